@@ -1,4 +1,4 @@
-"""Fewest stops over all places against fewest over the candidates, floor by floor."""
+"""Fewest stops over all positions compared with fewest over the candidates, floor by floor."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def main() -> None:
 
 
 def row(name: str, path: Path, options: dict[str, float]) -> list[object]:
-    """A floor's stops and bounds, both ways."""
+    """A floor's stops and bounds by both methods."""
     floor = read_floor(path)
     settings = Settings(selector=SELECTOR, **options)  # type: ignore[arg-type]
     begin = time.process_time()

@@ -1,4 +1,4 @@
-"""Measures the link: orders a second, large missions on a slow line, and what a robot costs at rest.
+"""Measures the link: commands per second, large missions on a slow link, and the load of an idle robot.
 
 Run: python -m benchmarks.bridge [--keys]; one line per figure, medians and p99. With --far instead: pushes
 and pauses on a line of long round trips, several pieces under way and, as formerly, one. With --stops: how
@@ -39,7 +39,7 @@ from tests.faults.full_disk import fill
 ORDERS = 1000
 THIS = (sys.executable, "-m", "benchmarks.bridge")
 ALONE = 100
-"""Of each stop, with nothing beside."""
+"""Bytes of each stop alone."""
 STOPS_OF_10_MB = 9_000
 POINTS_BETWEEN = 50
 FAR_BITS_PER_S, FAR_S = 8e6, 0.3
@@ -99,14 +99,14 @@ def measure(folder: Path, *, with_keys: bool) -> None:
 
 
 def order_time(station: Station) -> float:
-    """Seconds from sending an order to its stored answer; `retry` in READY is refused, and stored."""
+    """Seconds from sending a command to its stored answer; `retry` in READY is refused, and stored."""
     order = station.order("retry")
     payload = msgspec.json.encode(order)
     return timed(lambda: station.link.ask(station.keys.command("retry"), payload, timeout_s=1))
 
 
 def winding(mission: Mission) -> Mission:
-    """The same with ways of many points, for no mission may reach beyond 20 km."""
+    """The same with paths of many points, because no mission may extend beyond 20 km."""
     stops = tuple(
         msgspec.structs.replace(
             stop,
@@ -120,7 +120,7 @@ def winding(mission: Mission) -> Mission:
 
 
 def slow_push(station: Station) -> None:
-    """A document of some 10 MB at 8 Mbit/s, with questions asked meanwhile."""
+    """A document of about 10 MB at 8 Mbit/s, with queries during the transfer."""
     mission = winding(corridor(stops=STOPS_OF_10_MB, revision=2))
     size = len(msgspec.json.encode(mission))
     latencies: list[float] = []
@@ -145,7 +145,7 @@ def slow_push(station: Station) -> None:
 
 @contextmanager
 def one_by_one() -> Iterator[None]:
-    """Every piece waits for the answer to the last one, as formerly."""
+    """Every chunk waits for the answer to the previous one, as in the former version."""
     size = Window.size
     Window.size = property(lambda window: 1)  # type: ignore[assignment, method-assign]
     try:
@@ -173,7 +173,7 @@ def far(folder: Path) -> None:
 
 
 def far_push(station: Station, stops: int, revision: int, under_way: str) -> None:
-    """One push, with pauses given beside it while its pieces are under way."""
+    """One push, with pause commands while its chunks are in transit."""
     mission = winding(corridor(stops=stops, revision=revision))
     size = len(msgspec.json.encode(mission))
     pauses: list[float] = []
@@ -219,7 +219,7 @@ def stops(folder: Path, former: Path | None) -> None:
 
 @contextmanager
 def running_from(checkout: Path, state: Path) -> Iterator[str]:
-    """A robot of this checkout's version; gives its endpoint."""
+    """A robot of this checkout's version; yields its endpoint."""
     here = Path.cwd()
     os.chdir(checkout)
     try:
@@ -231,7 +231,7 @@ def running_from(checkout: Path, state: Path) -> Iterator[str]:
 
 
 def stops_on(folder: Path, row: str, checkout: Path, delay_s: float | None) -> None:
-    """`pause` and `abort` alone and beside a push, over one line."""
+    """`pause` and `abort` alone and during a push, over one link."""
     with running_from(checkout, folder) as endpoint:
         with connect(endpoint, robot="r1") as station:
             station.push(corridor())
@@ -253,7 +253,7 @@ def stops_on(folder: Path, row: str, checkout: Path, delay_s: float | None) -> N
 
 
 def push_of_10_mb(endpoint: str) -> None:
-    """Say when it begins."""
+    """Report the start."""
     mission = winding(corridor(stops=STOPS_OF_10_MB, revision=2))
     with connect(endpoint, robot="r1", commander="another", timeout_s=60) as station:
         print("begins", flush=True)
@@ -261,7 +261,7 @@ def push_of_10_mb(endpoint: str) -> None:
 
 
 def stopping(station: Station, over: Callable[[], bool]) -> dict[str, list[float]]:
-    """Seconds that stops take, in turn, until it is over."""
+    """Seconds of pause commands, one after the other, until the transfer ends."""
     took: dict[str, list[float]] = {"pause": [], "abort": []}
     while not over():
         for verb, seconds in took.items():
@@ -292,7 +292,7 @@ def stops_on_a_full_disk(at: str, name: str, checkout: str) -> None:
         asked = iter(range(2 * ALONE))
 
         def over() -> bool:
-            """What a stop, or the space kept for stops, left free is taken, too."""
+            """Fill the space that a pause command, or the space reserved for these, left free."""
             fill(Path(at) / "ballast")
             return next(asked, None) is None
 
@@ -307,7 +307,7 @@ def a_stop(station: Station, verb: Verb) -> tuple[str, bytes]:
 
 
 def pause(station: Station) -> tuple[str, bytes]:
-    """Where a pause is sent, and the pause; in READY it is refused, and stored."""
+    """Key expression and payload of a pause; in READY it is refused, and stored."""
     return a_stop(station, "pause")
 
 

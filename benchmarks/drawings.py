@@ -1,4 +1,4 @@
-"""What is found in architects' drawings, and how long that takes: `python -m benchmarks.drawings`."""
+"""Results and times of reading architects' drawings: `python -m benchmarks.drawings`."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def row(path: Path) -> list[object]:
 
 
 def against_the_truth() -> str:
-    """How well the rooms of the messy office fit those of the model it was made from."""
+    """Agreement of the messy office's rooms with those of its source model."""
     truth = read_floor(DATA / "layered" / "office-l1.dxf")
     found = read_floor(DATA / "dxf" / "office-l1-messy.dxf")
     off = lowest(truth) - lowest(found)

@@ -1,4 +1,4 @@
-"""Measures one station that listens to many robots: poses lost, and what they cost.
+"""Measures one station that receives many robots: lost poses, and processor load.
 
 Run: python -m benchmarks.fleet [--robots 50] [--seconds 20]; every robot is a process of its own.
 """

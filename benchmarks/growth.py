@@ -1,4 +1,4 @@
-"""How the cost of a plan grows with the floor: `python -m benchmarks.growth`.
+"""Growth of a plan's cost with the floor's area: `python -m benchmarks.growth`.
 
 Synthetic offices by seed, each planned in a process of its own, so that memory is counted apart; and
 one paper case as the whole command, recording included.
@@ -103,7 +103,7 @@ def plot(rows: list[list[object]]) -> str:
 
 
 def main() -> None:
-    """Measure, print, and put the table and the plot where readers find them."""
+    """Measure, print, and write the table and the plot into their files."""
     rows = [measured(*size) for size in SIZES]
     parts = [
         "## Growth",

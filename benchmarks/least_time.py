@@ -1,4 +1,4 @@
-"""What choosing stops and tour together saves against fewest stops and then the shortest route, floor by floor."""
+"""Time saved by choosing stops and tour together, against fewest stops first, floor by floor."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stopgo.mission.console.table import duration
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route
 from stopgo.planner.candidates import candidates
-from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import read_floor
 from stopgo.planner.routing import route
 from stopgo.planner.selection import select
@@ -40,17 +40,17 @@ def main() -> None:
 
 
 def row(name: str, scan: str, path: Path, options: dict[str, float]) -> list[object]:
-    """A floor's times, both ways."""
+    """A floor's times by both methods."""
     settings = Settings(minimise="time", **{**options, **SCANS[scan]})
     before = route(refined(select(visibility(candidates(navigable(read_floor(path), settings))))))
     begin = time.process_time()
-    made = in_least_time(before)
+    made = least_time_route(before)
     took = time.process_time() - begin
     return [name, scan, *figures_of(before, made, settings), f"{took:.1f}"]
 
 
 def figures_of(before: Route, made: Route, settings: Settings) -> list[str]:
-    """Both times, what is saved, stops and the bound."""
+    """Both times, the saving, stops and the lower bound."""
     told = made.time
     assert told is not None
     moving = told.two_step_s - len(before.order) * (settings.settle + settings.scan_time)

@@ -1,4 +1,4 @@
-"""How long field logs take to be read, and how much memory: `python -m benchmarks.logs [--evo PYTHON]`.
+"""Time and memory of reading field logs: `python -m benchmarks.logs [--evo PYTHON]`.
 
 With the Python of an environment in which evo is installed, evo reads the same files beside us.
 """
@@ -27,7 +27,7 @@ SMALL, LARGE = 100_000, 1_400_000
 """Messages of odometry; the second makes 1 GB."""
 STEP_NS = 10**7
 MARK = 1234.5678
-"""Found again in the bytes of a message, where x and y stand."""
+"""Marks the bytes of x and y in a message."""
 OURS = """
 import json, resource, sys, time
 from pathlib import Path
@@ -89,7 +89,7 @@ def row(path: Path, ours: dict[str, Any], theirs: dict[str, Any] | None) -> list
 
 
 def run(python: str, program: str, path: Path) -> dict[str, Any]:
-    """What a program in a process of its own printed last."""
+    """Last line printed by a program in a process of its own."""
     done = subprocess.run([python, "-c", program, str(path)], capture_output=True, text=True, check=True)
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return found

@@ -1,4 +1,4 @@
-"""Measures missions sent to autopilots over lines that lose: how often, how fast, and beside MAVSDK's client.
+"""Measures missions sent to autopilots over lossy links: success rate, time, and MAVSDK's client.
 
 Run: python -m benchmarks.mavlink [--seeds 10] [--peer-seeds 2]; the vehicle is the simulated one, the line
 20 ms long each way, and every run has a seed, a line and an empty vehicle of its own.
@@ -40,7 +40,7 @@ HEAD = ("vehicle", "items", "loss each way", "succeeded", "median s", "least s",
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run: whether the vehicle then held every item as it should, and how long it took."""
+    """One run: True if the vehicle then had every item, and the seconds it took."""
 
     right: bool
     seconds: float
@@ -115,7 +115,7 @@ def told(outcomes: Sequence[Outcome]) -> Row:
 
 @contextmanager
 def line(profile: str, rate: float, seed: int) -> Iterator[tuple[Url, Url]]:
-    """An empty vehicle behind a line that loses, and the same vehicle without the line."""
+    """An empty vehicle behind a lossy link, and the same vehicle without the link."""
     port = free_port()
     with (
         vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile])),
@@ -133,7 +133,7 @@ def sent(profile: str, listed: ItemList, rate: float, seed: int) -> Outcome:
 
 
 def fetched(profile: str, listed: ItemList, rate: float, seed: int) -> Outcome:
-    """By our reader, from a vehicle that was sent the list over a clean line."""
+    """By our reader, from a vehicle that received the list over a lossless link."""
     with line(profile, rate, seed) as (rough, clean):
         with reached(clean, vehicle=1) as peer:
             upload(peer, listed)
@@ -178,7 +178,7 @@ def attempt(client: Any, listed: ItemList) -> None:
 
 
 def timed(action: Callable[[], object]) -> float:
-    """Seconds of an action, whether it succeeds or says that it did not."""
+    """Seconds of an action, successful or not."""
     began = time.monotonic()
     with contextlib.suppress(StopgoError):
         action()

@@ -1,4 +1,4 @@
-"""How long a storey of a real model takes, first and again, beside IfcOpenShell's own geometry iterator."""
+"""Times of reading a storey of a real model, first and again, and of IfcOpenShell's geometry iterator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What it costs that all scans register with one another: stops, bound, pieces and time of every floor."""
+"""Cost of plans whose scans all register: stops, bound, components and time of every floor."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def rows_of(name: str, path: Path, options: dict[str, float]) -> Iterator[list[s
 
 
 def pairs_at(made: PartPlan, share: float) -> tuple[Overlap, ...]:
-    """Pairs of a plan's stops that register, whatever the plan asked for."""
+    """Pairs of a plan's stops that register, for any required overlap."""
     route = made.route
     space = made.space
     told = replace(space, settings=replace(space.settings, overlap=share))

@@ -1,4 +1,4 @@
-"""The paper's Tables 2 to 7 beside ours, and what its raster does on turned floors.
+"""The paper's Tables 2 to 7 with ours, and the errors of its raster on rotated floors.
 
 Frías et al., Remote Sensing 2019, 11(17), 1963. Its two buildings are not public: ours are reconstructions
 (units within 3 % of its Table 2, walls of case 2 12 % fewer), structural and with rooms.
@@ -51,7 +51,7 @@ RUNS = 3
 
 @dataclass(frozen=True)
 class Reported:
-    """What the paper reports of one strategy on one case (Tables 3 to 7)."""
+    """The paper's figures for one strategy on one case (Tables 3 to 7)."""
 
     generated: int
     left: int
@@ -433,7 +433,7 @@ def raster_table() -> str:
 
 
 def pairs(seen: Visibility) -> BoolArray:
-    """Whether each candidate sees each unit."""
+    """True where a candidate sees a unit."""
     found = np.zeros((seen.rows, seen.targets.total), dtype=bool)
     for row in range(seen.rows):
         found[row, seen.seen_by(row)] = True
@@ -441,7 +441,7 @@ def pairs(seen: Visibility) -> BoolArray:
 
 
 def _compared(found: BoolArray, truth: BoolArray) -> list[str]:
-    """Shares of the true pairs that are wrong and that are seen but are not, and of the units in sight."""
+    """Fractions of the true pairs that are missed and wrongly seen, and of the visible units."""
     union = np.sum(found.any(axis=0) & truth.any(axis=0)) / np.sum(truth.any(axis=0))
     wrong, invented = np.sum(found != truth) / truth.sum(), np.sum(found & ~truth) / truth.sum()
     return [f"{100 * wrong:.1f} %", f"{100 * invented:.1f} %", f"{union:.3f}"]

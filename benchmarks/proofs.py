@@ -1,4 +1,4 @@
-"""What simulated scans bring of every floor's default plan: promised, in sight, acquired, and registered."""
+"""Simulated scans of every floor's default plan: promised, visible, acquired, and registered."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.overlap import USUAL_SHARE
-from stopgo.planner.scan_simulation.proving import prove
+from stopgo.planner.scan_simulation.verification import verify
 
 HEAD = (
     *("floor", "stops", "promised", "acquired at 0.1°", "claims not in sight", "missed between rays"),
@@ -30,10 +30,10 @@ JOINED_HEAD = (
 
 
 def main() -> None:
-    """Prove every floor at hand and put the tables into the README."""
+    """Verify every floor at hand and put the tables into the README."""
     floors = {name: value for name, value in FLOORS.items() if value[0].exists()}
-    rows = [row(name, *proved(*value)) for name, value in floors.items()]
-    joined = [joined_row(name, *proved(*value, overlap=USUAL_SHARE)) for name, value in floors.items()]
+    rows = [row(name, *verified(*value)) for name, value in floors.items()]
+    joined = [joined_row(name, *verified(*value, overlap=USUAL_SHARE)) for name, value in floors.items()]
     text = "\n\n".join(
         (
             versions("numpy", "embreex", "small-gicp"),
@@ -59,19 +59,19 @@ JOINED_NOTE = (
 )
 
 
-def proved(path: Path, options: dict[str, float], **more: float) -> tuple[PlanProof, float]:
-    """One floor's proof, and the seconds of processor time that it took."""
+def verified(path: Path, options: dict[str, float], **more: float) -> tuple[PlanProof, float]:
+    """One floor's verification, and its seconds of processor time."""
     settings = Settings(**options, **more)
     made = plan(read_floor(path, options_of(settings)), settings)
     told = msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
     begin = time.process_time()
     simulation = Simulation(range_m=settings.range, joining_m=settings.farthest_overlap)
-    proof = prove(made.mission, made.space, simulation, told)
+    proof = verify(made.mission, made.space, simulation, told)
     return proof, time.process_time() - begin
 
 
 def row(name: str, proof: PlanProof, seconds: float) -> list[str]:
-    """What a floor's scans show of its targets."""
+    """Coverage of a floor's targets by its scans."""
     quality = proof.quality
     claimed = sum(stop.claimed for stop in proof.stops)
     lacking = sum(max(0, stop.claimed - stop.sighted) for stop in proof.stops)
@@ -89,7 +89,7 @@ def row(name: str, proof: PlanProof, seconds: float) -> list[str]:
 
 
 def joined_row(name: str, proof: PlanProof, seconds: float) -> list[str]:
-    """How a floor's scans register."""
+    """Registration of a floor's scans."""
     network = network_of(proof.mission)
     assert network is not None
     promised = {(item.a, item.b) for item in network.overlaps}

@@ -1,4 +1,4 @@
-"""What it costs to see targets well enough: flat rays, wide spacing and single views left out."""
+"""Cost of limits on views: without flat rays, wide spacing and single views."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def rows_of(name: str, path: Path, more: dict[str, Any]) -> Iterator[list[object]]:
-    """One row for each thing that is asked."""
+    """One row for each set of limits."""
     for words, asked in ASKED.items():
         settings = read_settings(None, {**more, **asked})
         watch = _Watch()
@@ -64,7 +64,7 @@ class _Watch:
     seconds = 0.0
 
     def observe(self, noun: object) -> None:
-        """Start and stop at the nouns."""
+        """Start and stop the clock at the stage results."""
         if isinstance(noun, Visibility):
             self._begin = time.process_time()
         if isinstance(noun, Selection):

@@ -1,4 +1,4 @@
-"""What recordings cost: `python -m benchmarks.recordings [--large] [CHECKOUT]`.
+"""Size and time of recordings: `python -m benchmarks.recordings [--large] [CHECKOUT]`.
 
 Plans of synthetic offices are drawn, a run of four hours is recorded, a folder of a thousand files is listed,
 and a large plan is opened by a viewer. With the folder of an older checkout its figures stand beside ours, from
@@ -69,7 +69,7 @@ nouns = [*part.stage_results(), schedule(part.mission), sight_of(part.route, par
 with open(sys.argv[3], "wb") as file:
     pickle.dump((part, nouns), file)
 """
-"""Plans an office and keeps every noun."""
+"""Plans an office and keeps every stage result."""
 
 
 def sizes() -> tuple[tuple[float, float], ...]:
@@ -77,7 +77,7 @@ def sizes() -> tuple[tuple[float, float], ...]:
 
 
 def ran(checkout: Path, script: str, *arguments: object) -> str:
-    """What a script prints that runs with the modules of a checkout."""
+    """Output of a script that runs with the modules of a checkout."""
     done = subprocess.run(
         [sys.executable, "-c", script, *map(str, arguments)],
         cwd=checkout,
@@ -202,7 +202,7 @@ def opened(folder: Path) -> list[list[object]]:
 
 
 def main() -> None:
-    """Measure, print, and put the tables where readers find them; STOPGO_BENCH keeps the plans for next time."""
+    """Measure, print, and write the tables into the README; STOPGO_BENCH keeps the plans for the next run."""
     folders = [Path(item).resolve() for item in sys.argv[1:] if not item.startswith("-")]
     former = folders[0] if folders else None
     with tempfile.TemporaryDirectory() as temporary:

@@ -1,4 +1,4 @@
-"""What a least share of every room and kind costs in stops, and what a plan without one leaves unseen."""
+"""Stops needed for a required fraction of every room and kind, and targets missed without one."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def main() -> None:
 
 
 def cost_row(name: str, path: Path, options: dict[str, float]) -> list[str]:
-    """Stops and bound at each share."""
+    """Stops and bound at each required fraction."""
     settings = Settings(**options)
     floor = read_floor(path, FloorOptions(d_dis=settings.d_dis))
     seen = visibility(candidates(navigable(floor, settings)))
@@ -85,7 +85,7 @@ def _selections(seen: Visibility) -> Iterator[Selection]:
 
 
 def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list[str]]:
-    """What a plan comes to by either rule, told by length."""
+    """Figures of a plan by either rule, counted by length."""
     for rule in ("paper", "length"):
         settings = Settings(**options, coverage_rule=rule)
         begin = time.perf_counter()
@@ -102,7 +102,7 @@ def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list
 
 
 def _by_length(selection: Selection, figures: Figures) -> Figures:
-    """The figures of a selection by length, whatever rule it was made by."""
+    """The figures of a selection by length, for either rule."""
     from stopgo.planner.appraisal.figures_of_route import shares_of
 
     space = selection.visibility.candidates.space

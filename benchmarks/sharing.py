@@ -1,4 +1,4 @@
-"""What sharing a floor out brings: the longest mission of fleets, the number of tours, and their bounds."""
+"""Task allocation: the longest mission of fleets, the number of tours, and their bounds."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def main() -> None:
 
 
 def rows_of(name: str, path: Path, start: tuple[float, float, float]) -> Iterator[list[str]]:
-    """One robot alone, then every way of sharing out."""
+    """One robot alone, then every allocation."""
     floor = read_floor(path, FloorOptions())
     alone = schedule(plan(floor, Settings(start=start)).mission).total_s
     yield [name, "1 robot", "1", duration(alone), "", "", duration(alone), ""]
@@ -56,7 +56,7 @@ def rows_of(name: str, path: Path, start: tuple[float, float, float]) -> Iterato
 
 
 def figures_of(floor: FloorPlan, settings: Settings) -> list[str]:
-    """Missions, the longest, its bound, the gap, all times together, and what it took to plan."""
+    """Missions, the longest, its bound, the gap, the total time, and the planning time."""
     begin = time.process_time()
     divided = plan(floor, settings).divided
     seconds = time.process_time() - begin

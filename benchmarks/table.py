@@ -1,4 +1,4 @@
-"""Markdown tables and where they stand in benchmarks/README.md."""
+"""Markdown tables and their markers in benchmarks/README.md."""
 
 from __future__ import annotations
 

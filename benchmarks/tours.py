@@ -1,4 +1,4 @@
-"""Tours against peers and proven bounds, and the paper's grids against exact ways.
+"""Tours compared with other solvers and proven bounds; the paper's grids compared with exact paths.
 
 Run: python -m benchmarks.tours. Peers are fast-tsp, pyvrp and OR-tools where they can be imported: they
 are not dependencies. Each peer that runs for a given time gets the time of planning.md's comparison.
@@ -24,10 +24,10 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.routing.colony import ant_colony
-from stopgo.planner.routing.grid_graph import RESOLUTIONS, ways_on_grids
-from stopgo.planner.routing.proof import Proof, proved
-from stopgo.planner.routing.roadmap import ways_between
-from stopgo.planner.routing.tour import length_of, nanometres, searched, shortest_tour, trials
+from stopgo.planner.routing.grid_graph import RESOLUTIONS, paths_on_grids
+from stopgo.planner.routing.proof import Proof, tour_proof
+from stopgo.planner.routing.roadmap import paths_between
+from stopgo.planner.routing.tour import length_of, nanometres, search, shortest_tour, trials
 from stopgo.planner.routing.ways import Ways
 from stopgo.planner.space.navigable import navigable
 
@@ -36,7 +36,7 @@ SIDE = 100.0
 SEEDS = {10: 5, 20: 5, 50: 5, 200: 3, 1000: 1}
 """Instances per number of points."""
 SECONDS = {10: 1.0, 20: 1.0, 50: 1.0, 200: 5.0, 1000: 5.0}
-"""What a peer that runs for a given time is given."""
+"""Time limit of a solver that runs for a given time."""
 ANTS_UP_TO = 200
 LONG_SEARCH = 5
 """Perturbations of the long search among the best found, in multiples of ours."""
@@ -78,7 +78,7 @@ def solvers() -> dict[str, Solver]:
 
 
 def search_and_proof(lengths: FloatArray) -> Proof:
-    return proved(nanometres(lengths), shortest_tour(lengths, seed=1))
+    return tour_proof(nanometres(lengths), shortest_tour(lengths, seed=1))
 
 
 def fast_tsp(lengths: FloatArray, seconds: float) -> IntArray:
@@ -202,7 +202,7 @@ def _long_search(lengths: FloatArray) -> int:
     if len(lengths) < 50:
         return length_of(cost, search_and_proof(lengths).order)
     perturbations = trials(cost, LONG_SEARCH * 100 * len(lengths), seed=2)
-    return length_of(cost, searched(cost, perturbations, interpreted=False))
+    return length_of(cost, search(cost, perturbations, interpreted=False))
 
 
 def _proved(instances: list[FloatArray]) -> str:
@@ -216,17 +216,17 @@ def _proved(instances: list[FloatArray]) -> str:
 
 
 def ways_table() -> str:
-    """Stop pairs that a grid connects and how much longer its ways are than the exact ones."""
+    """Stop pairs that a grid connects, and the excess length of its paths over exact ones."""
     space = navigable(office(60, 40, seed=1), Settings())
     stops = free_points(space, 50, seed=1)
-    exact, spent = _timed(lambda: ways_between(space, stops))
+    exact, spent = _timed(lambda: paths_between(space, stops))
     i, j = np.triu_indices(len(stops), 1)
     rows: list[tuple[object, ...]] = [("exact", "100 %", "1", "1", len(exact.xy), spent)]
     for name, resolutions in (
         *((f"grid {r:g} m", (r,)) for r in RESOLUTIONS[:4]),
         ("grid, refined", RESOLUTIONS),
     ):
-        found, spent = _timed(lambda r=resolutions: ways_on_grids(space, stops, resolutions=r))
+        found, spent = _timed(lambda r=resolutions: paths_on_grids(space, stops, resolutions=r))
         lengths = found.lengths[i, j]
         joined = np.isfinite(lengths)
         excess = lengths[joined] / exact.lengths[i, j][joined]
@@ -248,7 +248,7 @@ def _timed(action: Callable[[], Ways]) -> tuple[Ways, float]:
 
 
 def free_points(space: NavigableSpace, count: int, *, seed: int) -> FloatArray:
-    """Positions (count, 2) in the largest piece of the drive area, well inside it."""
+    """Positions (count, 2) in the largest part of the drive area, well inside it."""
     pieces = [shapely.Polygon(p.exterior, p.holes).buffer(-0.3) for p in space.drive_area]
     largest = max(pieces, key=shapely.area)
     low_x, low_y, high_x, high_y = largest.bounds

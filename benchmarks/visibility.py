@@ -27,7 +27,7 @@ from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 PAPER = ("case1_structural", "case2_structural", "case1_rooms", "case2_rooms")
 PAIRS = 20_000
-"""Pairs that the peer is timed on; its whole time is the share of all pairs."""
+"""Pairs on which the other library is timed; its total time is extrapolated to all pairs."""
 
 
 def scene_and_points(floor: FloorPlan, settings: Settings) -> tuple[Scene, np.ndarray, object]:

@@ -119,7 +119,7 @@ WRONG: dict[str, tuple[str, str, str]] = {
         "def f(space, points):\n"
         "    n = len(points)\n"
         "    return shortest_ways(points, np.array(list(combinations(range(n), 2))), n)",
-        "the leg to .* comes too near an obstacle or an edge",
+        "leg to .* is too close to an obstacle or an edge",
     ),
 }  # fmt: skip
 

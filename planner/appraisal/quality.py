@@ -15,9 +15,9 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.mission.stages.coverage_totals import ledger_of
 from stopgo.mission.stages.figures import LimitCost, Quality, percent
-from stopgo.planner.selection import quick
-from stopgo.planner.visibility import seen_well
-from stopgo.planner.visibility.limited import without
+from stopgo.planner.selection import quick_estimate
+from stopgo.planner.visibility import within_all_limits
+from stopgo.planner.visibility.limited import without_limit
 
 NOT_MET = "limits_not_met"
 MOST_NAMED = 5
@@ -37,7 +37,7 @@ def quality_of(selection: Selection) -> Quality | None:
     in_sight = _in_sight(seen)
     stops, costs = len(selection.chosen), []
     for key, words in limits.items():
-        fewer, bound = quick(_under(in_sight, without(settings, key)))
+        fewer, bound = quick_estimate(_under(in_sight, without_limit(settings, key)))
         costs.append(LimitCost(key, words, stops=stops, without=fewer, bound=bound))
     ledger = ledger_of(seen)
     return Quality(tuple(costs), ledger.amount(in_sight.visible), ledger.amount(_possible(seen)))
@@ -51,7 +51,7 @@ def _under(in_sight: Visibility, settings: Settings) -> Visibility:
     """Visibility within the limits of other settings."""
     candidates = in_sight.candidates
     space = replace(candidates.space, settings=settings)
-    return seen_well(replace(in_sight, candidates=replace(candidates, space=space)))
+    return within_all_limits(replace(in_sight, candidates=replace(candidates, space=space)))
 
 
 def _possible(seen: Visibility) -> BoolArray:

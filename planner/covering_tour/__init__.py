@@ -1,9 +1,9 @@
-"""Route -> route: stops and their order chosen together, so that driving, turning and scanning take least.
+"""Route -> route: stops and their order chosen together, for the least time of the whole mission.
 
-The covering tour problem (Gendreau, Laporte and Semet, Operations Research 1997): a tour over some of the
-places, from which enough is seen. From the fewest stops and the shortest route over them on, stops are
-exchanged, left out and added, and stretches turned round, by the time that the route then takes. By the
-mission's own schedule the route is never slower than the one that it began with.
+This is the covering tour problem (Gendreau, Laporte and Semet, Operations Research 1997): a tour over some
+of the positions, from which enough is seen. The search begins with the fewest stops and their shortest
+route. It exchanges, removes and adds stops and reverses stretches, by the time of the route. By the
+mission's own schedule the result is never slower than the first route.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from stopgo.planner.selection.greedy import in_greedy_order
 METHOD = "stops and tour together, by tabu search"
 
 
-def in_least_time(route: Route, *, done: IntArray | None = None) -> Route:
-    """The route with its stops and their order chosen for the least time, and what no plan is below.
+def least_time_route(route: Route, *, done: IntArray | None = None) -> Route:
+    """The route with its stops and their order chosen for the least time, and a lower bound on the time.
 
-    Rows `done` see what they see already, and are not driven to.
+    Rows `done` were scanned before: they count as seen and are not visited.
     """
     problem = problem_of(route, done)
     found = _driven(route, problem, shorter_line(problem.times, problem.task, problem.line))
     two_step_s, seconds = _seconds(route), _seconds(found)
     best = found if seconds < two_step_s else route
-    bound = max(0.0, min(seconds, two_step_s, least_time(problem.asked)))
+    bound = max(0.0, min(seconds, two_step_s, least_time(problem.bound_problem)))
     return replace(best, time=LeastTime(min(seconds, two_step_s), two_step_s, len(route.order), bound))
 
 
-def as_before(two_step: Route, quicker: Route) -> Route:
-    """The route of fewest stops, with what is known of its time from the quicker one."""
-    told = quicker.time
-    return two_step if told is None else replace(two_step, time=replace(told, seconds=told.two_step_s))
+def with_known_time(two_step: Route, quicker: Route) -> Route:
+    """The route of fewest stops, with the times and the bound found for the quicker one."""
+    known = quicker.time
+    return two_step if known is None else replace(two_step, time=replace(known, seconds=known.two_step_s))
 
 
 def _seconds(route: Route) -> float:
-    """What the route takes, by its mission's schedule."""
+    """Duration of the route by its mission's schedule."""
     return schedule(assemble(route)).total_s
 
 
@@ -55,9 +55,9 @@ def _driven(route: Route, problem: TourProblem, line: PointLine) -> Route:
     """The route that drives a line."""
     stops = problem.stops_of(line)
     selection = _selected(route.selection, problem, np.array(stops, dtype=np.int64))
-    place = {int(row): k for k, row in enumerate(selection.chosen)}
+    index = {int(row): k for k, row in enumerate(selection.chosen)}
     points, ends = points_and_ends(selection)
-    order = [place[int(problem.rows[stop])] for stop in stops]
+    order = [index[int(problem.rows[stop])] for stop in stops]
     ends = replace(ends, first=order[0] if ends.first is not None and ends.first < len(order) else ends.first)
     first = [ends.first] if ends.first is not None and ends.first >= len(order) else []
     last = [ends.last] if ends.last is not None else []
@@ -68,7 +68,7 @@ def _driven(route: Route, problem: TourProblem, line: PointLine) -> Route:
 
 
 def _selected(before: Selection, problem: TourProblem, stops: IntArray) -> Selection:
-    """The selection of these stops, in the order in which they add to what is seen."""
+    """The selection of these stops, in the order of their gain in coverage."""
     stay = problem.task.stays[stops]
     others = in_greedy_order(problem.task.cover, np.sort(stops[~stay]))
     rows = problem.rows[np.concatenate([np.sort(stops[stay]), others]).astype(np.int64)]
@@ -78,4 +78,4 @@ def _selected(before: Selection, problem: TourProblem, stops: IntArray) -> Selec
     return replace(before, chosen=frozen(rows, np.int64), coverage_steps=frozen(steps), method=method)
 
 
-__all__ = ["as_before", "in_least_time"]
+__all__ = ["least_time_route", "with_known_time"]

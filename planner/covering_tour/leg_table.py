@@ -1,6 +1,6 @@
-"""Ways between all points, with the time that each takes, in whole microseconds as a search adds them up.
+"""Times of the paths between all points, in whole microseconds, so that a search can add them exactly.
 
-A heading is told as the microseconds that turning to it takes from +x on, so that turns are differences.
+A heading is the number of microseconds that a turn from +x to it takes, so that turns are differences.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from stopgo.planner.routing.ways import Ways
 MICROSECONDS = 1e6
 """Per second."""
 NO_HEADING = -1
-"""Where nothing is driven, or it does not matter whence or whither."""
+"""Heading of a leg without length, and of the point `free`."""
 NO_WAY_S = 1e9
-"""Between points that no way joins."""
+"""Seconds between points without a path."""
 SOURCES = 128
-"""Points from which ways are followed at a time."""
+"""Points whose paths are traced at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class LegTable:
-    """What the ways between points take, and how they begin and end (points, points)."""
+    """Times of the paths between points, and their first and last headings (points, points)."""
 
     spent: IntArray
-    """Microseconds of a way from rest to rest, with the turns at its own corners."""
+    """Microseconds of a path from rest to rest, with the turns at its own corners."""
     leaving: IntArray
-    """Heading with which a way begins …"""
+    """Heading at the beginning of a path."""
     arriving: IntArray
-    """… and ends."""
+    """Heading at the end of a path."""
     whole_turn: int
-    """Microseconds that a turn all round would take."""
+    """Microseconds of a full turn."""
 
     def turns(self, a: IntArray, b: IntArray) -> IntArray:
-        """Microseconds to turn from headings to others, the short way round; 0 where there is none."""
+        """Microseconds to turn between headings in the shorter direction; 0 where either is none."""
         apart = np.abs(a - b)
         least: IntArray = np.where((a < 0) | (b < 0), 0, np.minimum(apart, self.whole_turn - apart))
         return least
@@ -53,9 +53,9 @@ class LegTable:
 
 
 def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
-    """The table of all ways between the points of `legs`.
+    """The table of all paths between the points of `legs`.
 
-    Of a graph that is another's the ways are taken to be straight: only their lengths are at hand.
+    The paths of a third-party graph count as straight, because only their lengths are known.
     """
     whole_turn = round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
     if legs.graph.ours:
@@ -66,19 +66,19 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
         leaving = arriving = np.arctan2(step[..., 1], step[..., 0])
     driven = legs.lengths > 0
     seconds = np.where(np.isfinite(legs.lengths), seconds, NO_WAY_S)
-    told = [
+    headings = [
         np.rint(angle / math.tau * whole_turn).astype(np.int64) % whole_turn for angle in (leaving, arriving)
     ]
     return LegTable(
         spent=frozen(np.where(driven, np.rint(seconds * MICROSECONDS), 0), np.int64),
-        leaving=frozen(np.where(driven, told[0], NO_HEADING), np.int64),
-        arriving=frozen(np.where(driven, told[1], NO_HEADING), np.int64),
+        leaving=frozen(np.where(driven, headings[0], NO_HEADING), np.int64),
+        arriving=frozen(np.where(driven, headings[1], NO_HEADING), np.int64),
         whole_turn=whole_turn,
     )
 
 
 def _followed(ways: Ways, count: int, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Seconds (n, n) of the ways between the first points, and headings at their beginnings and ends."""
+    """Seconds (n, n) of the paths between the first points, and headings at their beginnings and ends."""
     seconds, leaving, arriving = (np.zeros((count, count)) for _ in range(3))
     for first in range(0, count, SOURCES):
         source = np.arange(first, min(count, first + SOURCES))
@@ -96,9 +96,9 @@ def _followed(ways: Ways, count: int, robot: RobotSpec) -> tuple[FloatArray, Flo
 def _back(
     xy: FloatArray, before: IntArray, source: IntArray, start: IntArray, end: IntArray, robot: RobotSpec
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of ways (k,) from `source[start]` to `end`, followed from their ends: seconds, first and last heading.
+    """Seconds, first and last heading of paths (k,) from `source[start]` to `end`, traced from their ends.
 
-    Pieces in one line are one, as they are driven.
+    Collinear pieces count as one, as they are driven.
     """
     count = len(start)
     seconds, run, heading, last = (np.zeros(count) for _ in range(4))

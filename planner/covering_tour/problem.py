@@ -1,4 +1,35 @@
-"""Route -> what a search for a quicker one needs: places, times of ways, what must be seen, what stays."""
+"""Route -> the covering tour problem: positions, times of paths, coverage demands, required stops.
+
+Four numberings
+---------------
+Rows: candidates, as in `Visibility` and `Cover` (0 to `whole.rows` - 1). `offered`, `stays`, `done` and
+`rows` hold row numbers; `whole` and `cover` are numbered by rows.
+
+Positions: candidates that may become stops in the search. Position k is row `rows[k]`. `rows` is ascending
+and holds the offered rows nearest to the chosen ones (at most `MOST_POSITIONS`), all chosen rows, and all
+required rows. The cover of `task`, and `task.stays` and `task.rank`, are numbered by positions.
+
+Points: with P positions and E ends,
+- 0 to P - 1 are the positions;
+- P to P + E - 1 are the ends: the start if it is given, then the end if it is given, then for a closed
+  route without a start a second copy of the stop where it begins (`begin`);
+- P + E is `free`, a virtual point: it takes no time to drive from it or to it.
+`legs` and its lengths are over the P + E real points; `times` is over all P + E + 1 points. The points of
+the time bound (`bound_problem`) are numbered apart: all offered and required rows, then start and end.
+
+Lines: a route is a list of points (`line`). Its first and last entries are fixed, all others are positions:
+- open: from the start, or `free`, to the end, or `free`;
+- closed with a start: from the start back to the same point;
+- closed without a start: from position `begin` to its copy, the last of the ends. `begin` stays.
+
+Invariants
+----------
+- `cover` is what required and scanned rows leave of `whole`. In `task` the stop `begin` is taken off too.
+- Required rows are positions of every line. Rows in `done` count as seen and are never on a line.
+- A heading is an angle counted in microseconds of turning (`LegTable`); `NO_HEADING` is -1.
+- `connected` takes row numbers here, and position numbers in `LineTask`.
+- The cached properties are computed once, in any order: they depend only on the fields.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +45,7 @@ from stopgo.mission.document.specs import robot_of
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Route, Visibility
-from stopgo.planner.covering_tour.least_time_bound import RouteAsked
+from stopgo.planner.covering_tour.least_time_bound import RouteRequirements
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
 from stopgo.planner.covering_tour.search import LineTask
 from stopgo.planner.covering_tour.timed_line import LineTimes, PointLine
@@ -22,39 +53,39 @@ from stopgo.planner.covering_tour.zones import Zone, zones_of
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.legs import Legs
-from stopgo.planner.selection import METHODS, left_by, offered_further, posed
+from stopgo.planner.selection import METHODS, cover_problem, offered_for_follow_up, remaining_cover
 from stopgo.planner.selection.bound import lower_bound
-from stopgo.planner.selection.connected_selection import JoinedCover
+from stopgo.planner.selection.connected_selection import ConnectedCover
 from stopgo.planner.selection.cover import Cover
 
-MOST_PLACES = 1500
-"""Candidates that may become stops: those nearest to the stops there are."""
+MOST_POSITIONS = 1500
+"""Most candidates that may become stops: those nearest to the chosen ones."""
 MOST_BOUNDED = 5000
-"""Candidates up to which the bound tells of the way at all."""
+"""Candidates up to which the bound includes driving."""
 
 
-Together = Callable[[IntArray], bool]
-"""Whether the scans of some rows hang together as they must."""
+ConnectionTest = Callable[[IntArray], bool]
+"""Returns True if the scans of some rows are connected as required."""
 
 
 @dataclass(frozen=True, eq=False)
 class TourProblem:
-    """Places are numbered as in `rows`; points are the places, then start and end, then `free`."""
+    """The problem of one route; rows, positions, points and lines are numbered as the module explains."""
 
     route: Route
     whole: Cover
-    """All that is asked for, over all rows."""
+    """The whole covering problem, over all rows."""
     cover: Cover
-    """What is left of it after what stays and what is done, over all rows."""
+    """The covering problem that remains after the rows `stays` and `done`, over all rows."""
     offered: IntArray
     """All rows that a stop may be at."""
     rows: IntArray
-    """Of those, the rows of places, and rows that stay (places,)."""
+    """Row of each position, ascending (positions,)."""
     stays: IntArray
-    """Rows that are stops in any case."""
+    """Required rows: a stop must be at each."""
     done: IntArray
-    """Rows that see what they see, and are no stops."""
-    together: Together
+    """Rows scanned before: they count as seen and are no stops."""
+    connected: ConnectionTest
 
     @property
     def candidates(self) -> Candidates:
@@ -70,18 +101,18 @@ class TourProblem:
 
     @cached_property
     def begin(self) -> int | None:
-        """The stop that a closed route without a start begins at, which stays."""
+        """The position where a closed route without a start begins, which must stay; else None."""
         return self._order[0] if self.closed and self.settings.start is None else None
 
     @cached_property
     def _order(self) -> PointLine:
-        """The route's stops, as places."""
+        """The route's stops, as positions."""
         chosen = self.route.selection.chosen[self.route.order]
         return [int(k) for k in np.searchsorted(self.rows, chosen)]
 
     @cached_property
     def _ends(self) -> FloatArray:
-        """Start and end where they are given; and where the route begins and ends itself, that place."""
+        """Start and end if they are given, then the copy of `begin` if there is one (ends, 2)."""
         found = [] if self.settings.start is None else [self.settings.start[:2]]
         found += [] if self.settings.end is None else [self.settings.end]
         found += [] if self.begin is None else [tuple(self._xy[self.begin].tolist())]
@@ -99,8 +130,8 @@ class TourProblem:
     @cached_property
     def line(self) -> PointLine:
         """The route as a line."""
-        places, free = len(self.rows), len(self.rows) + len(self._ends)
-        start = places if self.settings.start is not None else free
+        positions, free = len(self.rows), len(self.rows) + len(self._ends)
+        start = positions if self.settings.start is not None else free
         end = free - 1 if self.settings.end is not None or self.begin is not None else free
         if self.closed and self.begin is None:
             end = start
@@ -108,25 +139,25 @@ class TourProblem:
         return [order[0], *order[1:], end] if self.begin is not None else [start, *order, end]
 
     def stops_of(self, line: PointLine) -> PointLine:
-        """The stops of a line, as places."""
+        """The stops of a line, as positions."""
         return [point for point in line if point < len(self.rows)]
 
     @cached_property
     def times(self) -> LineTimes:
-        settings, candidates, places = self.settings, self.candidates, len(self.rows)
+        settings, candidates, positions = self.settings, self.candidates, len(self.rows)
         table = leg_table(self.legs, robot_of(settings))
-        scan = np.full(places + len(self._ends) + 1, NO_HEADING, dtype=np.int64)
+        scan = np.full(positions + len(self._ends) + 1, NO_HEADING, dtype=np.int64)
         if len(candidates.heading):
             headings = candidates.heading[candidates.kept[self.rows]].tolist()
-            scan[:places] = [table.heading(heading) for heading in headings]
+            scan[:positions] = [table.heading(heading) for heading in headings]
         start_heading = NO_HEADING
         stands = scan.copy()
         if settings.start is not None:
             start_heading = table.heading(math.radians(settings.start[2]))
-            stands[places] = start_heading
+            stands[positions] = start_heading
         return LineTimes(
             table=_with_free(table, self.legs.lengths, stands),
-            places=places,
+            positions=positions,
             pause=round((settings.settle + settings.scan_time) * MICROSECONDS),
             scan=frozen(scan, np.int64),
             start_heading=start_heading,
@@ -143,22 +174,22 @@ class TourProblem:
             cover=_of_rows(cover, self.rows),
             stays=stays,
             rank=None if self.begin is not None else rank,
-            together=lambda places: self.together(self.rows[places]),
+            connected=lambda positions: self.connected(self.rows[positions]),
         )
 
     @cached_property
-    def asked(self) -> RouteAsked:
-        """The same problem for its bound, over all candidates; where there are too many, the stops alone."""
+    def bound_problem(self) -> RouteRequirements:
+        """The problem of the time bound, over all candidates; if these are too many, only the stops' time."""
         settings = self.settings
         rows = np.union1d(self.offered, self.stays).astype(np.int64)
         if len(rows) > MOST_BOUNDED:
             return self._stops_alone
         start = len(rows) if settings.start is not None else None
         end = len(rows) + (start is not None) if settings.end is not None else None
-        lengths, seconds = self._ways_over(rows)
+        lengths, seconds = self._paths_over(rows)
         among = np.arange(len(rows))
         own = [Zone(np.flatnonzero(rows == row), 0.0) for row in self.stays]
-        return RouteAsked(
+        return RouteRequirements(
             lengths=lengths,
             seconds=seconds,
             offered=among,
@@ -173,17 +204,17 @@ class TourProblem:
 
     @cached_property
     def _fewest(self) -> int:
-        """How many stops there are at least; what another's selector says of it is not taken for proved."""
+        """Lower bound on the number of stops; the bound of a third-party selector does not count."""
         selection = self.route.selection
         if self.settings.selector in METHODS:
             return selection.bound
         return len(self.stays) + lower_bound(self.cover, found=len(selection.chosen) - len(self.stays))
 
     @property
-    def _stops_alone(self) -> RouteAsked:
-        """The problem as if all places were one."""
+    def _stops_alone(self) -> RouteRequirements:
+        """The problem with all positions merged into one."""
         settings, none = self.settings, np.zeros((1, 1))
-        return RouteAsked(
+        return RouteRequirements(
             lengths=none,
             seconds=none,
             offered=np.arange(1),
@@ -196,8 +227,8 @@ class TourProblem:
             robot=robot_of(settings),
         )
 
-    def _ways_over(self, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Metres and seconds between rows, start and end; of very many rows as the crow flies."""
+    def _paths_over(self, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Metres and seconds between rows, start and end; for very many rows in a straight line."""
         given = len(self._ends) - (self.begin is not None)
         if len(rows) == len(self.rows):
             points = len(rows) + given
@@ -210,19 +241,21 @@ class TourProblem:
 
 
 def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
-    """What is to be seen and what must stay, as the selection of the route has it."""
+    """The covering tour problem of a route's selection; rows `done` were scanned before."""
     visibility, chosen = route.selection.visibility, np.unique(route.selection.chosen)
     stays: IntArray = np.empty(0, dtype=np.int64)
-    together: Together = _any_rows
+    connected: ConnectionTest = _any_rows
     joins = visibility.candidates.space.settings.least_overlap > 0
     if done is not None:
-        whole, cover = left_by(visibility, done)
+        whole, cover = remaining_cover(visibility, done)
         if joins:
-            cover, together = _joined(visibility, whole, done, chosen, offered_further(visibility, done))
+            cover, connected = _joined(
+                visibility, whole, done, chosen, offered_for_follow_up(visibility, done)
+            )
     else:
-        whole, stays, cover = posed(visibility)
+        whole, stays, cover = cover_problem(visibility)
         if joins:
-            cover, together = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
+            cover, connected = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
     offered = np.flatnonzero(np.diff(cover.sees.indptr)).astype(np.int64)
     nearest = _nearest(visibility.candidates, offered, chosen)
     return TourProblem(
@@ -233,7 +266,7 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
         rows=frozen(np.union1d(nearest, np.union1d(chosen, stays)), np.int64),
         stays=stays,
         done=np.empty(0, np.int64) if done is None else done,
-        together=together,
+        connected=connected,
     )
 
 
@@ -243,34 +276,35 @@ def _any_rows(rows: IntArray) -> bool:
 
 def _joined(
     visibility: Visibility, whole: Cover, fixed: IntArray, chosen: IntArray, offered: IntArray
-) -> tuple[Cover, Together]:
-    """What is left to see where scans must register, and whether rows hang together as the chosen ones do.
+) -> tuple[Cover, ConnectionTest]:
+    """The remaining covering problem where scans must register, and the test for connection.
 
-    Rows `fixed` stay or were scanned before; they hang together with the others.
+    Rows `fixed` are required or were scanned before. Rows pass the test if, together with `fixed`, they
+    are connected at least as well as the chosen rows.
     """
     cover = whole.with_one_of_each([np.array([row]) for row in fixed])
-    task = JoinedCover(cover, links_of(visibility.candidates), offered)
+    task = ConnectedCover(cover, links_of(visibility.candidates), offered)
     most = task.parts(np.union1d(chosen, fixed))
-    left = whole.after(fixed).offering(np.sort(np.concatenate(task.grounds)))
+    left = whole.after(fixed).offering(np.sort(np.concatenate(task.regions)))
     return left, lambda rows: task.parts(np.union1d(rows, fixed)) <= most
 
 
 def _nearest(candidates: Candidates, offered: IntArray, chosen: IntArray) -> IntArray:
-    """Of the rows offered, as many as may be places: those nearest to a chosen one."""
-    if len(offered) <= MOST_PLACES:
+    """The offered rows nearest to the chosen ones, at most MOST_POSITIONS."""
+    if len(offered) <= MOST_POSITIONS:
         return offered
     xy = candidates.xy[candidates.kept]
     away = np.min([np.hypot(*(xy[offered] - xy[row]).T) for row in chosen], axis=0)
-    return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:MOST_PLACES]])
+    return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:MOST_POSITIONS]])
 
 
 def _of_rows(cover: Cover, rows: IntArray) -> Cover:
-    """The problem over these rows alone, numbered anew."""
+    """The problem over these rows alone, renumbered."""
     return Cover(cover.sees[rows], cover.worth, cover.needed, cover.views)
 
 
 def _with_free(table: LegTable, lengths: FloatArray, stands: IntArray) -> LegTable:
-    """With a last point that nothing is driven from or to; where nothing is driven, headings stay."""
+    """The table with the point `free` added; between points at the same position headings stay."""
     leaving, arriving = (
         np.pad(angles, (0, 1), constant_values=NO_HEADING) for angles in (table.leaving, table.arriving)
     )

@@ -1,8 +1,9 @@
-"""Stops and their order together: exchanges, drops and additions, by what the route then takes.
+"""Tabu search over stops and their order: exchanges, removals and additions, by the time of the route.
 
-What is asked for may be missed on the way: what is missing costs time, the more the longer it stays missing
-(Gendreau, Hertz and Laporte, "A tabu search heuristic for the vehicle routing problem", Management Science
-1994). Of all changes the best one is made, be it for the worse; the best line that met everything is kept.
+Demands may be violated during the search. A shortfall is a penalty in time, which grows while the demand
+stays unmet (Gendreau, Hertz and Laporte, "A tabu search heuristic for the vehicle routing problem",
+Management Science 1994). Each step makes the best change, even if it is worse. The result is the best line
+that met every demand.
 """
 
 from __future__ import annotations
@@ -20,44 +21,44 @@ from stopgo.planner.selection.cover import Cover
 STEPS = 400
 """Changes made at most; a count, so that no plan depends on speed."""
 LOOKS = 40_000
-"""Stops looked at for all those changes together, so that large floors get fewer of them."""
+"""Stops evaluated for all those changes together, so that large floors get fewer changes."""
 TENURE, LULL = 8, 10
-"""Places left last that may not come back: 1, after so many changes 2, and up to 8, and anew."""
+"""Removed positions that may not return: 1, one more after each LULL changes up to TENURE, then again 1."""
 SCALE = 1024
-"""Costs of what is missing are in microseconds by this, for each unit of weight."""
+"""Penalties are in microseconds / SCALE per unit of missing weight."""
 DEARER, CHEAPER = (9, 8), (15, 16)
-"""How the cost of a demand changes with each step at which it is not met; and that of all where all are."""
+"""Factors of a penalty at each step: for an unmet demand, and for all demands if all are met."""
 RANGE = 256
-"""By how much these costs may rise and fall from where they begin."""
+"""Factor by which a penalty may rise above and fall below its first value."""
 TRIED = 30
-"""Changes looked at, the best first, for one after which scans still register with one another."""
+"""Changes tried, the best first, until one leaves the scans connected."""
 NEVER = 2**60
 
 
 @dataclass(frozen=True, eq=False)
 class LineTask:
-    """What a line must see, and which of its places may change."""
+    """Demands on a line, and the positions that must stay."""
 
     cover: Cover
-    """What the places that stay leave to be seen; its rows are the places."""
+    """The covering problem that remains after the required positions; its rows are the positions."""
     stays: BoolArray
-    """Whether there must be a stop at each place (places,)."""
+    """True for required positions (positions,)."""
     rank: IntArray | None
-    """Of the places of a line the one of the lowest rank comes first (places,); None: any may."""
-    together: Callable[[IntArray], bool]
-    """Whether the scans of stops at these places hang together as they must."""
+    """The position of the lowest rank comes first on a line (positions,); None: any may."""
+    connected: Callable[[IntArray], bool]
+    """Returns True if the scans of stops at these positions are connected as required."""
 
 
 @dataclass(frozen=True)
 class _Change:
-    """A stop that leaves, by where it is on the line, and a place that comes; None where none does."""
+    """An index of the line whose stop is removed, and a position that is added; None for neither."""
 
     at: int | None
     into: int | None
 
 
 def shorter_line(times: LineTimes, task: LineTask, line: PointLine) -> PointLine:
-    """A line from the same begin to the same end that meets what is asked for, and takes no longer."""
+    """A line between the same ends that meets every demand and takes no longer."""
     search = _TourSearch(times, task, line)
     stops = max(1, len(line) - 2)
     for _ in range(min(STEPS, max(50, LOOKS // stops))):
@@ -80,15 +81,15 @@ class _TourSearch:
         self._made = 0
 
     def _first_free(self, line: PointLine) -> int:
-        """The first place of a line that may be driven to later."""
+        """The first index of a line whose point may move to a later index."""
         return 1 if self._task.rank is None else 2
 
     def _places(self, line: PointLine) -> list[int]:
         """The stops of a line."""
-        return [point for point in line if point < self._times.places]
+        return [point for point in line if point < self._times.positions]
 
     def step(self) -> bool:
-        """Make the best change; whether there was one."""
+        """Make the best change; return False if there is none."""
         change = self._best_change()
         if change is None:
             return False
@@ -104,7 +105,7 @@ class _TourSearch:
         return True
 
     def _price(self, missing: IntArray) -> None:
-        """Make what is missing dearer; where nothing is, everything cheaper."""
+        """Raise the penalties of unmet demands; lower all penalties if every demand is met."""
         (up, by), (down, of) = DEARER, CHEAPER
         weight = self._board.weight
         changed = (
@@ -127,19 +128,19 @@ class _TourSearch:
             if not task.stays[change.into]:
                 self._board.take(change.into)
 
-    def _leg_for(self, line: PointLine, place: int) -> int:
-        """The leg in which this place adds least."""
+    def _leg_for(self, line: PointLine, position: int) -> int:
+        """The leg in which this position adds least time."""
         rank = self._task.rank
         first = 0
-        if rank is not None and any(p < self._times.places for p in line):
-            if rank[place] < min(rank[p] for p in line if p < self._times.places):
+        if rank is not None and any(p < self._times.positions for p in line):
+            if rank[position] < min(rank[p] for p in line if p < self._times.positions):
                 return 0
             first = 1
-        added = [int(self._times.inserted(line, leg)[place]) for leg in range(first, len(line) - 1)]
+        added = [int(self._times.inserted(line, leg)[position]) for leg in range(first, len(line) - 1)]
         return first + int(np.argmin(added))
 
     def _best_change(self) -> _Change | None:
-        """The change after which time and what is missing cost least together, of those that are allowed."""
+        """The allowed change with the least sum of time and penalties."""
         found = list(self._changes())
         values = np.concatenate([value for _, value in found]) if found else np.empty(0, np.int64)
         ends = np.cumsum([len(value) for _, value in found])
@@ -151,7 +152,7 @@ class _TourSearch:
             at, value = found[which]
             into = k - (int(ends[which]) - len(value))
             change = _Change(at, into if len(value) > 1 else None)
-            if self._task.together(self._after(change)):
+            if self._task.connected(self._after(change)):
                 return change
             values[k] = NEVER
         return None
@@ -163,9 +164,9 @@ class _TourSearch:
         return np.array(sorted({*self._places(rest), *more}), dtype=np.int64)
 
     def _changes(self) -> Iterator[tuple[int | None, IntArray]]:
-        """For each stop that may leave, and for none: what each place that may come then costs (places,).
+        """Costs of changes, for each removable stop and for none: of adding each position (positions,).
 
-        Also what it costs if nobody comes (1,). All is told less the line's own time.
+        Also the cost of removal alone (1,). All costs are relative to the line's own time.
         """
         times, line = self._times, self._line
         legs = np.array([times.inserted(line, leg) for leg in range(len(line) - 1)])
@@ -175,27 +176,27 @@ class _TourSearch:
         barred = self._barred()
         yield None, self._allowed(ahead[-1] + self._missing_with(None), barred, None)
         for at in range(1, len(line) - 1):
-            place = line[at]
-            if place >= times.places:
+            position = line[at]
+            if position >= times.positions:
                 continue
             saved = times.removed(line, at)
             least = self._least_added(at, ahead, behind)
             value = least - saved + self._missing_with(at)
-            here = int(least[place]) - saved
+            here = int(least[position]) - saved
             value = self._allowed(value, barred, at)
-            if self._task.stays[place]:
+            if self._task.stays[position]:
                 value[:] = NEVER
-            value[place] = here + self._missing_now() if here < 0 else NEVER
+            value[position] = here + self._missing_now() if here < 0 else NEVER
             yield at, value
-            if not self._task.stays[place] and not self._leads(at):
+            if not self._task.stays[position] and not self._leads(at):
                 yield at, np.array([self._missing_without(at) - saved])
 
     def _leads(self, at: int) -> bool:
-        """Whether the stop at this place of the line comes first because of its rank."""
+        """True if the stop at this index of the line comes first because of its rank."""
         return self._task.rank is not None and at == 1
 
     def _least_added(self, at: int, ahead: IntArray, behind: IntArray) -> IntArray:
-        """What each place adds where it adds least, once the stop `at` is left out (places,)."""
+        """Least time that each position adds after the stop at index `at` is removed (positions,)."""
         times, line = self._times, self._line
         rest = without(line, at)
         if self._leads(at):
@@ -210,10 +211,10 @@ class _TourSearch:
         return least
 
     def _barred(self) -> BoolArray:
-        """Places that may not come: those on the line, and those left of late."""
-        barred = np.zeros(self._times.places, dtype=bool)
-        barred[[p for p in self._line if p < self._times.places]] = True
-        spare = self._times.places - len(self._places(self._line))
+        """True for positions that may not be added: those on the line, and those removed recently."""
+        barred = np.zeros(self._times.positions, dtype=bool)
+        barred[[p for p in self._line if p < self._times.positions]] = True
+        spare = self._times.positions - len(self._places(self._line))
         tenure = 1 + self._made // LULL % max(1, min(TENURE, spare // 2))
         barred[self._left[-tenure:]] = True
         return barred
@@ -223,7 +224,7 @@ class _TourSearch:
         rank = self._task.rank
         if rank is None:
             return value
-        stops = [rank[p] for k, p in enumerate(self._line) if p < self._times.places and k != at]
+        stops = [rank[p] for k, p in enumerate(self._line) if p < self._times.positions and k != at]
         lowest = min(stops, default=None)
         if lowest is None:
             return value
@@ -234,11 +235,11 @@ class _TourSearch:
         return int(self._board.weight @ self._board.missing) // SCALE
 
     def _missing_with(self, at: int | None) -> IntArray:
-        """What is missing costs so much with each place, in exchange for the stop `at` if one is given."""
+        """Penalty after each position is added, in exchange for the stop at index `at` if one is given."""
         if at is None:
             return self._board.after_takes() // SCALE
         if self._task.stays[self._line[at]]:
-            return np.zeros(self._times.places, dtype=np.int64)
+            return np.zeros(self._times.positions, dtype=np.int64)
         return self._board.after_swaps(self._line[at])[0] // SCALE
 
     def _missing_without(self, at: int) -> int:

@@ -1,7 +1,7 @@
-"""The line of points that a route drives, and what every change of it would take, in whole microseconds.
+"""Times of a line, the sequence of points of a route, and of its changes, in whole microseconds.
 
-A line begins and ends at a given place, at a stop that stays, or at `free`, a point without a place, from and
-to which nothing is driven.
+A line begins and ends at a given position, at a required stop, or at `free`, a virtual point: driving from
+it or to it takes no time.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from stopgo.mission.geometry import IntArray
 from stopgo.planner.covering_tour.leg_table import NO_HEADING, LegTable
 
 MOST_KEPT = 4000
-"""Legs whose insertions are remembered."""
+"""Legs whose insertions are cached."""
 
 PointLine = list[int]
 
 
 @dataclass(eq=False)
 class LineTimes:
-    """Times of lines over the points of a table: places that may be stops first, then starts and ends."""
+    """Times of lines over the points of a table: possible stops first, then starts and ends."""
 
     table: LegTable
-    places: int
-    """Points that may be stops."""
+    positions: int
+    """Number of points that may be stops."""
     pause: int
-    """Settling and scanning at a stop."""
+    """Microseconds of settling and scanning at a stop."""
     scan: IntArray
-    """Heading of the scan at each point; NO_HEADING where it is that of the arrival (points,)."""
+    """Heading of the scan at each point; NO_HEADING for the heading of arrival (points,)."""
     start_heading: int
-    """With which a line leaves its first point; NO_HEADING where it takes that of its first leg."""
+    """Heading at a line's first point; NO_HEADING for the heading of its first leg."""
     _inserted: dict[tuple[int, int, int, int], IntArray] = field(default_factory=dict)
 
     def total(self, line: Sequence[int]) -> int:
@@ -43,18 +43,18 @@ class LineTimes:
         return driven + int(self._at(points, come, go).sum()) + self.pause * self.stops_of(line)
 
     def stops_of(self, line: Sequence[int]) -> int:
-        """How many stops a line has."""
-        return sum(point < self.places for point in line)
+        """Number of stops of a line."""
+        return sum(point < self.positions for point in line)
 
     def _headings(self, points: IntArray) -> tuple[IntArray, IntArray]:
-        """Headings with which each point of a line is reached and left."""
+        """Headings of arrival and departure at each point of a line."""
         a, b = points[:-1], points[1:]
         come = np.concatenate([[self.start_heading], self.table.arriving[a, b]])
         go = np.concatenate([self.table.leaving[a, b], [NO_HEADING]])
         return come, go
 
     def _at(self, point: IntArray | int, come: IntArray | int, go: IntArray | int) -> IntArray:
-        """Turns at points that are reached and left with these headings: to the scan's, and from it."""
+        """Times of turning at points, from the arrival to the scan's heading and on to the departure."""
         scan, come, go = np.broadcast_arrays(self.scan[point], come, go)
         come = np.where(
             (come < 0) & (scan >= 0), go, come
@@ -64,7 +64,7 @@ class LineTimes:
         return np.where(scan < 0, through, looked)
 
     def inserted(self, line: PointLine, leg: int) -> IntArray:
-        """What a stop at each place adds between point `leg` of a line and the next one (places,)."""
+        """Time added by a stop at each position between points `leg` and `leg` + 1 of a line (positions,)."""
         before = line[leg - 1] if leg else NO_HEADING
         beyond = line[leg + 2] if leg + 2 < len(line) else NO_HEADING
         key = (before, line[leg], line[leg + 1], beyond)
@@ -76,22 +76,22 @@ class LineTimes:
 
     def _added(self, before: int, a: int, b: int, beyond: int) -> IntArray:
         spent, leaving, arriving = self.table.spent, self.table.leaving, self.table.arriving
-        place = np.arange(self.places)
+        position = np.arange(self.positions)
         come = self.start_heading if before < 0 else int(arriving[before, a])
         go = NO_HEADING if beyond < 0 else int(leaving[b, beyond])
-        there = self._at(a, come, leaving[a, place]) + self._at(b, arriving[place, b], go)
+        there = self._at(a, come, leaving[a, position]) + self._at(b, arriving[position, b], go)
         here = self._at(a, come, leaving[a, b]) + self._at(b, arriving[a, b], go)
-        own = self._at(place, arriving[a, place], leaving[place, b])
-        driven = spent[a, place] + spent[place, b] - spent[a, b]
+        own = self._at(position, arriving[a, position], leaving[position, b])
+        driven = spent[a, position] + spent[position, b] - spent[a, b]
         added: IntArray = driven + own + there - here + self.pause
         return added
 
     def removed(self, line: PointLine, at: int) -> int:
-        """What a line takes less without the stop at place `at` of it."""
+        """Time saved by removing the stop at index `at` of a line."""
         return int(self.inserted(without(line, at), at - 1)[line[at]])
 
     def turned(self, line: PointLine, first: int) -> PointLine:
-        """The line in which no stretch from place `first` on, turned round, makes it shorter."""
+        """The line after reversing stretches from index `first` on, while that saves time."""
         while True:
             i, j, gain = self._best_turn(line, first)
             if gain <= 0:
@@ -99,7 +99,7 @@ class LineTimes:
             line = [*line[:i], *line[i : j + 1][::-1], *line[j + 1 :]]
 
     def _best_turn(self, line: PointLine, first: int) -> tuple[int, int, int]:
-        """The stretch, from `i` to `j`, whose turning round saves most, and how much that is."""
+        """The stretch from `i` to `j` whose reversal saves most, and the time saved."""
         points = np.array(line, dtype=np.int64)
         i, j = np.triu_indices(len(line) - 1 - first, 1)
         if not len(i):
@@ -119,7 +119,7 @@ class LineTimes:
         return int(i[best]), int(j[best]), int(gain[best])
 
     def _inner(self, points: IntArray, at: IntArray, i: IntArray, j: IntArray) -> IntArray:
-        """What stretches save inside, driven the other way: nothing but where scans have headings."""
+        """Time saved inside reversed stretches; 0 unless scans have headings."""
         back = self._at(
             points[1:-1],
             self.table.arriving[points[2:], points[1:-1]],
@@ -131,5 +131,5 @@ class LineTimes:
 
 
 def without(line: PointLine, at: int) -> PointLine:
-    """The line without the point at place `at` of it."""
+    """The line without the point at index `at`."""
     return [*line[:at], *line[at + 1 :]]

@@ -1,7 +1,7 @@
-"""Zones: sets of candidates without which what is asked for cannot be seen.
+"""Zones: sets of candidates of which every selection has at least one.
 
-Every selection has a stop in each zone. A share of targets may stay unseen, so that no single target makes a
-zone; one is grown round a candidate until those beyond it see less than some demand asks for.
+Some fraction of the targets may stay unseen, so a single target makes no zone. A zone grows around a
+candidate until the candidates outside it see less than some demand requires.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
 
 MOST_SEEDS = 1500
-"""Candidates round which zones are grown, at most."""
+"""Most candidates around which zones are grown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """Rows of which every selection has one, and how far the farthest is from the middle."""
+    """Rows of which every selection has one, and the distance of the farthest from the centre."""
 
     rows: IntArray
     radius: float
 
 
 def zones_of(cover: Cover, lengths: FloatArray) -> list[Zone]:
-    """A zone round each row that sees anything, the smallest first; `lengths` (rows, rows) tell the ways."""
+    """A zone around each row that sees anything, the smallest first; `lengths` (rows, rows) are of paths."""
     growth = _Growth(cover)
     offered = np.flatnonzero(np.diff(cover.sees.indptr))
     seeds = offered[:: max(1, -(-len(offered) // MOST_SEEDS))]
@@ -35,7 +35,7 @@ def zones_of(cover: Cover, lengths: FloatArray) -> list[Zone]:
 
 
 class _Growth:
-    """What rows beyond a distance can still see, by demand."""
+    """Growth of zones: what rows beyond a distance can still see, by demand."""
 
     def __init__(self, cover: Cover) -> None:
         self._cover = cover
@@ -48,12 +48,12 @@ class _Growth:
         self._sees = [self._seers(demand) for demand in range(len(cover.needed))]
 
     def _seers(self, demand: int) -> IntArray:
-        """Rows that see something of a demand."""
+        """Rows that see any part of a demand."""
         columns = self._column[self._demand == demand]
         return np.unique(self._cover.seen_by[columns].indices).astype(np.int64)
 
     def round(self, away: FloatArray) -> Zone | None:
-        """The smallest zone of rows up to a distance, where `away` (rows,) tells how far each is."""
+        """The smallest zone around a seed, by the distance of each row, `away` (rows,); None if none."""
         cover = self._cover
         farthest = np.full(cover.columns, -np.inf)
         farthest[self._seen] = np.maximum.reduceat(away[cover.seen_by.indices], self._first)

@@ -1,4 +1,4 @@
-"""Candidates -> which of them register with one another, by the boundary that both see."""
+"""Candidates -> pairs whose scans register with one another, by the boundary that both see."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.pairs import Overlaps, Pairs
 
 LEAST_HOLD_M = 0.15
-"""Metres of wall that must face the weakest move of a pair of scans, so that it registers."""
+"""Least registration strength of a pair: metres of wall that face its weakest direction."""
 LEAST_COMMON_M = 1.0
-"""Metres of boundary that both must see."""
+"""Least length of boundary in metres that both must see."""
 USUAL_SHARE = 0.1
-"""Of a scan, that its neighbour must see too where nobody says how much."""
+"""Overlap ratio required where the settings give none."""
 
 
 @instance_cached
 def overlaps_of(candidates: Candidates) -> Overlaps:
-    """What the kept candidates see in common."""
+    """The boundary that kept candidates see in common."""
     return Overlaps(shown(candidates, np.arange(len(candidates.kept))))
 
 
 def registers(pairs: Pairs, *, share: float) -> IntArray:
-    """Which of the pairs (indices) are fixed in x, y and heading by what both see, a share at least."""
+    """Indices of the pairs that register: enough strength, common boundary and overlap ratio."""
     firm = (pairs.hold_m >= LEAST_HOLD_M) & (pairs.common_m >= LEAST_COMMON_M)
     return np.flatnonzero(firm & (pairs.share >= share))
 
 
 def links_of(candidates: Candidates) -> csr_array:
-    """1 where two kept candidates register with one another, by the share in the settings (rows, rows)."""
+    """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
     overlaps, share = overlaps_of(candidates), candidates.space.settings.least_overlap
     every = (overlaps.after(row) for row in range(overlaps.rows))
     near = [pairs.other[registers(pairs, share=share)] for pairs in every]

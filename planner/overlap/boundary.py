@@ -1,7 +1,7 @@
-"""Candidates -> what each sees of everything that two scans can be laid on one another by.
+"""Candidates -> the boundary that each sees: all surfaces by which two scans can be registered.
 
-That is every upright face that stops the laser, target or not. Limits on how well a target must be seen do
-not count here; beams do not either, since how high they hang decides what of them two scans share.
+The boundary is every upright face that stops the laser, target or not. Limits on the views of targets do
+not apply here. Beams do not count, because their height decides which parts of them two scans share.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from stopgo.planner.visibility.sight.sight import scene_of, sight
 from stopgo.planner.visibility.unit_ranges import ranges, runs_of
 
 PIECE_M = 0.05
-"""Boundary is seen by pieces of this length (m), whatever the plan's units are."""
+"""Length in metres of the boundary's pieces, independent of the plan's units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class Boundary:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
-    """What each candidate sees of a boundary, as stretches of faces.
+class ShownBoundary:
+    """The boundary that each candidate sees, as stretches of faces.
 
     Stretch k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, is of face `face[k]` and reaches from
     `begin[k]` to `end[k]` metres from the face's start. A row's stretches ascend and do not overlap.
@@ -51,7 +51,7 @@ class Shown:
     begin: FloatArray
     end: FloatArray
     xy: FloatArray
-    """Where each row stands, local metres (rows, 2)."""
+    """Position of each row, local metres (rows, 2)."""
 
 
 def boundary_of(space: NavigableSpace) -> Boundary:
@@ -61,10 +61,10 @@ def boundary_of(space: NavigableSpace) -> Boundary:
     return Boundary(frozen(ends[:, 0]), frozen(ends[:, 1]), frozen(pieces, np.int64))
 
 
-def shown(candidates: Candidates, rows: IntArray) -> Shown:
-    """What some rows see of the boundary within `overlap_range` and the scanner's field of view.
+def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
+    """The boundary that some rows see within `overlap_range` and the scanner's field of view.
 
-    `rows` (n,) are indices into `kept`; what is shown is in their order.
+    `rows` (n,) are indices into `kept`; the result is in their order.
     """
     space = candidates.space
     origin = local_origin(space.floor)
@@ -83,7 +83,7 @@ def shown(candidates: Candidates, rows: IntArray) -> Shown:
 
 
 def _viewpoints(candidates: Candidates, rows: IntArray) -> tuple[FloatArray, IntArray]:
-    """Where each of these rows looks from (n, 2), and its place among them (n,), ascending."""
+    """Viewpoints of these rows (n, 2), and the index among `rows` of each (n,), ascending."""
     places, of = viewpoints_of(candidates)
     first = np.searchsorted(of, rows)
     counts = np.searchsorted(of, rows, side="right") - first
@@ -113,10 +113,10 @@ def shown_by(
     pieces: Iterable[IntArray],
     heading: FloatArray | None,
     settings: Settings,
-) -> Shown:
-    """What is shown from places (rows, 2), local metres, that see these pieces all round.
+) -> ShownBoundary:
+    """The boundary shown from positions (rows, 2), local metres, that see these pieces all round.
 
-    With a field of view below 360° only what lies within it about each place's `heading` (rows,) is.
+    With a field of view below 360° only the part within it about each `heading` (rows,) is shown.
     """
     face = np.repeat(np.arange(len(boundary.pieces)), boundary.pieces)
     if heading is not None and settings.fov < 360:
@@ -128,7 +128,7 @@ def shown_by(
     first, last = (np.concatenate([empty, *(run[k] for run in runs)]) for k in range(2))
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[face[first]]
     piece = (np.hypot(*(boundary.b - boundary.a).T) / boundary.pieces)[face[first]]
-    return Shown(
+    return ShownBoundary(
         boundary=boundary,
         pointer=frozen(np.cumsum([0, *(len(run[0]) for run in runs)]), np.int64),
         face=frozen(face[first], np.int64),

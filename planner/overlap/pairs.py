@@ -1,9 +1,10 @@
-"""Shown boundary -> how firmly two scans can be laid on one another: what both see, and what it holds.
+"""Shown boundary -> registration strength of two scans, by the boundary that both see.
 
-A wall seen by both holds the pair across the wall and not along it. Boundary seen by both, laid on itself
-point to line, has the normal matrix N = ∫ j jᵀ ds with j = (nx, ny, (p × n) / LEVER_M), p from the stop and n
-the face's normal (Censi, "An accurate closed-form estimate of ICP's covariance", ICRA 2007). Its least
-eigenvalue, in metres, is how much wall faces the weakest of all small moves in x, y and heading.
+A wall seen by both constrains the pair across the wall and not along it. Point-to-line registration of the
+common boundary has the normal matrix N = ∫ j jᵀ ds with j = (nx, ny, (p × n) / LEVER_M), p from the stop
+and n the face's normal (Censi, "An accurate closed-form estimate of ICP's covariance", ICRA 2007). Its least
+eigenvalue is the registration strength `hold_m`: the metres of wall that face the weakest of all small moves
+in x, y and heading. `share` is the overlap ratio. Both names are those of mission.json.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from functools import cached_property
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.overlap.boundary import Shown
+from stopgo.planner.overlap.boundary import ShownBoundary
 from stopgo.planner.visibility.unit_ranges import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
-"""A turn counts as the way it makes at this distance: 0.1° as much as 1 cm, what is allowed of each."""
+"""A rotation counts as its displacement at this distance: 0.1° as much as 1 cm, the tolerance of each."""
 LEAST_STRETCH_M = 0.35
-"""Narrower stretches seen by both do not count, such as the jambs of a door: where points are thinned to one
-per 7.5 cm they have no direction of their own, and a long wall beside them outweighs them."""
+"""Least width of a common stretch. Narrower ones, such as door jambs, do not count: with points thinned to
+one per 7.5 cm they have no direction of their own, and a long wall next to them outweighs them."""
 DIGITS = 6
-"""Figures of a pair are whole micrometres and millionths, so that both ends of a pair have the same."""
+"""Decimals of a pair's figures, so that both stops of a pair have equal figures."""
 
 
 EPSILON_M = 1e-9
@@ -32,22 +33,22 @@ EPSILON_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """One row with every other that sees some of the same boundary."""
+    """One row with every other row that sees some of the same boundary."""
 
     other: IntArray
     """Rows, ascending (n,)."""
     common_m: FloatArray
     """Metres of boundary that both see (n,)."""
     share: FloatArray
-    """Of what the one of the two sees that sees less (n,)."""
+    """Overlap ratio: common boundary over the boundary of the row that sees less (n,)."""
     hold_m: FloatArray
-    """Metres of wall that face the pair's weakest move (n,)."""
+    """Registration strength: metres of wall that face the pair's weakest move (n,)."""
 
 
 class Overlaps:
-    """What candidates see in common, worked out row by row as it is asked for."""
+    """The boundary that candidates see in common, computed row by row on demand."""
 
-    def __init__(self, seen: Shown) -> None:
+    def __init__(self, seen: ShownBoundary) -> None:
         self._seen = seen
         self._by_row: dict[int, Pairs] = {}
         self._row = np.repeat(np.arange(len(seen.xy)), np.diff(seen.pointer))
@@ -66,13 +67,13 @@ class Overlaps:
         return np.asarray(np.bincount(self._row, length, self.rows), np.float64)
 
     def of(self, row: int) -> Pairs:
-        """A row with every other; kept."""
+        """A row with every other row; cached."""
         if row not in self._by_row:
             self._by_row[row] = self._pairs(row, first=0)
         return self._by_row[row]
 
     def after(self, row: int) -> Pairs:
-        """A row with every later one; not kept, since all of a large floor's would take gigabytes."""
+        """A row with every later row; not cached, since a large floor would take gigabytes."""
         return self._pairs(row, first=row + 1)
 
     def middle_of_common(self, row: int, other: int) -> FloatArray:
@@ -87,7 +88,7 @@ class Overlaps:
         return middle
 
     def _common(self, row: int, *, first: int = 0) -> tuple[IntArray, FloatArray, FloatArray]:
-        """What a row and others (from `first` on) both see: the others' stretches, from where to where."""
+        """Stretches that a row and another (from `first` on) both see: the other's stretch, begin, end."""
         seen = self._seen
         own = np.arange(seen.pointer[row], seen.pointer[row + 1])
         begin = np.searchsorted(self._place, seen.face[own] * self.rows + first)
@@ -135,7 +136,7 @@ class Overlaps:
 
 
 def _least_hold(moments: FloatArray, at: FloatArray) -> FloatArray:
-    """Least eigenvalue of each normal matrix about its own point (n, 2), turns counted by LEVER_M."""
+    """Least eigenvalue of each normal matrix about its own point (n, 2), rotations scaled by LEVER_M."""
     shift = np.repeat(np.eye(3)[None], len(at), axis=0)
     shift[:, 2, 0], shift[:, 2, 1] = at[:, 1], -at[:, 0]  # (p - at) × n = p × n - at × n
     shift[:, 2] /= LEVER_M

@@ -1,4 +1,4 @@
-"""Route -> which of its stops register with one another; and where pieces lie apart, what would join them."""
+"""Route -> pairs of its stops that register; and a remedy where the network is not connected."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from stopgo.planner.overlap.boundary import shown
 def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     """Pairs of the route's stops that register with one another, in the order of driving.
 
-    By the share in the settings; by the usual one where none is asked for.
+    The overlap ratio is that of the settings, or the usual one if they give none.
     """
     overlaps, share = _overlaps_of_stops(route), _settings(route).least_overlap or USUAL_SHARE
     names = stop_names(overlaps.rows)
@@ -40,7 +40,7 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
 
 @instance_cached
 def _overlaps_of_stops(route: Route) -> Overlaps:
-    """What the stops see in common; row k is the k-th that is driven to."""
+    """The boundary that stops see in common; row k is the k-th stop in driving order."""
     selection = route.selection
     return Overlaps(shown(selection.visibility.candidates, selection.chosen[route.order]))
 
@@ -50,11 +50,11 @@ def _settings(route: Route) -> Settings:
 
 
 SCANS_APART = ("scans_apart", "scans_not_joined")
-"""Codes of findings about scans that do not hang together: as was asked for, and where nothing was asked."""
+"""Codes of findings about scans that are not connected: with a required overlap, and without."""
 
 
 def scans_apart(route: Route) -> Iterator[Finding]:
-    """What would join each piece of the network; where none was asked for, how many pieces there are."""
+    """Remedy for each separate component of the network; without a required overlap, their number."""
     settings, count = _settings(route), len(route.order)
     names = stop_names(count)
     _, *others = Network(tuple(names), registered_pairs(route)).pieces or ((),)
@@ -69,26 +69,25 @@ def scans_apart(route: Route) -> Iterator[Finding]:
     called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]
     for piece in others:
         here = np.array([names.index(stop) for stop in piece])
-        told = [called[k] for k in here]
+        stops = _listed([called[k] for k in here])
         verb = "does" if len(piece) == 1 else "do"
-        way_out, at = _way_out(route, here, np.setdiff1d(np.arange(count), here), called)
-        yield Finding(
-            "scans_apart", f"{_listed(told)} {verb} not register with the other scans; {way_out}", at=at
-        )
+        remedy, at = _remedy(route, here, np.setdiff1d(np.arange(count), here), called)
+        yield Finding("scans_apart", f"{stops} {verb} not register with the other scans; {remedy}", at=at)
 
 
-MOST_TOLD = 6
+MOST_LISTED = 6
+"""Stops named in a finding; of more only the number."""
 
 
 def _listed(stops: list[str]) -> str:
-    rest = f" and {len(stops) - MOST_TOLD} more" if len(stops) > MOST_TOLD else ""
-    return ", ".join(stops[:MOST_TOLD]) + rest
+    rest = f" and {len(stops) - MOST_LISTED} more" if len(stops) > MOST_LISTED else ""
+    return ", ".join(stops[:MOST_LISTED]) + rest
 
 
-def _way_out(
+def _remedy(
     route: Route, here: IntArray, there: IntArray, names: list[str]
 ) -> tuple[str, tuple[float, float] | None]:
-    """What would join two sets of stops, and where: spheres that two of them see, else an opening."""
+    """A remedy that connects two sets of stops, and its position: target spheres, else an opening."""
     space = route.selection.visibility.candidates.space
     overlaps = _overlaps_of_stops(route)
     best = None
@@ -101,9 +100,9 @@ def _way_out(
     if best is not None:
         (hold, common), k, j = best
         x, y = overlaps.middle_of_common(k, j) + local_origin(space.floor)
-        told = f"target spheres that {names[k]} and {names[j]} both see would join them, such as near "
+        spheres = f"target spheres that {names[k]} and {names[j]} both see would join them, such as near "
         seen = f" (they see {common:.1f} m of boundary in common, which hold as {hold:.2f} m do)"
-        return f"{told}({x:.1f}, {y:.1f}){seen}", (x, y)
+        return f"{spheres}({x:.1f}, {y:.1f}){seen}", (x, y)
     opening = _nearest_opening(space.openings, route.xy[here], route.xy[there])
     if opening is None:
         return (
@@ -112,18 +111,18 @@ def _way_out(
         )
     x, y = opening.opening.line.mean(axis=0).tolist()
     name, kind = opening.opening.id, opening.opening.kind.removesuffix("s")
-    why = (
+    advice = (
         "a scan from it"
         if opening.passable
         else f"it would join them if it were not {opening.why}: a scan from it"
     )
-    return f"{kind} {name} at ({x:.1f}, {y:.1f}) is nearest to both; {why} or spheres there", (x, y)
+    return f"{kind} {name} at ({x:.1f}, {y:.1f}) is nearest to both; {advice} or spheres there", (x, y)
 
 
 def _nearest_opening(
     openings: tuple[OpeningState, ...], here: FloatArray, there: FloatArray
 ) -> OpeningState | None:
-    """The opening over which the way from some stop here to some stop there is shortest."""
+    """The opening with the shortest straight detour from a stop here to a stop there."""
     if not openings:
         return None
     lines = np.array([shapely.LineString(item.opening.line) for item in openings])

@@ -75,9 +75,9 @@ def _selected(found: Candidates, observe: Observe) -> Selection:
 
 
 def _in_least_time(route: Route) -> Route:
-    from stopgo.planner.covering_tour import in_least_time
+    from stopgo.planner.covering_tour import least_time_route
 
-    return in_least_time(route)
+    return least_time_route(route)
 
 
 def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
@@ -125,16 +125,16 @@ def _divided(selection: Selection) -> tuple[Route, DividedRoute]:
     For the least time, both the route of least time and the route of fewest stops are divided. The route
     that is quicker for one robot is not always quicker for several.
     """
-    from stopgo.planner.covering_tour import as_before
+    from stopgo.planner.covering_tour import with_known_time
     from stopgo.planner.routing import route
-    from stopgo.planner.task_allocation.dividing import divided, taken_by
+    from stopgo.planner.task_allocation.dividing import divided, division_cost
 
     driven = route(selection)
     if selection.visibility.candidates.space.settings.minimise == "stops":
         return driven, divided(driven)
     quicker = _in_least_time(driven)
-    both = [(one, divided(one)) for one in (as_before(driven, quicker), quicker)]
-    return min(both, key=lambda one: taken_by(one[1]))
+    both = [(one, divided(one)) for one in (with_known_time(driven, quicker), quicker)]
+    return min(both, key=lambda one: division_cost(one[1]))
 
 
 def parts_to_plan(space: NavigableSpace) -> list[Candidates]:

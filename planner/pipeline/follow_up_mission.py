@@ -27,12 +27,12 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
 from stopgo.planner.candidates import candidates
-from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing import route
 from stopgo.planner.routing.assemble import assemble
-from stopgo.planner.selection import select_further
+from stopgo.planner.selection import select_follow_up
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility import visibility
@@ -158,12 +158,12 @@ def top_up(
         )
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
     seen, done = _with_poses(known, poses)
-    selection = select_further(seen, done)
+    selection = select_follow_up(seen, done)
     if not len(selection.chosen):
         return None
     driven = route(selection)
     if planned.settings.minimise == "time":
-        driven = in_least_time(driven, done=done)
+        driven = least_time_route(driven, done=done)
     mission = assemble(driven)
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))

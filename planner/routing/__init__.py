@@ -1,7 +1,7 @@
-"""Selection -> route: the order of the stops, and the ways between them.
+"""Selection -> route: the order of the stops, and the paths between them.
 
 A router is a function `(lengths, seed) -> order` over a symmetric matrix of lengths in metres. A graph is
-a function `(space, points) -> Ways`.
+a function `(space, points) -> Ways`; `Ways` holds the shortest paths between the points.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_lengt
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing.colony import ant_colony
-from stopgo.planner.routing.grid_graph import grid_ways
+from stopgo.planner.routing.grid_graph import grid_paths
 from stopgo.planner.routing.legs import Legs
-from stopgo.planner.routing.proof import proved
-from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.proof import tour_proof
+from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from stopgo.planner.routing.ways import Ways
 from stopgo.planner.space.reach import reach_of
@@ -31,12 +31,12 @@ Router = Callable[..., IntArray]
 ROUTERS: dict[str, Router] = {"default": shortest_tour, "aco": ant_colony}
 METHODS = {"default": "2-opt, Or-opt, iterated", "aco": "ant colony"}
 Graph = Callable[[NavigableSpace, FloatArray], Ways]
-GRAPHS: dict[str, Graph] = {"exact": ways_between, "grid": grid_ways}
+GRAPHS: dict[str, Graph] = {"exact": paths_between, "grid": grid_paths}
 
 
 @dataclass(frozen=True)
 class Ends:
-    """Where the route begins and ends, as indices into the points (stops first)."""
+    """Start and end of the route, as indices into the points (stops first)."""
 
     first: int | None
     last: int | None
@@ -45,38 +45,38 @@ class Ends:
 
 
 def route(selection: Selection) -> Route:
-    """The shortest tour found over the chosen stops, closed or open, with a proven bound.
+    """The shortest tour found over the chosen stops, closed or open, with a proven lower bound.
 
-    The bound is that of the graph's ways: over the paper's grid, which has detours, exact ways may be
-    shorter, and the method says so.
+    The bound holds for the paths of the graph. The paper's grid has detours, so exact paths may be
+    shorter; the method says so.
     """
     space = selection.visibility.candidates.space
     settings = space.settings
     router = variant("router", settings.router, ROUTERS)
     points, ends = points_and_ends(selection)
-    ways = legs_between(space, points)
-    if not np.isfinite(ways.lengths).all():
+    legs = legs_between(space, points)
+    if not np.isfinite(legs.lengths).all():
         raise NegativeResult(f"{space.floor.name}: the route's end is not connected with its stops")
-    sequence, bound, method = _ordered(ways.lengths, ends, router, seed=settings.seed)
+    sequence, bound, method = _ordered(legs.lengths, ends, router, seed=settings.seed)
     method += "" if settings.graph == "exact" else f", over the ways of --graph {settings.graph}"
-    return assembled(selection, points, ways, sequence, ends, bound, method)
+    return assembled(selection, points, legs, sequence, ends, bound, method)
 
 
 def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
-    """The ways between all pairs of points (n, 2), by the graph of the settings."""
+    """The paths between all pairs of points (n, 2), by the graph of the settings."""
     graph = variant("graph", space.settings.graph, GRAPHS)
     return Legs(graph, graph.of_kind(graph.called(space, points), Ways), points)
 
 
 def points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
-    """The stops, then the start and the end where they are given."""
+    """The stops, then the start and the end if they are given."""
     settings = selection.visibility.candidates.space.settings
     points, first, last = [*selection.xy], None, None
     if settings.start is not None:
         first = len(points)
         points.append(np.array(settings.start[:2]))
     if settings.end is not None:
-        check_place(selection.visibility.candidates, "end", settings.end)
+        check_position(selection.visibility.candidates, "end", settings.end)
         last = len(points)
         points.append(np.array(settings.end))
     closed = settings.tour == "closed" or (
@@ -88,14 +88,14 @@ def points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
     return np.array(points), Ends(nearest, last, closed, reason)
 
 
-def check_place(candidates: Candidates, name: str, place: tuple[float, ...]) -> None:
-    """Refuse a place where the robot does not fit, or that is in another part of the floor than the plan."""
+def check_position(candidates: Candidates, name: str, position: tuple[float, ...]) -> None:
+    """Refuse a position where the robot does not fit, or in another part of the floor than the plan."""
     space = candidates.space
-    x, y = place[:2]
+    x, y = position[:2]
     found = int(reach_of(space).part_at(np.array([[x, y]]) - local_origin(space.floor))[0])
     if found != candidates.chosen_part:
-        why = "the robot does not fit there" if found < 0 else "it is in another part of the floor"
-        raise InputError(f"{name} = {x:g},{y:g}: {why}; choose a place clear of walls and floor edges")
+        problem = "the robot does not fit there" if found < 0 else "it is in another part of the floor"
+        raise InputError(f"{name} = {x:g},{y:g}: {problem}; choose a position clear of walls and floor edges")
 
 
 def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
@@ -105,9 +105,10 @@ def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
 
 
 def rank_at_door(candidates: Candidates, rows: IntArray) -> tuple[IntArray | None, str]:
-    """How near these rows are to the widest exterior door, 0 the nearest (n,), if there is one; in words.
+    """Ranks of these rows by distance to the widest exterior door, 0 the nearest (n,); and the reason.
 
-    Those in the door's room come first: a stop behind a wall may be nearer.
+    Rows in the door's room come first, because a stop behind a wall may be nearer. The ranks are None if
+    there is no exterior door.
     """
     space = candidates.space
     doors = [item for item in space.openings if item.why.startswith("exterior")]
@@ -127,33 +128,33 @@ def rank_at_door(candidates: Candidates, rows: IntArray) -> tuple[IntArray | Non
 def _ordered(
     lengths: FloatArray, ends: Ends, router: Variant[Router], *, seed: int
 ) -> tuple[list[int], float, str]:
-    """The points in the order of driving, what no such route is shorter than, and how that is known.
+    """The points in the order of driving, a lower bound on the length, and the method.
 
-    The default router takes the proof's tour where that is shorter; others are reported as they are.
+    The default router takes the proof's tour if it is shorter; other routers keep their own tour.
     """
     matrix = tour_matrix(lengths, ends)
     order = router.indices(router.called(matrix, seed=seed), "order", length=len(matrix), below=len(matrix))
     if len(set(order.tolist())) < len(order):
         raise router.wrong("order visits a point twice")
-    proof = proved(nanometres(matrix), order, improve=router.name == "default")
+    proof = tour_proof(nanometres(matrix), order, improve=router.name == "default")
     bound = proof.bound / NANOMETRES - far_edge(lengths, ends)
     method = METHODS.get(router.name, router.name) + (", proved optimal" if proof.closed else "")
     return _sequence(proof.order, ends, len(lengths)), max(0.0, bound), method
 
 
 def tour_bound(lengths: FloatArray, sequence: list[int], ends: Ends) -> float:
-    """Metres below which no route between these ends over all points is; `sequence` is one such route."""
+    """Lower bound in metres on a route between these ends over all points; `sequence` is one such route."""
     matrix = tour_matrix(lengths, ends)
     tour = [*sequence, *([] if len(matrix) == len(lengths) else [len(lengths)])]
-    proof = proved(nanometres(matrix), np.array(tour, dtype=np.int64), improve=False)
+    proof = tour_proof(nanometres(matrix), np.array(tour, dtype=np.int64), improve=False)
     return max(0.0, proof.bound / NANOMETRES - far_edge(lengths, ends))
 
 
 def tour_matrix(lengths: FloatArray, ends: Ends) -> FloatArray:
     """Lengths for a closed tour; an open path gets one more point between its last and its first.
 
-    That point is next to where the path may end and far from everywhere else, farther than any two edges
-    exchanged for others can gain, so that a shortest tour is a shortest path.
+    That point is at distance 0 from each point where the path may end, and far from all others: farther than
+    any exchange of two edges can gain. So a shortest tour is a shortest path.
     """
     if ends.closed:
         return lengths
@@ -164,7 +165,7 @@ def tour_matrix(lengths: FloatArray, ends: Ends) -> FloatArray:
 
 
 def far_edge(lengths: FloatArray, ends: Ends) -> float:
-    """What the extra point adds to a shortest tour: one far edge if just one end of several is fixed."""
+    """Length that the extra point adds to a shortest tour: one far edge if exactly one end is fixed."""
     one_end = not ends.closed and (ends.first is None) != (ends.last is None)
     return _far(lengths) if one_end and len(lengths) > 1 else 0.0
 
@@ -191,21 +192,21 @@ def _sequence(order: IntArray, ends: Ends, points: int) -> list[int]:
 def assembled(
     selection: Selection,
     points: FloatArray,
-    ways: Legs,
+    legs: Legs,
     sequence: list[int],
     ends: Ends,
     bound: float,
     method: str,
 ) -> Route:
-    """The route over points (stops first) in an order, with what no route over them is shorter than."""
+    """The route over points (stops first) in a given order, with its lower bound."""
     stops = len(selection.chosen)
     visited = [k for k in sequence if k < stops]
-    places = [sequence[0], *visited[1 if sequence[0] < stops else 0 :]]
-    approaches = [ways.way(a, b) for a, b in itertools.pairwise(places)]
+    reached = [sequence[0], *visited[1 if sequence[0] < stops else 0 :]]
+    approaches = [legs.path(a, b) for a, b in itertools.pairwise(reached)]
     if sequence[0] < stops:
         approaches.insert(0, frozen(points[sequence[:1]]))
-    back = places[0] if ends.closed else ends.last
-    return_leg = None if back is None or back == places[-1] else ways.way(places[-1], back)
+    back = reached[0] if ends.closed else ends.last
+    return_leg = None if back is None or back == reached[-1] else legs.path(reached[-1], back)
     driven = sum(polyline_length(leg) for leg in (*approaches, *([] if return_leg is None else [return_leg])))
     space = selection.visibility.candidates.space
     return Route(
@@ -238,7 +239,7 @@ __all__ = [
     "Graph",
     "Router",
     "assembled",
-    "check_place",
+    "check_position",
     "legs_between",
     "points_and_ends",
     "rank_at_door",

@@ -1,4 +1,4 @@
-"""Route -> mission: stops with headings, approaches, tolerances and scans, ready to be sent."""
+"""Route -> mission: stops with headings, approaches, tolerances and scans, ready to send."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def assemble(
 ) -> Mission:
     """The mission of a route; `part` numbers the missions of a floor that has several.
 
-    `share` says which of the missions it is that together see what the floor's plan promises.
+    `share` identifies it among several missions that together reach the coverage of the floor's plan.
     """
     space = route.selection.visibility.candidates.space
     settings, floor = space.settings, space.floor
@@ -115,14 +115,14 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
 
 
 def _scan_heading(candidates: Candidates, row: int, arrival: float) -> float:
-    """The heading the scan was planned with; a scanner that looks all round keeps that of the arrival."""
+    """The planned heading of the scan; with a field of view of 360° it is the heading of arrival."""
     if not len(candidates.heading):
         return arrival
     return _turned(candidates.heading[candidates.kept[row]])
 
 
 def _arrival_heading(approach: FloatArray, before: float) -> float:
-    """Direction of the approach's last piece; where the robot does not move, it keeps its heading."""
+    """Direction of the approach's last piece; without movement the heading stays."""
     if len(approach) < 2:
         return before
     step = approach[-1] - approach[-2]
@@ -159,17 +159,17 @@ def _turned(heading: float) -> float:
 
 
 def check_legs(route: Route) -> None:
-    """Every leg as it will be sent keeps its distance from obstacles, closed openings and floor edges.
+    """Check that every leg, as sent, keeps its distance from obstacles, closed openings and floor edges.
 
     Raises
     ------
     StopgoError
-        If one does not: the route is then not written.
+        If a leg comes too close; no mission is made then.
     """
     space = route.selection.visibility.candidates.space
     origin = local_origin(space.floor)
     graph = space.settings.graph
-    whose = space.floor.name if graph in GRAPHS else f"graph = {graph}"
+    source = space.floor.name if graph in GRAPHS else f"graph = {graph}"
     exact = walls_of(space)
     walls = Walls(exact.segments, exact.clearance - CLEAR_SLACK)
     tree = shapely.STRtree(walls.shapes())
@@ -179,4 +179,4 @@ def check_legs(route: Route) -> None:
         shape = shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0])
         if not keeps_clear(shape, walls, tree):
             x, y = leg[-1]
-            raise StopgoError(f"{whose}: the leg to ({x:.3f}, {y:.3f}) comes too near an obstacle or an edge")
+            raise StopgoError(f"{source}: leg to ({x:.3f}, {y:.3f}) is too close to an obstacle or an edge")

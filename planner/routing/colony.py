@@ -1,4 +1,4 @@
-"""The paper's router: an ant colony over the matrix of ways between stops (paper, 3.5).
+"""The paper's router: an ant colony over the matrix of path lengths between stops (paper, 3.5).
 
 The ant system of Dorigo, Maniezzo and Colorni, "Ant system: optimization by a colony of cooperating
 agents", IEEE Trans. SMC-B 1996, with the parameters found best there. The paper names the method and
@@ -15,15 +15,15 @@ from stopgo.planner.routing.tour import canonical
 ALPHA = 1
 """Power of the trail in an ant's choice."""
 BETA = 5
-"""Power of the nearness in an ant's choice."""
+"""Power of the inverse length in an ant's choice."""
 EVAPORATION = 0.5
-"""1 - rho: share of the trail that is lost per cycle."""
+"""1 - rho: fraction of the trail that is lost per cycle."""
 CYCLES = 100
 """Tours of every ant; a count, so that the route does not depend on speed."""
 MOST_ANTS = 50
 """One ant per point, but no more than this (ours)."""
 NEAREST = 0.01
-"""Shorter edges count as this share of the mean one, since nearness is one over length (ours)."""
+"""Shorter edges count as this fraction of the mean one, since lengths are inverted (ours)."""
 
 
 def ant_colony(lengths: FloatArray, *, seed: int) -> IntArray:
@@ -74,7 +74,7 @@ def _walks(attraction: FloatArray, random: np.random.Generator) -> IntArray:
 
 
 def _first_above(share: FloatArray, drawn: FloatArray, left: IntArray) -> IntArray:
-    """The point each draw falls on; the first one left where all shares are too small to tell apart."""
+    """The point of each draw; the first point left if all fractions are too small to distinguish."""
     found = np.argmax(share > drawn[:, None], axis=1)
     seen = ~left[np.arange(len(found)), found]
     found[seen] = np.argmax(left[seen], axis=1)

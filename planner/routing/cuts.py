@@ -1,4 +1,4 @@
-"""Inequalities that every tour keeps and a solution of the relaxation does not.
+"""Inequalities that every tour meets and a solution of the relaxation violates.
 
 A tour leaves any set of points at least twice (Dantzig, Fulkerson, Johnson 1954), and an even number of
 times (Edmonds' blossom inequalities, with the sets proposed by Padberg and Rinaldi, 1990).
@@ -14,11 +14,11 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.routing.relaxation import Cut
 
 LITTLE = 1e-6
-"""Shares and violations below this are the solver's noise."""
+"""Fractions and violations below this are the solver's noise."""
 
 
 def violated_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
-    """Cuts that the shares (m,) of the edges (m, 2) violate; none if only dearer ones may be left."""
+    """Cuts violated by the fractions (m,) of the edges (m, 2); none if this cheap search finds none."""
     labels = _components(points, edges[share > LITTLE])
     if labels.max() > 0:
         sets = [labels == k for k in range(int(labels.max()) + 1)]
@@ -32,7 +32,7 @@ def _components(points: int, edges: IntArray) -> IntArray:
 
 
 def _leaving(edges: IntArray, inside: BoolArray) -> BoolArray:
-    """Edges (m,) with one end in a set of points."""
+    """True for edges (m,) with one end in a set of points."""
     return inside[edges[:, 0]] != inside[edges[:, 1]]
 
 
@@ -41,9 +41,9 @@ def _leave_twice(edges: IntArray, inside: BoolArray) -> Cut:
 
 
 def _small_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
-    """Sets that are left less than twice (Stoer and Wagner, J. ACM 1997).
+    """Cuts of sets that fewer than two edges leave (Stoer and Wagner, J. ACM 1997).
 
-    Points joined by a whole edge are taken as one: some smallest cut does not part them.
+    Points joined by a whole edge are merged: some smallest cut does not separate them.
     """
     group = _components(points, edges[share > 1 - LITTLE])
     m = int(group.max()) + 1
@@ -66,7 +66,7 @@ def _small_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
 
 
 def _most_tightly(weight: FloatArray, left: list[int]) -> tuple[int, int, float]:
-    """The last two groups when always the one is added that is tied most to those before, and its ties."""
+    """The last two groups of a maximum adjacency order, and the weight that ties the last one."""
     ties = np.full(len(weight), -np.inf)
     ties[left] = weight[left[0], left]
     last, before, value = left[0], left[0], 0.0
@@ -80,7 +80,7 @@ def _most_tightly(weight: FloatArray, left: list[int]) -> tuple[int, int, float]
 
 
 def _odd_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
-    """Sets that are left an odd number of times: the groups that edges used in part hold together."""
+    """Blossom cuts of sets that an odd number of edges leaves: components of fractional edges."""
     partly = (share > LITTLE) & (share < 1 - LITTLE)
     labels = _components(points, edges[partly])
     cuts = []

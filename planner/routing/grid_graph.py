@@ -5,9 +5,9 @@ Each room's grid is 8-connected in the room's own axes; edges that leave the dri
 room a node within max_err_dist. Rooms in rooms are subtracted from the outer one, so that their doors
 join the two; a floor without rooms is one grid.
 
-Ours, where the paper is silent: a grid is also refined until it joins the room's stops and doors, and all
-grids are if stops are not connected yet; rooms that adjoin without a wall are joined along it. The
-paper moves scan positions to the nearest node; here the way goes on from that node to the stop itself, and
+Our additions: a grid is also refined until it connects the room's stops and doors. All grids are refined if
+stops are still not connected. Rooms that adjoin without a wall are joined along their border. The paper
+moves scan positions to the nearest node; here the path continues from that node to the stop itself, and
 every piece of it lies in the drive area.
 """
 
@@ -34,39 +34,39 @@ from stopgo.planner.routing.ways import Ways, shortest_ways
 from stopgo.planner.space.opening_joins import middle_and_normal
 
 RESOLUTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)
-"""Greatest spacings in metres: the paper's first one, then ours."""
+"""Grid spacings in metres, from coarse to fine: the paper's first one, then ours."""
 EXITS = (0.2, 0.4, 0.6, 0.8, 1.0)
-"""Distances in metres from the middle of a door, straight on, at which its rooms' grids are looked for."""
+"""Distances in metres from the middle of a door, straight ahead, from which its rooms' grids are searched."""
 THIN = 0.35
-"""Rooms this near to each other in metres may adjoin without a wall."""
+"""Largest distance in metres between rooms that may adjoin without a wall."""
 ACROSS = 1.5
 """Longest edge in metres from one room's grid to the next one's, a diagonal of the coarsest grid."""
 NEIGHBOURS = 32
-"""Nearest nodes from which the nearest one is taken that a straight way leads to."""
+"""Nearest nodes among which the nearest reachable by a straight line is taken."""
 
 
-def grid_ways(space: NavigableSpace, points: FloatArray) -> Ways:
-    """Ways between all pairs of points (n, 2) over the coarsest grids that connect them.
+def grid_paths(space: NavigableSpace, points: FloatArray) -> Ways:
+    """Paths between all pairs of points (n, 2) over the coarsest grids that connect them.
 
     Raises
     ------
     NegativeResult
-        Where the finest grids do not connect the points.
+        If the finest grids do not connect the points.
     """
     for k in range(len(RESOLUTIONS)):
-        ways = ways_on_grids(space, points, resolutions=RESOLUTIONS[k:])
-        apart = ~np.isfinite(ways.lengths)
+        paths = paths_on_grids(space, points, resolutions=RESOLUTIONS[k:])
+        apart = ~np.isfinite(paths.lengths)
         if not apart.any():
-            return ways
+            return paths
     x, y = points[int(np.argmax(apart.sum(axis=1)))]
     raise NegativeResult(
         f"{space.floor.name}: the grid of {RESOLUTIONS[-1]:g} m does not connect the stop at "
-        f"({x:.3f}, {y:.3f}) with the others; --graph exact connects it"
+        f"({x:.3f}, {y:.3f}) with the others; use --graph exact"
     )
 
 
-def ways_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Sequence[float]) -> Ways:
-    """Ways over grids of the first of `resolutions` that is fine enough for each room, else of the last."""
+def paths_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Sequence[float]) -> Ways:
+    """Paths over grids of the first of `resolutions` that is fine enough for each room, else of the last."""
     origin = local_origin(space.floor)
     free, doors, net = _free(space), _doors(space), Net()
     ends, crossing = np.unique(space.gaps.reshape(-1, 2) - origin, axis=0, return_inverse=True)
@@ -85,10 +85,10 @@ def ways_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Seq
     for k, m in _adjoining(areas):
         pairs = _across(grids[k].xy, grids[m].xy, areas[m], free)
         net.join(node[k][pairs[:, 0]], node[m][pairs[:, 1]])
-    # what the finest grid cannot join runs between gaps too narrow for any node: round their corners
+    # paths that the finest grid misses pass gaps too narrow for any node: add the corners as nodes
     corner = net.add(outward_corners(space).xy if len(resolutions) == 1 else np.empty((0, 2)))
     joints = np.concatenate([gap, exits, corner, entry])
-    net.join(*joints[_in_sight(net.xy[joints], free)].T)
+    net.join(*joints[_visible_pairs(net.xy[joints], free)].T)
     every = np.concatenate(node)
     for joint in (entry, gap, corner):
         pairs, _ = nearest_seen(net.xy[joint], net.xy[every], free)
@@ -97,14 +97,14 @@ def ways_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Seq
 
 
 class Net:
-    """A graph that grows: nodes, local, and the edges between them."""
+    """A growing graph: nodes in local coordinates, and the edges between them."""
 
     def __init__(self) -> None:
         self.xy: FloatArray = np.empty((0, 2))
         self.edges: IntArray = np.empty((0, 2), dtype=np.int64)
 
     def add(self, xy: FloatArray) -> IntArray:
-        """Add nodes (n, 2); their numbers."""
+        """Add nodes (n, 2) and return their numbers."""
         first = len(self.xy)
         self.xy = np.concatenate([self.xy, xy])
         return np.arange(first, len(self.xy))
@@ -115,7 +115,7 @@ class Net:
 
 
 def _entries(space: NavigableSpace, net: Net, stop: IntArray, links: IntArray) -> IntArray:
-    """The node by which each stop enters the drive area: itself, or its anchor just beside it.
+    """The node by which each stop enters the drive area: itself, or its anchor next to it.
 
     Stops in openings just as wide as the robot are joined with the ends of the crossing.
     """
@@ -129,7 +129,7 @@ def _entries(space: NavigableSpace, net: Net, stop: IntArray, links: IntArray) -
 
 
 def _free(space: NavigableSpace) -> BaseGeometry:
-    """The drive area, local, with its edge: it is drawn this much farther from everything than it must."""
+    """The drive area in local coordinates with its edge, widened by the margin with which it was drawn."""
     free = to_shape(space.drive_area, local_origin(space.floor)).buffer(GRID, quad_segs=2)
     shapely.prepare(free)
     return free
@@ -137,18 +137,18 @@ def _free(space: NavigableSpace) -> BaseGeometry:
 
 @dataclass(frozen=True, eq=False)
 class Doors:
-    """Openings that are driven through, local: straight across, from the middle of where there is room."""
+    """Openings to drive through, local: lines straight across, from the middle of the free width."""
 
     middle: FloatArray
     """(d, 2)."""
     exits: FloatArray
-    """Places on both sides that a straight way leads to (e, 2)."""
+    """Positions on both sides that a straight line reaches (e, 2)."""
     door: IntArray
     """Door of each exit (e,)."""
 
 
 def _doors(space: NavigableSpace) -> Doors:
-    """Openings just as wide as the robot are left out: their gap crossings carry it through."""
+    """The doors of a floor, without openings just as wide as the robot, which have gap crossings."""
     free, origin = _free(space), local_origin(space.floor)
     lines = [shapely.LineString(item.opening.line - origin) for item in space.openings if item.passable]
     found = [middle_and_normal(piece) for line in lines if (piece := _widest(line, free)).length > GRID]
@@ -176,7 +176,7 @@ class RoomGrid:
     edges: IntArray
     """Pairs of nodes (m, 2)."""
     exits: IntArray
-    """Pairs of a door's exit and the node it is joined with (k, 2)."""
+    """Pairs of a door's exit and its node (k, 2)."""
 
 
 def _fine_grid(
@@ -200,13 +200,13 @@ def _fine_grid(
         joined = set(doors.door[exits[exits_to[:, 0]]]) == set(doors.door[exits])
         used = np.concatenate([stops_to[:, 1], exits_to[:, 1]])
         dense = len(xy) >= settings.den_grid_min * inside.area
-        if near and joined and dense and _whole(xy, edges, used, inside):
+        if near and joined and dense and _connects(xy, edges, used, inside):
             break
     return RoomGrid(xy, edges, np.column_stack([exits[exits_to[:, 0]], exits_to[:, 1]]))
 
 
-def _whole(xy: FloatArray, edges: IntArray, used: IntArray, inside: BaseGeometry) -> bool:
-    """Whether the grid joins those of the nodes in use that lie in the same piece of the room."""
+def _connects(xy: FloatArray, edges: IntArray, used: IntArray, inside: BaseGeometry) -> bool:
+    """True if the grid connects all used nodes that lie in the same piece of the room."""
     links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(xy), len(xy)))
     label = connected_components(links, directed=False)[1][used]
     held = shapely.intersects(shapely.points(xy[used])[:, None], shapely.get_parts(inside)[None, :])
@@ -217,7 +217,7 @@ def _whole(xy: FloatArray, edges: IntArray, used: IntArray, inside: BaseGeometry
 def _lattice(
     room: BaseGeometry, inside: BaseGeometry, free: BaseGeometry, *, spacing: float
 ) -> tuple[FloatArray, IntArray]:
-    """Nodes (n, 2) of a room's grid that may be driven to, and pairs of neighbours (m, 2), diagonals too."""
+    """Reachable nodes (n, 2) of a room's grid, and pairs of neighbours (m, 2), diagonals included."""
     if inside.is_empty:
         return np.empty((0, 2)), np.empty((0, 2), dtype=np.int64)
     xy = room_grid(room, spacing=spacing)
@@ -243,22 +243,22 @@ def _adjoining(rooms: list[BaseGeometry]) -> list[tuple[int, int]]:
 
 
 def _across(here: FloatArray, there: FloatArray, room: BaseGeometry, free: BaseGeometry) -> IntArray:
-    """Pairs of nodes (k, 2) of a grid and that of the next room, where no wall stands between them."""
+    """Pairs of nodes (k, 2) of a grid and the next room's grid, without a wall between them."""
     near = np.flatnonzero(shapely.dwithin(shapely.points(here), room, ACROSS))
     pairs, away = nearest_seen(here[near], there, free)
     pairs = pairs[away <= ACROSS]
     return np.column_stack([near[pairs[:, 0]], pairs[:, 1]])
 
 
-def _in_sight(xy: FloatArray, free: BaseGeometry) -> IntArray:
-    """Pairs (m, 2) of points that a short straight way joins: pockets between gaps may hold no node."""
+def _visible_pairs(xy: FloatArray, free: BaseGeometry) -> IntArray:
+    """Pairs (m, 2) of points that a short straight line joins: pockets between gaps may contain no node."""
     pairs = KDTree(xy).query_pairs(ACROSS, output_type="ndarray") if len(xy) else np.empty((0, 2), np.int64)
-    ways = shapely.linestrings(xy[pairs]) if len(pairs) else np.empty(0, dtype=object)
-    return pairs[shapely.covers(free, ways)].astype(np.int64)
+    lines = shapely.linestrings(xy[pairs]) if len(pairs) else np.empty(0, dtype=object)
+    return pairs[shapely.covers(free, lines)].astype(np.int64)
 
 
 def nearest_seen(xy: FloatArray, nodes: FloatArray, free: BaseGeometry) -> tuple[IntArray, FloatArray]:
-    """The nearest node that a straight way leads to: pairs (k, 2) of point and node, and how far it is."""
+    """The nearest node that a straight line reaches: pairs (k, 2) of point and node, and the distance."""
     if not len(xy) or not len(nodes):
         return np.empty((0, 2), dtype=np.int64), np.empty(0)
     away, node = KDTree(nodes).query(xy, k=np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))

@@ -1,4 +1,4 @@
-"""The ways of a graph, held against what they must be where another's program gave them."""
+"""Paths of a graph, checked where a plug-in computed them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from stopgo.mission.geometry import FloatArray, frozen, polyline_length
 from stopgo.planner.routing.ways import Ways
 
 TOLERANCE = 1e-6
-"""Metres by which a way may miss its ends, or its length."""
+"""Largest error in metres of a path's ends and of its length."""
 
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """Ways between points (n, 2), by a graph of the settings."""
+    """Paths between points (n, 2), by a graph of the settings."""
 
     graph: Variant[Any]
     ways: Ways
@@ -37,20 +37,20 @@ class Legs:
 
     @property
     def lengths(self) -> FloatArray:
-        """(n, n) in metres; infinite where there is no way."""
+        """(n, n) in metres; infinite where there is no path."""
         return np.asarray(self.ways.lengths, dtype=np.float64)
 
-    def way(self, start: int, end: int) -> FloatArray:
+    def path(self, start: int, end: int) -> FloatArray:
         """The polyline (n, 2) from one point to another, both included."""
         if self.graph.ours:
             return self.ways.way(start, end)
         with self.graph.named_errors():
             given = self.ways.way(start, end)
-        line = frozen(self.graph.array(given, "a way", (None, 2)))
+        line = frozen(self.graph.array(given, "a path", (None, 2)))
         ends = self.points[[start, end]]
         if not len(line) or np.abs(line[[0, -1]] - ends).max() > TOLERANCE:
-            raise self.graph.wrong(f"the way from point {start} to point {end} does not lead there")
-        told = float(self.lengths[start, end])
-        if abs(polyline_length(line) - told) > TOLERANCE * max(1.0, told):
-            raise self.graph.wrong(f"a way of {told:.6f} m is {polyline_length(line):.6f} m long")
+            raise self.graph.wrong(f"the path from point {start} to point {end} does not lead there")
+        stated = float(self.lengths[start, end])
+        if abs(polyline_length(line) - stated) > TOLERANCE * max(1.0, stated):
+            raise self.graph.wrong(f"a path of {stated:.6f} m is {polyline_length(line):.6f} m long")
         return line

@@ -1,7 +1,7 @@
-"""How good a tour is: a bound below which no tour is, and up to some hundred points the shortest tour.
+"""Optimality proof of a tour: a lower bound, and for up to some hundred points the shortest tour.
 
 Few points: all tours are compared. More: branch and bound over the relaxation of Dantzig, Fulkerson and
-Johnson (1954) with cuts found on the way. Most: the one-tree bound alone.
+Johnson (1954), with cuts added during the search. Most: the one-tree bound alone.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from stopgo.planner.routing.tour_bound import one_tree_bound, useful_edges
 COMPARE_ALL_UP_TO = 12
 """Points up to which all tours are compared."""
 BRANCH_UP_TO = 120
-"""Points up to which the relaxation is worth its time."""
+"""Points up to which the relaxation is used."""
 SOLVE_LIMIT = 400
 """Relaxations solved at most; a count, so that the bound does not depend on speed."""
 CLOSE = 1_000
-"""Nanometres by which a tour called optimal may be too long: what a mission is rounded to."""
+"""Tolerance in nanometres of a tour called optimal: the rounding of a mission."""
 WHOLE = 1e-6
-"""How far from 0 or 1 the share of an edge may be to count as whole."""
+"""Tolerance of an edge's value at 0 or 1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """A tour and what no tour is shorter than, both in the matrix's unit."""
+    """A tour and a lower bound on every tour, both in the matrix's unit."""
 
     order: IntArray
     length: int
@@ -41,14 +41,14 @@ class Proof:
 
     @property
     def closed(self) -> bool:
-        """Whether the tour is proved to be the shortest, to within a micrometre."""
+        """True if the tour is proved to be the shortest, to within a micrometre."""
         return self.length - self.bound <= CLOSE
 
 
-def proved(cost: IntArray, order: IntArray, *, improve: bool = True) -> Proof:
-    """The tour with a bound, over a symmetric matrix (n, n); if `improve`, a shorter tour the proof meets.
+def tour_proof(cost: IntArray, order: IntArray, *, improve: bool = True) -> Proof:
+    """The tour with a bound, over a symmetric matrix (n, n); if `improve`, a shorter tour if one is found.
 
-    The tour is kept where the proof meets another one of the same length.
+    The given tour stays if the search finds another one of the same length.
     """
     length = length_of(cost, order)
     found = _searched(cost, order, length)
@@ -71,9 +71,9 @@ def _searched(cost: IntArray, order: IntArray, length: int) -> Proof:
 
 
 def _branch_and_bound(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
-    """Split the tours by one edge at a time, the part with the lowest bound first.
+    """Branch on one edge at a time, the subproblem with the lowest bound first.
 
-    A part is done with when its bound comes within CLOSE of the best tour: no tour of it is worth more.
+    A subproblem is closed when its bound comes within CLOSE of the best tour.
     """
     relaxation = Relaxation(cost, edges, limit=known.length)
     none, all_ = np.zeros(len(edges), dtype=np.int64), np.ones(len(edges), dtype=np.int64)
@@ -98,7 +98,7 @@ def _branch_and_bound(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
 def _bounded(
     relaxation: Relaxation, low: IntArray, high: IntArray, least: int, best: int
 ) -> tuple[int, FloatArray]:
-    """A bound on the tours that use each edge from `low` to `high` times, and the relaxation's use of it."""
+    """A bound on the tours that use each edge from `low` to `high` times, and the relaxed solution."""
     while True:
         share = relaxation.solve(low, high)
         least = max(least, relaxation.bound(low, high))
@@ -112,14 +112,14 @@ def _bounded(
 
 
 def _fixed(low: IntArray, high: IntArray, edge: int, times: int) -> tuple[IntArray, IntArray]:
-    """The same limits with one edge used or left out."""
+    """The same limits with one edge forced in or out."""
     low, high = low.copy(), high.copy()
     low[edge] = high[edge] = times
     return low, high
 
 
 def _better(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
-    """The tour made of `edges` if it is one and shorter than the best one known."""
+    """The tour made of `edges`, if they form a tour that is shorter than the best one known."""
     graph = nx.Graph(edges.tolist())
     ring = nx.is_connected(graph) and len(graph) == len(cost) and all(d == 2 for _, d in graph.degree)
     if not ring:

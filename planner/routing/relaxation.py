@@ -1,7 +1,7 @@
-"""The relaxation of a tour to shares of edges, as a linear programme, and bounds that hold exactly.
+"""The relaxation of a tour to fractions of edges, as a linear programme, and exact bounds from it.
 
-Whatever the solver's tolerances, its prices only suggest a bound: they are rounded to whole nanometres
-and the bound they imply is summed up in whole numbers (weak duality, so any prices give a valid one).
+The bound does not depend on the solver's tolerances. The solver's prices are rounded to whole nanometres,
+and their bound is summed in whole numbers (by weak duality any prices give a valid bound).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ NANOMETRES = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """An inequality that every tour keeps: the sum of `times` over its edges is at least `least`."""
+    """An inequality that every tour meets: the sum of `times` over its edges is at least `least`."""
 
     times: IntArray
     """(m,)."""
@@ -27,10 +27,10 @@ class Cut:
 
 
 class Relaxation:
-    """Every point is left twice and every cut is kept; edges are used in part.
+    """The linear programme: two edges at every point, every cut met, edges used in fractions.
 
-    A row that cannot be kept is paid for with a whole tour's length, so that there always is a solution
-    and its prices prove that a part of the tours is not worth looking at.
+    A violated row costs a whole tour's length. So there always is a solution, and its prices prove that a
+    subproblem contains no shorter tour.
     """
 
     def __init__(self, cost: IntArray, edges: IntArray, *, limit: int) -> None:
@@ -48,7 +48,7 @@ class Relaxation:
             self._add(Cut((edges == point).any(axis=1).astype(np.int64), 2), most=2.0)
 
     def add(self, cut: Cut) -> None:
-        """Keep this cut too."""
+        """Add a cut."""
         self._add(cut, most=np.inf)
 
     def _add(self, cut: Cut, *, most: float) -> None:
@@ -60,7 +60,7 @@ class Relaxation:
         self._least.append(cut.least)
 
     def solve(self, low: IntArray, high: IntArray) -> FloatArray:
-        """Share of each edge (m,) in a cheapest solution that uses it from `low` to `high` times."""
+        """Fraction of each edge (m,) in a cheapest solution that uses it from `low` to `high` times."""
         index = np.arange(len(self.edges), dtype=np.int32)
         self._solver.changeColsBounds(len(index), index, low.astype(float), high.astype(float))
         self._solver.run()
@@ -68,9 +68,9 @@ class Relaxation:
         return np.array(self._solver.getSolution().col_value[: len(index)])
 
     def bound(self, low: IntArray, high: IntArray) -> int:
-        """What no tour within these limits is shorter than, from the prices of the last solution."""
+        """Lower bound on the tours within these limits, from the prices of the last solution."""
         prices = np.nan_to_num(np.array(self._solver.getSolution().row_dual))
-        dearest = 2 * self._limit  # whatever the solver says, sums stay within 64 bits
+        dearest = 2 * self._limit  # clipped, so that sums stay within 64 bits for any prices
         price = np.rint(np.clip(prices, -dearest, dearest) * NANOMETRES).astype(np.int64)
         price[self.points :] = np.maximum(price[self.points :], 0)
         reduced = self._cost - price @ np.array(self._times)

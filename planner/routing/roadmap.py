@@ -1,8 +1,8 @@
-"""Shortest ways between points of the drive area: a visibility graph over its corners.
+"""Shortest paths between points of the drive area: a visibility graph over its corners.
 
-A shortest way bends only at corners that stick out into the drive area, so these, the points asked
-for, and the ends of gap crossings are its nodes. The drive area rounds obstacles from outside with 16
-corners per turn, so a way is at most 2 % of a radius longer at a right-angled bend than the true arc.
+A shortest path bends only at corners that project into the drive area. So the nodes are these corners, the
+given points, and the ends of gap crossings. The drive area rounds obstacles from outside with 16 corners
+per full circle, so a path is at most 2 % of a radius longer at a right-angled bend than the true arc.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from stopgo.planner.visibility.sight.mesh import mesh_of
 from stopgo.planner.visibility.sight.sight import scene_of, sight
 
 PAIRS = 1_000_000
-"""Pairs of nodes held at a time, about 200 bytes each."""
+"""Pairs of nodes in memory at a time, about 200 bytes each."""
 TOUCH = 1e-9
-"""Products of areas (m⁴) below this are float noise."""
+"""Products of areas (m⁴) below this are floating-point noise."""
 
 
-def ways_between(space: NavigableSpace, points: FloatArray) -> Ways:
-    """Shortest ways between all pairs of points (n, 2) of the drive area."""
+def paths_between(space: NavigableSpace, points: FloatArray) -> Ways:
+    """Shortest paths between all pairs of points (n, 2) of the drive area."""
     origin = local_origin(space.floor)
     corners = outward_corners(space)
     ends, crossing = np.unique(space.gaps.reshape(-1, 2) - origin, axis=0, return_inverse=True)
@@ -54,7 +54,7 @@ def ways_between(space: NavigableSpace, points: FloatArray) -> Ways:
 
 
 def anchors_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Anchors (k, 2) of the points that are not well inside the drive area, and which points those are."""
+    """Anchors (k, 2) of the points at the edge of the drive area, and the indices of those points."""
     anchors = reach_of(space).anchors(points)
     moved = np.flatnonzero(np.any(anchors != points, axis=1) & np.isfinite(anchors[:, 0]))
     return anchors[moved], moved
@@ -62,12 +62,12 @@ def anchors_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, I
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """Corners of the drive area, local, where its inner angle is more than straight."""
+    """Corners of the drive area with an inner angle above 180°, in local coordinates."""
 
     xy: FloatArray
     """(n, 2)."""
     sides: FloatArray
-    """The way to the corner before and to the one after (n, 2, 2); zero where rings touch."""
+    """Vectors to the previous and to the next corner (n, 2, 2); zero where rings touch."""
 
 
 def outward_corners(space: NavigableSpace) -> Corners:
@@ -102,17 +102,17 @@ def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntA
     """Links (k, 2) from points that lie on a gap crossing, such as stops in doorways, to its ends."""
     if not len(links):
         return np.empty((0, 2), dtype=np.int64)
-    ways = shapely.linestrings(nodes[links])
-    near = shapely.dwithin(shapely.points(points)[:, None], ways[None, :], GRID)
-    point, way = np.nonzero(near)
-    return np.stack([np.repeat(point, 2), links[way].ravel()], axis=1).astype(np.int64)
+    crossings = shapely.linestrings(nodes[links])
+    near = shapely.dwithin(shapely.points(points)[:, None], crossings[None, :], GRID)
+    point, crossing = np.nonzero(near)
+    return np.stack([np.repeat(point, 2), links[crossing].ravel()], axis=1).astype(np.int64)
 
 
 def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first: int) -> IntArray:
-    """Pairs (m, 2) of nodes that see each other and between which a shortest way may lead straight.
+    """Pairs (m, 2) of mutually visible nodes that may be a straight piece of a shortest path.
 
-    Nodes from `first` on are the corners. Among round columns some hundred times as many pairs see each
-    other, so from a corner only those are looked for that pass by it, and PAIRS are held at a time.
+    Nodes from `first` on are the corners. Round columns give some hundred times as many visible pairs. So
+    from a corner only directions that pass by it are searched, and PAIRS are in memory at a time.
     """
     sides = np.zeros((len(nodes), 2, 2))
     sides[first : first + len(corners.xy)] = corners.sides
@@ -131,9 +131,10 @@ def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first
 
 
 def views_of(nodes: IntArray, sides: IntArray) -> tuple[IntArray, IntArray]:
-    """Which nodes look and between which two points (n, 2, 2): all round, or to both sides past a corner.
+    """Nodes that look (n,), and the two points (n, 2, 2) between which each looks.
 
-    A way that passes by a corner leaves it between one of its sides and the other one drawn on beyond it.
+    A point looks all round, a corner past both of its sides. A path that passes by a corner leaves it
+    between one of its sides and the extension of the other.
     """
     back, on = nodes + sides[:, 0], nodes + sides[:, 1]
     left, right = np.stack([on, nodes - sides[:, 0]], axis=1), np.stack([nodes - sides[:, 1], back], axis=1)
@@ -143,10 +144,10 @@ def views_of(nodes: IntArray, sides: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _tangent(edges: IntArray, nodes: FloatArray, sides: FloatArray) -> IntArray:
-    """The edges that a shortest way may use: straight on from a corner, they pass by it.
+    """The edges that a shortest path may use: those that pass by the corners at their ends.
 
-    Where both sides of a corner (n, 2, 2) do not lie on one side of the edge, the way would cut the corner
-    shorter. What is too close to tell is kept.
+    If the sides of a corner (n, 2, 2) lie on different sides of the edge, a shorter path cuts the corner.
+    Edges too close to decide stay.
     """
     for end in range(2):
         along = (nodes[edges[:, 1]] - nodes[edges[:, 0]])[:, None]

@@ -1,4 +1,4 @@
-"""The shortest of all tours, by dynamic programming over subsets: exact, for a handful of points.
+"""The shortest of all tours, by dynamic programming over subsets: exact, for few points.
 
 Held and Karp, "A dynamic programming approach to sequencing problems", J. SIAM 1962.
 """

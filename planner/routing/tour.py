@@ -17,21 +17,21 @@ from stopgo.planner.routing.tour_kernel import HELPERS, iterated_search
 NANOMETRES = 1e9
 """Per metre."""
 LARGEST = 4e18
-"""Nanometres that all edges of a tour may come to, so that sums stay within 64 bits."""
+"""Largest total of a tour's edges in nanometres, so that sums stay within 64 bits."""
 COMPARE_ALL_UP_TO = 9
 """Points up to which comparing all tours is quicker than a search."""
 COMPILE_ABOVE = 30
-"""Points above which loading the compiled kernel pays for itself."""
+"""Points above which the compiled kernel is faster, its loading time included."""
 ROUNDS = 100
 """Perturbations per point that are tried; a count, so that plans do not depend on speed."""
 INTERPRETED_ROUNDS = 20
-"""The same where the kernel is interpreted: short tours are mostly found at once."""
+"""The same for the interpreted kernel: short tours are mostly found in the first search."""
 NEAREST = 10
-"""Points to which new edges are tried from each point."""
+"""Nearest points to which new edges are tried from each point."""
 LONGEST_STRETCH = 50
 """Points in each of the two stretches that a perturbation exchanges, at most."""
 JOURNAL = 1000
-"""Reversals that a trial may make, so that it can be taken back."""
+"""Most reversals in a trial, so that it can be undone."""
 
 
 def shortest_tour(lengths: FloatArray, *, seed: int) -> IntArray:
@@ -45,14 +45,14 @@ def shortest_tour(lengths: FloatArray, *, seed: int) -> IntArray:
         return canonical(best_of_all(cost))
     rounds = INTERPRETED_ROUNDS if n <= COMPILE_ABOVE else ROUNDS
     perturbations = trials(cost, rounds * n, seed=seed)
-    return canonical(searched(cost, perturbations, interpreted=n <= COMPILE_ABOVE))
+    return canonical(search(cost, perturbations, interpreted=n <= COMPILE_ABOVE))
 
 
 def nanometres(lengths: FloatArray) -> IntArray:
     """Lengths in whole nanometres, rounded down, so that no sum of them is above the true one."""
     if float(np.max(lengths, initial=0.0)) * NANOMETRES * len(lengths) > LARGEST:
         longest, most = float(lengths.max()), LARGEST / NANOMETRES / len(lengths)
-        raise InputError(f"a way of {longest:g} m between {len(lengths)} stops; the most is {most:g} m")
+        raise InputError(f"route: a path of {longest:g} m between {len(lengths)} stops; at most {most:g} m")
     return np.floor(lengths * NANOMETRES).astype(np.int64)
 
 
@@ -70,28 +70,28 @@ def canonical(order: IntArray) -> IntArray:
 
 
 def trials(cost: IntArray, count: int, *, seed: int) -> IntArray:
-    """Perturbations (count, 4): a place, points in the two stretches after it, and what may be lost.
+    """Perturbations (count, 4): an index, points in the two stretches after it, and the allowed loss.
 
-    Losses are drawn up to twice the mean way to the nearest point at first, and to nothing at the end.
+    Losses are drawn up to twice the mean distance to the nearest point at first, down to 0 at the end.
     """
     n = len(cost)
     random = np.random.Generator(np.random.PCG64(seed))
     sizes = random.integers(1, min(LONGEST_STRETCH, n // 3), size=(count, 2), endpoint=True)
-    places = random.integers(0, n, size=count)
+    indices = random.integers(0, n, size=count)
     step = int(nearest(cost, 1)[1].sum()) // n
     loss = random.integers(0, 2 * step + 1, size=count) // count * np.arange(count, 0, -1)
-    return np.column_stack([places, sizes, loss])
+    return np.column_stack([indices, sizes, loss])
 
 
 def nearest(cost: IntArray, many: int) -> tuple[IntArray, IntArray]:
-    """The nearest other points of each (n, many) and how far they are."""
+    """The nearest other points of each point (n, many), and their distances."""
     away = cost + np.diag(np.full(len(cost), cost.max() + 1))
     near = np.argsort(away, axis=1, kind="stable")[:, :many]
     return near, np.take_along_axis(away, near, axis=1)
 
 
-def searched(cost: IntArray, perturbations: IntArray, *, interpreted: bool) -> IntArray:
-    """The shortest tour met from the nearest neighbours' tour on, by local search and `perturbations`."""
+def search(cost: IntArray, perturbations: IntArray, *, interpreted: bool) -> IntArray:
+    """The shortest tour of a local search with `perturbations`, from the nearest neighbours' tour on."""
     n = len(cost)
     order = _nearest_neighbours(cost)
     near, _ = nearest(cost, min(NEAREST, n - 1))
@@ -107,11 +107,11 @@ def searched(cost: IntArray, perturbations: IntArray, *, interpreted: bool) -> I
 
 
 BEST = 5
-"""Place of the best tour among the kernel's arguments."""
+"""Index of the best tour among the kernel's arguments."""
 
 
 def _nearest_neighbours(cost: IntArray) -> IntArray:
-    """The tour that always goes on to the nearest point not yet visited."""
+    """The tour that always continues to the nearest unvisited point."""
     away = cost.copy()
     order = [0]
     for _ in range(len(cost) - 1):

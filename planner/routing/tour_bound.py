@@ -1,8 +1,8 @@
-"""A lower bound on a tour's length, from smallest one-trees, and the edges a shorter tour may use.
+"""A lower bound on a tour's length from smallest one-trees, and the edges that a shorter tour may use.
 
 Held and Karp, "The traveling-salesman problem and minimum spanning trees", Operations Research 1970;
 step sizes after Volgenant and Jonker, EJOR 1982. Weights are whole numbers like the lengths, so a
-one-tree's value is exact, whatever way its weights were found.
+one-tree's value is exact, however its weights were found.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import numpy as np
 from stopgo.mission.geometry import BoolArray, IntArray
 
 STEPS = 300
-"""One-trees looked at; a count, so that the bound does not depend on speed."""
+"""One-trees computed; a count, so that the bound does not depend on speed."""
 MANY = 300
-"""Points above which fewer one-trees are looked at, since each takes longer."""
+"""Points above which fewer one-trees are computed, since each takes longer."""
 PATIENCE = 12
 """One-trees without a higher bound after which steps are halved."""
 MEMORY = 0.3
-"""Weight of the direction before in each step's direction."""
+"""Weight of the previous direction in each step's direction."""
 NEVER = np.iinfo(np.int64).max
-"""The cost of what must not be taken."""
+"""Cost of an edge that must not be used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,25 +35,26 @@ class OneTree:
     costs: IntArray
     """Lengths plus the weights of both ends (n, n)."""
     before: IntArray
-    """Points 0 to n - 2 in the order in which the tree reached them, with the point each hangs on."""
+    """Parent in the tree of each point of `reached` (n - 1,)."""
     reached: IntArray
+    """Points 0 to n - 2 in the order in which the tree reached them (n - 1,)."""
 
 
 def one_tree_bound(cost: IntArray, *, best: int) -> OneTree:
-    """The one-tree of the highest value found; `best` is the length of a tour, to steer by.
+    """The one-tree of the highest value found; the length `best` of a tour sets the step size.
 
-    Points that a one-tree uses too often are made dearer, those it uses too seldom cheaper; every tour
-    changes by the same amount then, so that the value less that amount remains a bound.
+    The weight of a point rises if a one-tree uses the point too often, and falls if too seldom. Every tour
+    changes by the same amount, so that the value less that amount remains a bound.
     """
-    weight, way = np.zeros(len(cost)), np.zeros(len(cost))
+    weight, direction = np.zeros(len(cost)), np.zeros(len(cost))
     highest = tree = one_tree(cost, weight.astype(np.int64))
     scale, waited = 1.0, 0
     for _ in range(STEPS * MANY // max(MANY, len(cost))):
         off = (tree.degree - 2).astype(float)
         if not off.any() or highest.value >= best:
             break
-        way = off + MEMORY * way
-        weight += scale * max(best - tree.value, 1) / float(off @ off) * way
+        direction = off + MEMORY * direction
+        weight += scale * max(best - tree.value, 1) / float(off @ off) * direction
         tree = one_tree(cost, np.rint(weight).astype(np.int64))
         waited = 0 if tree.value > highest.value else waited + 1
         highest = tree if tree.value > highest.value else highest
@@ -66,7 +67,7 @@ def one_tree(cost: IntArray, weight: IntArray) -> OneTree:
     """The smallest one-tree where every edge costs its ends' weights more (Prim's algorithm)."""
     costs = cost + weight[:, None] + weight[None, :]
     n = len(cost)
-    away, hangs_on = costs[0, :-1].copy(), np.zeros(n - 1, dtype=np.int64)
+    away, parent = costs[0, :-1].copy(), np.zeros(n - 1, dtype=np.int64)
     reached = np.zeros(n - 1, dtype=np.int64)
     away[0] = NEVER
     open_ = np.ones(n - 1, dtype=bool)
@@ -78,9 +79,9 @@ def one_tree(cost: IntArray, weight: IntArray) -> OneTree:
         row = costs[point, :-1]
         nearer = open_ & (row < away)
         away[nearer] = row[nearer]
-        hangs_on[nearer] = point
+        parent[nearer] = point
         away[point] = NEVER
-    before = hangs_on[reached]
+    before = parent[reached]
     ends = np.argsort(costs[-1, :-1], kind="stable")[:2]
     value = costs[reached[1:], before[1:]].sum() + costs[-1, ends].sum() - 2 * weight.sum()
     used = np.concatenate([reached[1:], before[1:], ends, [n - 1, n - 1]])
@@ -88,10 +89,10 @@ def one_tree(cost: IntArray, weight: IntArray) -> OneTree:
 
 
 def useful_edges(tree: OneTree, *, best: int) -> BoolArray:
-    """Edges (n, n) that a tour no longer than `best` may use.
+    """True for edges (n, n) that a tour no longer than `best` may use.
 
-    A one-tree that must hold an edge costs that edge more and the longest edge of the circle it closes
-    less (Volgenant and Jonker 1983).
+    A one-tree forced to use an edge gains that edge and loses the longest edge of the cycle it closes
+    (Volgenant and Jonker 1983).
     """
     n = len(tree.costs)
     longest = np.full((n - 1, n - 1), -(2**62))

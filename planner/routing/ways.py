@@ -1,4 +1,7 @@
-"""Shortest ways between points over a graph of straight pieces, by Dijkstra's algorithm."""
+"""Shortest paths between points over a graph of straight pieces, by Dijkstra's algorithm.
+
+`Ways`, its method `way` and `shortest_ways` keep their names, because plug-ins for `--graph` use them.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +16,17 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.shapes import SLACK
 
 CHUNK = 256
-"""Points whose distances to all nodes are held at a time."""
+"""Points whose distances to all nodes are in memory at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """Shortest ways between the points asked for."""
+    """Shortest paths between given points."""
 
     xy: FloatArray
     """Node positions in the drawing's coordinates; the points come first."""
     lengths: FloatArray
-    """(points, points) in metres; infinite where there is no way."""
+    """(points, points) in metres; infinite where there is no path."""
     graph: csr_array
     """(nodes, nodes): lengths of the straight pieces."""
 
@@ -34,19 +37,19 @@ class Ways:
         nodes = [end]
         while nodes[-1] != start:
             if before[nodes[-1]] < 0:
-                raise ValueError(f"no way leads from point {start} to point {end}")
+                raise ValueError(f"no path from point {start} to point {end}")
             nodes.append(int(before[nodes[-1]]))
         line = self.xy[nodes[::-1]]
         if len(line) < 2 or np.all(line == line[0]):
             return frozen(line[:1])
-        # a point on a straight piece would make the robot halt there
+        # a point on a straight piece would make the robot stop there
         straightened = shapely.simplify(shapely.LineString(line - line[0]), SLACK, preserve_topology=False)
         inner = shapely.get_coordinates(straightened)[1:-1] + line[0]
         return frozen(np.concatenate([line[:1], inner, line[-1:]]))
 
 
 def shortest_ways(xy: FloatArray, edges: IntArray, points: int) -> Ways:
-    """Ways between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
+    """Shortest paths between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
     low, high = edges.min(axis=1), edges.max(axis=1)
     key = np.unique(low[low < high] * len(xy) + high[low < high])
     pair = np.stack([key // len(xy), key % len(xy)], axis=1)

@@ -1,1 +1,1 @@
-"""Proof of a mission by simulation: the floor raised to its heights, scanned, measured, and registered."""
+"""Verification of a mission by simulation: the floor is extruded, scanned, measured, and registered."""

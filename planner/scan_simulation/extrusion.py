@@ -1,6 +1,6 @@
-"""Floor -> solids of a height: every element by itself, as it was drawn, with the floor and a ceiling.
+"""Floor -> extruded solids: every element by itself, as drawn, with the floor and a ceiling.
 
-Nothing here is of the plan's own geometry of sight: no union, no grid, no mesh that it looks through.
+This shares nothing with the plan's own visibility geometry: no union, no grid, no mesh.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 
 BEAM_M = 0.3
-"""How far beams hang below the ceiling, where nothing tells."""
+"""Assumed height of a beam, from its underside to the ceiling."""
 BEAM_WIDTH_M = 0.2
-"""How wide beams are that are drawn as single lines."""
+"""Assumed width of beams drawn as single lines."""
 SEE_THROUGH_M = {"windows": (0.9, 2.1), "railings": (0.0, 1.0), "other": (0.0, 1.0)}
-"""From where to where the laser meets other targets that it passes, where nothing tells."""
+"""Assumed lower and upper height of targets that the laser passes, by kind."""
 NONE = -1
-HANGING = "beams"
-"""The kind that hangs below the ceiling."""
+BEAM_KIND = "beams"
+"""The kind that is fixed below the ceiling."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExtrudedFloor:
-    """Triangles in metres from `origin`, z up from the floor; each of an upright face or of a level one."""
+    """Triangles in metres from `origin`, z up from the floor; each belongs to an upright or a level face."""
 
     origin: FloatArray
     """(2,), in the drawing's coordinates."""
@@ -41,7 +41,7 @@ class ExtrudedFloor:
     under: IntArray
     """Element of which a level triangle is the underside (n,), else NONE."""
     a: FloatArray
-    """Where each upright face begins (m, 2)."""
+    """Start of each upright face (m, 2)."""
     b: FloatArray
     low: FloatArray
     """(m,)."""
@@ -49,7 +49,7 @@ class ExtrudedFloor:
     element: IntArray
     """Index of each upright face's element (m,), NONE of a closed door."""
     passed: BoolArray
-    """Whether the laser passes the triangle (n,): a target that hides nothing."""
+    """True for triangles that the laser passes (n,): targets that hide nothing."""
     door: IntArray
     """Closed door of each triangle (n,), else NONE."""
 
@@ -86,8 +86,8 @@ def extruded(floor: FloorPlan, closed: Sequence[FloatArray], ceiling: float) -> 
 
 
 def heights_of(item: Element, ceiling: float) -> tuple[float, float]:
-    """From where to where above the floor an element stands."""
-    if item.kind == HANGING:
+    """Lower and upper height of an element above the floor."""
+    if item.kind == BEAM_KIND:
         return ceiling - BEAM_M, ceiling
     return (0.0, ceiling) if item.occludes else SEE_THROUGH_M.get(item.kind, SEE_THROUGH_M["other"])
 
@@ -100,7 +100,7 @@ def _sides(item: Element, index: int, ceiling: float) -> Iterator[_Upright]:
 
 
 def _undersides(item: Element, index: int, ceiling: float) -> Iterator[_Level]:
-    if item.kind == HANGING and (item.occludes or item.target):
+    if item.kind == BEAM_KIND and (item.occludes or item.target):
         low, _ = heights_of(item, ceiling)
         for solid in item.solids:
             yield from (_Level(flat, index) for flat in _flat(solid, low))
@@ -109,8 +109,8 @@ def _undersides(item: Element, index: int, ceiling: float) -> Iterator[_Level]:
 
 
 def _is_passed(item: Element) -> bool:
-    """Whether the laser meets an element and goes on all the same; what hangs above does stop it."""
-    return not item.occludes and item.kind != HANGING
+    """True if the laser hits an element and passes it; beams stop the laser."""
+    return not item.occludes and item.kind != BEAM_KIND
 
 
 def _edges(item: Element) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -144,7 +144,7 @@ def _flat(polygon: Polygon, height: float) -> Iterator[FloatArray]:
 
 
 def _middle(floor: FloorPlan) -> FloatArray:
-    """Near everything, so that Embree's single precision is a few micrometres."""
+    """Centre of the floor in whole metres, so that Embree's single precision is a few micrometres."""
     rings = [ring for polygon in floor.outline for ring in polygon.rings]
     points = np.concatenate(rings)
     return np.round((points.min(axis=0) + points.max(axis=0)) / 2)

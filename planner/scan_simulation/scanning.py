@@ -1,4 +1,4 @@
-"""Stop + solids -> its scan: points on every cell of the targets, and a thinned cloud for registration."""
+"""Stop + solids -> scan: points on every cell of the targets, and a thinned cloud for registration."""
 
 from __future__ import annotations
 
@@ -10,93 +10,93 @@ import numpy as np
 from stopgo.mission.document import Stop
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation
-from stopgo.planner.scan_simulation.casting import Met, RayFan, SolidScene, distances
+from stopgo.planner.scan_simulation.casting import Hits, RayFan, SolidScene, distances
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor
 from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 CLOUD_DEG = 0.4
-"""Between the rays that are kept as a cloud, where their points lie dense enough."""
+"""Angle between the rays kept in the cloud, where their points are dense enough."""
 SPARSE_M = 0.03
-"""Where points of these rays lie farther apart on a surface, far or flatly seen, all rays are kept."""
+"""Point spacing above which all rays are kept: on surfaces far away or at a flat angle."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScannerPose:
-    """Where a scanner stands, in metres from the solids' origin."""
+    """Pose of a scanner, in metres from the solids' origin."""
 
-    place: FloatArray
+    position: FloatArray
     """(3,)."""
     heading: float
     open_door: int = NONE
-    """The closed door in whose doorway it stands: it keeps it open."""
+    """The closed door in whose doorway the scanner is, and which it keeps open; else NONE."""
     number: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class ScanCount:
-    """What a scan met."""
+    """Hits of one scan."""
 
     cell: IntArray
     """Cells with points, ascending."""
     points: IntArray
-    """How many there are on each."""
+    """Number of points on each."""
     columns: IntArray
-    """On how many upright lines they lie; 0 on undersides."""
+    """Number of vertical lines on which they lie; 0 on undersides."""
     away: FloatArray
-    """From the scanner to the middle of each, metres."""
+    """Distance from the scanner to the centre of each, metres."""
     incidence: FloatArray
-    """Between the ray and the perpendicular at each, radians."""
+    """Angle between the ray and the surface normal at each, radians."""
     cloud: FloatArray
-    """Some of all points, from the scanner, with noise (n, 3)."""
+    """Some of the points, relative to the scanner, with noise (n, 3)."""
 
 
-def scanned(solids: ExtrudedFloor, strips: Strips, stand: ScannerPose, simulation: Simulation) -> ScanCount:
-    """One scan, block by block; the same seed gives the same noise."""
-    random = np.random.default_rng([simulation.seed, stand.number])
-    scene = SolidScene(solids, stand.place, see_through=False, open_door=stand.open_door)
+def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:
+    """Simulate one scan, block by block; the same seed gives the same noise."""
+    random = np.random.default_rng([simulation.seed, pose.number])
+    scene = SolidScene(solids, pose.position, see_through=False, open_door=pose.open_door)
     more = (
-        SolidScene(solids, stand.place, see_through=True, open_door=stand.open_door)
+        SolidScene(solids, pose.position, see_through=True, open_door=pose.open_door)
         if solids.passed.any()
         else None
     )
-    counting = _Counting(solids, strips, stand.place, simulation)
-    turn = RayFan.of(simulation, stand.heading)
+    counts = _CellCounts(solids, strips, pose.position, simulation)
+    fan = RayFan.of(simulation, pose.heading)
     every = max(1, round(CLOUD_DEG / simulation.step_deg))
     cloud = []
-    for block in turn.blocks():
-        ways = turn.ways(block)
-        met = scene.cast(ways)
-        counting.take(met, turn, block, ways)
+    for block in fan.blocks():
+        directions = fan.directions(block)
+        met = scene.cast(directions)
+        counts.take(met, fan, block, directions)
         if more is not None:
-            beyond = more.cast(ways)
-            counting.take(np.where(_passed(solids, beyond), beyond, NONE), turn, block, ways)
-        kept = _kept(solids, stand.place, met, ways, -block.start % every, every)
-        cloud.append(_points(solids, stand.place, met[kept], ways[kept], simulation, random))
-    cell = np.flatnonzero(counting.points)
+            beyond = more.cast(directions)
+            counts.take(np.where(_passed(solids, beyond), beyond, NONE), fan, block, directions)
+        kept = _in_cloud(solids, pose.position, met, directions, -block.start % every, every)
+        cloud.append(_points(solids, pose.position, met[kept], directions[kept], simulation, random))
+    cell = np.flatnonzero(counts.points)
     return ScanCount(
         cell=frozen(cell, np.int64),
-        points=frozen(counting.points[cell], np.int64),
-        columns=frozen(counting.columns[cell], np.int64),
-        away=frozen(np.linalg.norm(strips.middle[cell] - stand.place, axis=1)),
-        incidence=frozen(_incidence(strips, cell, stand.place)),
+        points=frozen(counts.points[cell], np.int64),
+        columns=frozen(counts.columns[cell], np.int64),
+        away=frozen(np.linalg.norm(strips.middle[cell] - pose.position, axis=1)),
+        incidence=frozen(_incidence(strips, cell, pose.position)),
         cloud=frozen(np.concatenate(cloud)),
     )
 
 
-def _passed(solids: ExtrudedFloor, met: Met) -> Met:
+def _passed(solids: ExtrudedFloor, met: Hits) -> Hits:
     return np.append(solids.passed, False)[met]
 
 
-def _kept(
-    solids: ExtrudedFloor, place: FloatArray, met: Met, ways: FloatArray, first: int, every: int
+def _in_cloud(
+    solids: ExtrudedFloor, position: FloatArray, met: Hits, directions: FloatArray, first: int, every: int
 ) -> BoolArray:
-    """Which rays (columns, rows) the cloud keeps: few where these lie dense, all where they do not.
+    """True for rays (columns, rows) kept in the cloud: few where points are dense, else all.
 
-    `first` is the first column of which some are kept in any case.
+    `first` is the first of the columns always kept, one of `every`.
     """
-    few, towards = met[first::every, ::every], ways[first::every, ::every]
+    few, towards = met[first::every, ::every], directions[first::every, ::every]
     hit = few != NONE
-    far = distances(solids, place, few[hit], towards[hit])
+    far = distances(solids, position, few[hit], towards[hit])
     slope = np.abs(np.einsum("ij,ij->i", towards[hit], solids.normal[few[hit]]))
     sparse = np.zeros(few.shape, dtype=bool)
     sparse[hit] = far * math.radians(CLOUD_DEG) > SPARSE_M * slope
@@ -110,64 +110,64 @@ def _kept(
 
 def _points(
     solids: ExtrudedFloor,
-    place: FloatArray,
+    position: FloatArray,
     met: IntArray,
-    ways: FloatArray,
+    directions: FloatArray,
     simulation: Simulation,
     random: np.random.Generator,
 ) -> FloatArray:
-    """Where rays end, as measured, from the scanner (n, 3)."""
+    """Measured ends of rays, relative to the scanner (n, 3)."""
     hit = met != NONE
-    far = distances(solids, place, met[hit], ways[hit])
-    near = _within(far, ways[hit], simulation.joining_m, slant=simulation.slant)
+    far = distances(solids, position, met[hit], directions[hit])
+    near = _within(far, directions[hit], simulation.joining_m, slant=simulation.slant)
     far = far[near] + random.normal(0.0, simulation.noise_m, int(near.sum()))
-    found: FloatArray = far[:, None] * ways[hit][near]
+    found: FloatArray = far[:, None] * directions[hit][near]
     return found
 
 
-def _within(far: FloatArray, ways: FloatArray, reach: float, *, slant: bool) -> BoolArray:
-    """Whether what lies so far along each way (n, 3) is within range."""
-    level = 1.0 if slant else np.hypot(ways[:, 0], ways[:, 1])
+def _within(far: FloatArray, directions: FloatArray, reach: float, *, slant: bool) -> BoolArray:
+    """True for hits at these distances along the directions (n, 3) that are within range."""
+    level = 1.0 if slant else np.hypot(directions[:, 0], directions[:, 1])
     found: BoolArray = far * level <= reach
     return found
 
 
-def _incidence(strips: Strips, cell: IntArray, place: FloatArray) -> FloatArray:
-    way = strips.middle[cell] - place
-    cosine = np.abs(np.einsum("ij,ij->i", way, strips.normal[cell])) / np.linalg.norm(way, axis=1)
+def _incidence(strips: Strips, cell: IntArray, position: FloatArray) -> FloatArray:
+    towards = strips.middle[cell] - position
+    cosine = np.abs(np.einsum("ij,ij->i", towards, strips.normal[cell])) / np.linalg.norm(towards, axis=1)
     found: FloatArray = np.arccos(np.clip(cosine, 0.0, 1.0))
     return found
 
 
-class _Counting:
-    """Points on each cell, as blocks come.
+class _CellCounts:
+    """Points on each cell, counted block by block.
 
-    On an upright face the rays of one column lie on one upright line: what holds for the column is worked
-    out once, and how many rays fall on a cell follows from the elevations of its edges.
+    On an upright face the rays of one column lie on one vertical line. So the column's hit is computed
+    once, and the number of rays on each cell follows from the elevations of the cell's edges.
     """
 
     def __init__(
-        self, solids: ExtrudedFloor, strips: Strips, place: FloatArray, simulation: Simulation
+        self, solids: ExtrudedFloor, strips: Strips, position: FloatArray, simulation: Simulation
     ) -> None:
-        self._solids, self._strips, self._place = solids, strips, place
+        self._solids, self._strips, self._position = solids, strips, position
         self._simulation, self._reach = simulation, simulation.range_m
         self._face = np.append(solids.face, NONE)
         self._under = np.append(solids.under, NONE)
-        way = solids.b - solids.a
-        self._length = np.hypot(*way.T)
-        self._way = way / self._length[:, None]
+        along = solids.b - solids.a
+        self._length = np.hypot(*along.T)
+        self._along = along / self._length[:, None]
         self.points = np.zeros(strips.cells, np.int64)
         self.columns = np.zeros(strips.cells, np.int64)
 
-    def take(self, met: Met, turn: RayFan, block: slice, ways: FloatArray) -> None:
-        self._take_upright(self._face[met], turn, turn.azimuth[block])
+    def take(self, met: Hits, fan: RayFan, block: slice, directions: FloatArray) -> None:
+        self._take_upright(self._face[met], fan, fan.azimuth[block])
         if len(self._strips.patch):
-            self._take_under(met, ways)
+            self._take_under(met, directions)
 
-    def _take_upright(self, face: IntArray, turn: RayFan, azimuth: FloatArray) -> None:
+    def _take_upright(self, face: IntArray, fan: RayFan, azimuth: FloatArray) -> None:
         column, begin, end, face = _runs(face)
         towards = np.column_stack([np.cos(azimuth), np.sin(azimuth)])[column]
-        along, to = self._way[face], self._solids.a[face] - self._place[:2]
+        along, to = self._along[face], self._solids.a[face] - self._position[:2]
         with np.errstate(divide="ignore", invalid="ignore"):
             away = _cross(to, along) / _cross(towards, along)
         at = np.einsum("ij,ij->i", away[:, None] * towards - to, along)
@@ -176,12 +176,12 @@ class _Counting:
         column, begin, end, away, unit = (item[good] for item in (column, begin, end, away, unit))
         if self._simulation.slant:
             steepest = np.arccos(np.clip(away / self._reach, 0.0, 1.0))
-            begin = np.maximum(begin, np.searchsorted(turn.elevation, -steepest))
-            end = np.minimum(end, np.searchsorted(turn.elevation, steepest, side="right"))
-        self._count(unit, away, begin, end, turn.elevation)
+            begin = np.maximum(begin, np.searchsorted(fan.elevation, -steepest))
+            end = np.minimum(end, np.searchsorted(fan.elevation, steepest, side="right"))
+        self._count(unit, away, begin, end, fan.elevation)
 
     def _unit(self, face: IntArray, at: FloatArray, side: IntArray) -> IntArray:
-        """Unit at a length along a face, on one of its sides."""
+        """Unit at a distance along a face, on one of its sides."""
         first = self._strips.first_piece
         pieces = first[face + 1] - first[face]
         at = np.where(np.isfinite(at), at, 0.0)
@@ -191,10 +191,10 @@ class _Counting:
     def _count(
         self, unit: IntArray, away: FloatArray, begin: IntArray, end: IntArray, elevation: FloatArray
     ) -> None:
-        """Rays from row `begin` to before `end` that fall on each cell of a unit's strip."""
+        """Count the rays from row `begin` to before `end` on each cell of a unit's strip."""
         strips = self._strips
         rows = np.diff(strips.first_cell)[unit] - strips.under[unit]
-        edge = strips.low[unit] - self._place[2]
+        edge = strips.low[unit] - self._position[2]
         before = np.searchsorted(elevation, np.arctan2(edge, away))
         for row in range(strips.most):
             edge = edge + CELL_M
@@ -206,17 +206,17 @@ class _Counting:
             np.add.at(self.columns, strips.first_cell[unit[kept]] + row, 1)
             before = after
 
-    def _take_under(self, met: Met, ways: FloatArray) -> None:
+    def _take_under(self, met: Hits, directions: FloatArray) -> None:
         hit = self._under[met] != NONE
-        towards = ways[hit]
-        far = distances(self._solids, self._place, met[hit], towards)
-        unit = self._strips.under_at(self._place[:2] + far[:, None] * towards[:, :2])
+        towards = directions[hit]
+        far = distances(self._solids, self._position, met[hit], towards)
+        unit = self._strips.under_at(self._position[:2] + far[:, None] * towards[:, :2])
         good = (unit != NONE) & _within(far, towards, self._reach, slant=self._simulation.slant)
         np.add.at(self.points, self._strips.first_cell[unit[good] + 1] - 1, 1)
 
 
 def _runs(face: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Rays of one column that meet the same face column, first row, row after the last."""
+    """Runs of rays of one column on the same face: column, first row, row after the last, face."""
     columns, rows = face.shape
     begins = np.ones((columns, rows), dtype=bool)
     begins[:, 1:] = face[:, 1:] != face[:, :-1]
@@ -234,6 +234,6 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
     return found
 
 
-def stand_of(stop: Stop, *, origin: FloatArray, height: float, number: int) -> ScannerPose:
-    """A stop as the stand of a scanner."""
+def pose_of(stop: Stop, *, origin: FloatArray, height: float, number: int) -> ScannerPose:
+    """The scanner's pose at a stop."""
     return ScannerPose(frozen([stop.x - origin[0], stop.y - origin[1], height]), stop.heading, number=number)

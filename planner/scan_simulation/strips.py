@@ -1,4 +1,4 @@
-"""What is to be scanned as strips: every target unit as high as its element, cut into cells."""
+"""Targets as strips: every target unit with the height of its element, cut into cells."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ import shapely
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.stages import Targets
-from stopgo.planner.scan_simulation.extrusion import HANGING, NONE, ExtrudedFloor, heights_of
+from stopgo.planner.scan_simulation.extrusion import BEAM_KIND, NONE, ExtrudedFloor, heights_of
 
 CELL_M = 0.1
 """Height of a cell; it is as wide as its unit."""
 PIECE_M = 0.005
-"""Faces are looked up in pieces of this length."""
+"""Length of the pieces in which faces are looked up."""
 FLUSH_M = 2e-3
-"""A target's face and an element's side so near each other are the same."""
+"""Largest distance between a target's face and the same side of an element."""
 PARALLEL = 0.02
-"""Sine of the angle up to which they are."""
+"""Sine of the largest angle between them."""
 UNDER_M = 0.1
-"""How far from its edge the underside of what hangs counts for the edge's units."""
+"""Width of the underside strip along a beam's edge that counts for the edge's units."""
 PATCH_M = 0.025
-"""Undersides are looked up in squares of this size."""
+"""Side of the squares in which undersides are looked up."""
 
 
 @dataclass(frozen=True, eq=False)
 class Strips:
-    """Cells of the target units; unit k has those from `first_cell[k]` to before `first_cell[k + 1]`."""
+    """Cells of the target units; unit k has cells `first_cell[k]` to before `first_cell[k + 1]`."""
 
     first_cell: IntArray
     """(units + 1,)."""
     low: FloatArray
-    """Height at which each unit's strip begins (units,)."""
+    """Lower height of each unit's strip (units,)."""
     tall: FloatArray
     """Height of each unit's strip (units,)."""
     area: FloatArray
-    """Of each cell, m² (cells,)."""
+    """Area of each cell, m² (cells,)."""
     middle: FloatArray
-    """Of each cell, from the solids' origin (cells, 3)."""
+    """Centre of each cell, from the solids' origin (cells, 3)."""
     normal: FloatArray
-    """Of each cell (cells, 3); it may point either way."""
+    """Normal of each cell (cells, 3); it may point to either side."""
     under: BoolArray
-    """Whether a unit's last cell is of an underside (units,)."""
+    """True for units whose last cell is an underside (units,)."""
     first_piece: IntArray
     """First piece of each upright face (faces + 1,)."""
     piece_unit: IntArray
@@ -58,7 +58,7 @@ class Strips:
 
     @property
     def most(self) -> int:
-        """The most cells that any strip has."""
+        """Largest number of cells in a strip."""
         return int(np.diff(self.first_cell).max(initial=0))
 
     @property
@@ -66,7 +66,7 @@ class Strips:
         return frozen(np.repeat(np.arange(len(self.low)), np.diff(self.first_cell)), np.int64)
 
     def under_at(self, xy: FloatArray) -> IntArray:
-        """Unit of which undersides at these places (n, 2) are, else NONE."""
+        """Unit of the underside at each position (n, 2), else NONE."""
         if not len(self.patch):
             return np.full(len(xy), NONE)
         key = patches_at(xy)
@@ -75,16 +75,16 @@ class Strips:
 
 
 def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling: float) -> Strips:
-    """The strips of all targets, and which part of which side of the solids is of which."""
+    """The strips of all targets, with the lookup from sides of the solids to units."""
     element = targets.element[targets.unit_segment]
     spans = np.array([heights_of(item, ceiling) for item in floor.elements]).reshape(-1, 2)
-    hangs = np.array([item.kind == HANGING for item in floor.elements], dtype=bool)[element]
+    is_beam = np.array([item.kind == BEAM_KIND for item in floor.elements], dtype=bool)[element]
     low, high = spans[element].T
-    rows = np.maximum(1, np.ceil((high - low) / CELL_M - 1e-9)).astype(np.int64) + hangs
+    rows = np.maximum(1, np.ceil((high - low) / CELL_M - 1e-9)).astype(np.int64) + is_beam
     first = np.concatenate([[0], np.cumsum(rows)])
     unit = np.repeat(np.arange(targets.total), rows)
     row = np.arange(first[-1]) - first[unit]
-    below = hangs[unit] & (row == rows[unit] - 1)
+    below = is_beam[unit] & (row == rows[unit] - 1)
     top = np.minimum(low[unit] + (row + 1) * CELL_M, high[unit])
     bottom = low[unit] + row * CELL_M
     z = np.where(below, low[unit], (top + bottom) / 2)
@@ -92,7 +92,7 @@ def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling
     along = along / np.hypot(*along.T)[:, None]
     side = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(along))])[unit]
     first_piece, piece_unit = _pieces(solids, targets)
-    patch, patch_unit = _patches(targets, hangs, solids.origin)
+    patch, patch_unit = _patches(targets, is_beam, solids.origin)
     return Strips(
         first_cell=frozen(first, np.int64),
         low=frozen(low),
@@ -100,7 +100,7 @@ def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling
         area=frozen(targets.unit_length[unit] * np.where(below, UNDER_M, top - bottom)),
         middle=frozen(np.column_stack([(targets.unit_xy - solids.origin)[unit], z])),
         normal=frozen(np.where(below[:, None], (0.0, 0.0, 1.0), side)),
-        under=frozen(hangs, np.bool_),
+        under=frozen(is_beam, np.bool_),
         first_piece=frozen(first_piece, np.int64),
         piece_unit=frozen(piece_unit, np.int64),
         patch=frozen(patch, np.int64),
@@ -110,15 +110,15 @@ def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling
 
 def _pieces(solids: ExtrudedFloor, targets: Targets) -> tuple[IntArray, IntArray]:
     """Pieces of the upright faces, and the units on both sides of each."""
-    way = solids.b - solids.a
-    length = np.hypot(*way.T)
+    along = solids.b - solids.a
+    length = np.hypot(*along.T)
     first = np.concatenate([[0], np.cumsum(np.ceil(length / PIECE_M).astype(np.int64))])
     units = np.full((first[-1], 2), NONE)
     face, segment, away = _flush(solids, targets)
     for f, s in zip(
         *(item[np.argsort(-away, kind="stable")].tolist() for item in (face, segment)), strict=True
     ):
-        u, a, b = way[f] / length[f], targets.a[s] - solids.origin, targets.b[s] - solids.origin
+        u, a, b = along[f] / length[f], targets.a[s] - solids.origin, targets.b[s] - solids.origin
         ends = sorted([float((a - solids.a[f]) @ u), float((b - solids.a[f]) @ u)])
         low, high = np.clip(np.round(np.array(ends) / PIECE_M), 0, first[f + 1] - first[f]).astype(int)
         if low >= high:
@@ -133,7 +133,7 @@ def _pieces(solids: ExtrudedFloor, targets: Targets) -> tuple[IntArray, IntArray
 
 
 def _flush(solids: ExtrudedFloor, targets: Targets) -> tuple[IntArray, IntArray, FloatArray]:
-    """Upright faces and target segments that lie on each other, and how far off they are."""
+    """Pairs of upright faces and target segments that coincide, and their distance."""
     lines = shapely.linestrings(np.stack([solids.a, solids.b], axis=1))
     wanted = shapely.linestrings(np.stack([targets.a, targets.b], axis=1) - solids.origin)
     face, segment = shapely.STRtree(wanted).query(lines, predicate="dwithin", distance=FLUSH_M)
@@ -144,9 +144,9 @@ def _flush(solids: ExtrudedFloor, targets: Targets) -> tuple[IntArray, IntArray,
     return face, segment, shapely.distance(lines[face], wanted[segment])
 
 
-def _patches(targets: Targets, hangs: BoolArray, origin: FloatArray) -> tuple[IntArray, IntArray]:
-    """Squares beside the edges of what hangs, and the unit of each; where two meet, the first."""
-    unit = np.flatnonzero(hangs)
+def _patches(targets: Targets, is_beam: BoolArray, origin: FloatArray) -> tuple[IntArray, IntArray]:
+    """Squares along the edges of beams, and the unit of each; where two overlap, the first."""
+    unit = np.flatnonzero(is_beam)
     if not len(unit):
         return np.empty(0, np.int64), np.empty(0, np.int64)
     along = (targets.b - targets.a)[targets.unit_segment[unit]]
@@ -164,7 +164,7 @@ def _patches(targets: Targets, hangs: BoolArray, origin: FloatArray) -> tuple[In
 
 
 def patches_at(xy: FloatArray) -> IntArray:
-    """A number for the square in which each place (n, 2) lies."""
+    """Number of the square that contains each position (n, 2)."""
     x, y = np.floor(xy / PATCH_M).astype(np.int64).T
     numbers: IntArray = x * 2**24 + y
     return numbers

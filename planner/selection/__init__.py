@@ -1,7 +1,7 @@
-"""Visibility -> selection: as few candidates as see the required shares of what is visible.
+"""Visibility -> selection: the fewest candidates that see the required fractions of what is visible.
 
-A method is a function `(cover, settings) -> (rows, bound)`: rows that meet every demand, and a number
-of rows that no selection goes below.
+A method is a function `(cover, settings) -> (rows, bound)`: rows that meet every demand, and a lower
+bound on the number of rows of any selection.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.overlap import links_of
 from stopgo.planner.selection.bound import counting_bound, lower_bound
-from stopgo.planner.selection.connected_selection import JoinedCover, Search, connected
+from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.exact_cover import exact
@@ -48,12 +48,13 @@ def _exact(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
 
 
 QUICK_SWAPS = 20
-"""Swaps for each stop that a plan made only to tell about how many it takes tries to do without."""
+"""Swaps per removed stop in a plan that only estimates the number of stops."""
 ROUNDS = 6
-"""Times that the default looks at what parts its selection."""
+"""Rounds in which the default method adds cuts to connect its selection."""
 EXACT_ROUNDS = 60
+"""The same for the exact method."""
 SWAPS_BETWEEN = 120
-"""Swaps tried in each of those rounds before a smaller selection is given up."""
+"""Swaps in each of those rounds before the search for a smaller selection ends."""
 METHODS: dict[str, Selector] = {"default": _default, "greedy": _greedy, "exact": _exact, "anywhere": _default}
 NAMES = {
     "default": "greedy, drop-and-repair",
@@ -64,14 +65,14 @@ NAMES = {
 
 
 def select(visibility: Visibility) -> Selection:
-    """Choose stops by the method named in the settings, and say how few there could be at best.
+    """Choose stops by the method of the settings, with a lower bound on their number.
 
-    Stops that must be used, and doorways added for registration, are chosen first and count. Where scans are
-    to register with one another, doorways are offered too.
+    Required stops, and doorways added for registration, are chosen first and count. Where scans must
+    register with one another, doorways are offered too.
     """
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
-    whole, fixed, problem = posed(visibility)
+    whole, fixed, problem = cover_problem(visibility)
     if settings.least_overlap > 0:
         rows, bound = _connected(visibility, whole, fixed, np.arange(whole.rows), method)
         return _selection(visibility, whole, rows, bound, method)
@@ -80,16 +81,16 @@ def select(visibility: Visibility) -> Selection:
     return _selection(visibility, whole, chosen, len(fixed) + bound, method)
 
 
-def quick(visibility: Visibility) -> tuple[int, int]:
-    """About how many stops it takes, by few swaps after greedy, and the number that no choice goes below."""
-    _, fixed, problem = posed(visibility)
+def quick_estimate(visibility: Visibility) -> tuple[int, int]:
+    """Estimated number of stops, from greedy and a few swaps, and a lower bound on it."""
+    _, fixed, problem = cover_problem(visibility)
     start, bound = _greedy(problem, visibility.candidates.space.settings)
     rows = improved(problem, start, at_least=bound, swaps=QUICK_SWAPS)
     return len(fixed) + len(rows), len(fixed) + bound
 
 
-def posed(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
-    """The whole problem, the rows that are chosen in any case, and what is left to choose after them."""
+def cover_problem(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
+    """The whole problem, the required rows, and the problem that remains after them."""
     candidates = visibility.candidates
     settings = candidates.space.settings
     whole = cover_of(visibility, demands_of(visibility))
@@ -104,13 +105,13 @@ def posed(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
 def _connected(
     visibility: Visibility, whole: Cover, fixed: IntArray, offered: IntArray, method: Variant[Selector]
 ) -> tuple[IntArray, int]:
-    """Rows whose scans register with one another, and a bound: one network, or as few as are possible.
+    """Rows whose scans form one network by registration, or as few networks as possible; and a bound.
 
-    `fixed` come first, and are among those `offered`.
+    Rows `fixed` come first and are among the rows `offered`.
     """
     settings = visibility.candidates.space.settings
     cover = whole.with_one_of_each([np.array([row]) for row in fixed])
-    task = JoinedCover(cover, links_of(visibility.candidates), offered)
+    task = ConnectedCover(cover, links_of(visibility.candidates), offered)
     if method.name == "exact":
         rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
     elif method.name == "default":
@@ -125,11 +126,11 @@ def _connected(
 
 
 class Searches:
-    """How our own methods look for fewer rows, from some that solve the problem and under conditions."""
+    """Searches of our own methods for fewer rows, from a known solution and under conditions."""
 
     @staticmethod
     def default(settings: Settings) -> Search:
-        """Drop-and-repair; the conditions are left to what joins its pieces."""
+        """Drop-and-repair; it ignores the conditions, and its caller connects the components."""
         return lambda cover, start, conditions: (
             improved(cover, start, at_least=counting_bound(cover), swaps=SWAPS_BETWEEN),
             0,
@@ -147,23 +148,23 @@ class Searches:
         return search
 
 
-def select_further(visibility: Visibility, done: IntArray) -> Selection:
-    """As few candidates as see what the rows `done` leave of what is asked for; none where that is nothing.
+def select_follow_up(visibility: Visibility, done: IntArray) -> Selection:
+    """The fewest candidates that see what the rows `done` leave to see; none where nothing is left.
 
-    Where scans are to register with one another, they join those that were taken, too.
+    Where scans must register with one another, the new scans also register with the existing ones.
 
     Raises
     ------
     NegativeResult
-        When it cannot be reached.
+        If the required coverage cannot be reached.
     """
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
     if settings.least_overlap > 0:
         whole = cover_of(visibility, demands_of(visibility))
-        both, bound = _connected(visibility, whole, done, offered_further(visibility, done), method)
+        both, bound = _connected(visibility, whole, done, offered_for_follow_up(visibility, done), method)
     else:
-        whole, problem = left_by(visibility, done)
+        whole, problem = remaining_cover(visibility, done)
         rows, more = _solved(method, problem, settings)
         both, bound = np.concatenate([done, in_greedy_order(problem, rows)]), len(done) + more
     made = _selection(visibility, whole, both.astype(np.int64), bound, method)
@@ -175,30 +176,30 @@ def select_further(visibility: Visibility, done: IntArray) -> Selection:
     )
 
 
-def offered_further(visibility: Visibility, done: IntArray) -> IntArray:
-    """Rows that a further mission may join scans by, with those that were taken."""
+def offered_for_follow_up(visibility: Visibility, done: IntArray) -> IntArray:
+    """Rows that may connect scans in a follow-up mission, with those already scanned."""
     candidates = visibility.candidates
     left_out = np.setdiff1d(candidates.extra_rows, np.union1d(done, candidates.doorway_rows))
     return np.setdiff1d(np.arange(visibility.rows), left_out)
 
 
-def left_by(visibility: Visibility, done: IntArray) -> tuple[Cover, Cover]:
-    """The whole problem, and what the rows `done` leave of it to others."""
+def remaining_cover(visibility: Visibility, done: IntArray) -> tuple[Cover, Cover]:
+    """The whole problem, and the problem that remains after the rows `done`."""
     whole = cover_of(visibility, demands_of(visibility))
     not_offered = np.union1d(done, visibility.candidates.extra_rows)
     return whole, whole.after(done).offering(np.setdiff1d(np.arange(whole.rows), not_offered))
 
 
 def _solved(method: Variant[Selector], problem: Cover, settings: Settings) -> tuple[IntArray, int]:
-    """The rows and the bound that a method gives, if they are some and meet every demand."""
-    given, told = method.several(method.called(problem, settings), "rows, bound")
+    """The rows and the bound that a method returns, after a check of both."""
+    given, reported = method.several(method.called(problem, settings), "rows, bound")
     rows = method.indices(given, "rows", length=None, below=problem.rows)
-    bound = int(method.indices([told], "bound", length=1, below=len(rows) + 1)[0])
+    bound = int(method.indices([reported], "bound", length=1, below=len(rows) + 1)[0])
     if len(set(rows.tolist())) < len(rows):
         raise method.wrong("gave a row twice")
     missed = np.flatnonzero(problem.missing(problem.covered_by(rows)))
     if len(missed) and not method.ours:
-        raise method.wrong(f"its {len(rows)} rows leave {len(missed)} of the coverages asked for unmet")
+        raise method.wrong(f"its {len(rows)} rows leave {len(missed)} of the required coverages unmet")
     return rows, bound
 
 
@@ -210,7 +211,7 @@ def _selection(
     if whole.missing(whole.covered_by(chosen))[0] > 0:
         name, reached = visibility.candidates.space.floor.name, steps[-1] if len(steps) else 0.0
         raise NegativeResult(
-            f"{name}: coverage {reached:.3f} is reached, not {settings.coverage:g}; "
+            f"{name}: coverage reaches {reached:.3f}, not {settings.coverage:g}; "
             "lower --coverage or offer more candidates"
         )
     proved = ", proved fewest" if method.ours else ", by its own word fewest"
@@ -225,7 +226,7 @@ def _selection(
 
 
 def coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
-    """Coverage of the whole after each row."""
+    """Fraction of the whole that is covered after each row."""
     counted, steps = np.zeros(cover.columns, dtype=np.int64), []
     for row in rows:
         counted[cover.columns_of(int(row))] += 1
@@ -236,11 +237,11 @@ def coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
 __all__ = [
     "METHODS",
     "Selector",
+    "cover_problem",
     "coverage_steps",
-    "left_by",
-    "offered_further",
-    "posed",
-    "quick",
+    "offered_for_follow_up",
+    "quick_estimate",
+    "remaining_cover",
     "select",
-    "select_further",
+    "select_follow_up",
 ]

@@ -1,4 +1,4 @@
-"""A selection being changed: what it covers, and what every change of it would leave missing."""
+"""Incremental bookkeeping for a local search over selections: coverage, shortfall, value of each move."""
 
 from __future__ import annotations
 
@@ -10,62 +10,62 @@ from stopgo.planner.visibility.unit_ranges import ranges
 
 
 class Board:
-    """A selection being changed: what is covered, what is missing, and what every row would add."""
+    """The state of a selection under change: coverage, shortfall, and the gain of every row."""
 
     def __init__(self, cover: Cover, rows: list[int]) -> None:
         self._cover = cover
         self._covered = cover.covered_by(np.array(rows, dtype=np.int64))
         self._left = cover.asks - self._covered
-        """How many more views each column asks for; below 1 where it counts."""
+        """Views that each column still needs; below 1 where the column counts."""
         self._reached = cover.reached(self._covered)
         self.weight: IntArray = np.ones(len(cover.needed), dtype=np.int64)
-        """How much a unit that is missing of each demand counts."""
+        """Penalty per missing unit of each demand (demands,)."""
         bare = cover.worth * (self._left == 1)[None, :]
         self._adds = np.ascontiguousarray((cover.sees @ bare.T).toarray().T)
-        """What each row would add to each demand at once (demands, rows)."""
+        """Immediate gain of each row for each demand (demands, rows)."""
         self._losses: dict[int, tuple[bytes, IntArray]] = {}
-        """By the row that leaves: which columns hang on it, and their worth to each demand."""
+        """Cache per leaving row: the columns that only it covers, and their worth to each demand."""
         self._regains: dict[int, tuple[bytes, IntArray, IntArray]] = {}
-        """By the row that leaves: of which columns and demands; cells of (demands, rows), and their sums."""
+        """Cache per leaving row: key of columns and demands; cells of (demands, rows), and their sums."""
 
     @property
     def missing(self) -> IntArray:
-        """What each demand still asks for (demands,)."""
+        """Shortfall of each demand (demands,)."""
         return np.maximum(0, self._cover.needed - self._reached)
 
-    def insist(self) -> None:
-        """Make what is missing count for more, so that the search leaves places where it stays missing."""
+    def raise_penalties(self) -> None:
+        """Raise the penalty of each unmet demand, so that the search leaves local minima."""
         self.weight[self.missing > 0] += 1
 
     def take(self, row: int) -> None:
-        """Cover what a row sees."""
+        """Add a row to the selection."""
         columns = self._cover.columns_of(row)
         self._reach(columns[self._left[columns] == 1], sign=1)
         self._offer(columns[self._left[columns] == 2], sign=1)
         self._left[columns] -= 1
 
     def drop(self, row: int) -> None:
-        """Uncover what a row sees."""
+        """Remove a row from the selection."""
         columns = self._cover.columns_of(row)
         self._left[columns] += 1
         self._reach(columns[self._left[columns] == 1], sign=-1)
         self._offer(columns[self._left[columns] == 2], sign=-1)
 
     def after_takes(self) -> IntArray:
-        """What is missing in all (rows,), by who comes and nobody leaves."""
+        """Weighted shortfall after each row is added and none is removed (rows,)."""
         asked = self.missing
         open_demands = np.flatnonzero(asked)
         short = np.maximum(0, asked[open_demands][:, None] - self._adds[open_demands])
         return self.weight[open_demands] @ short
 
     def after_drop(self, out: int) -> int:
-        """What is missing in all if this row leaves and nobody comes."""
+        """Weighted shortfall after this row is removed and none is added."""
         columns = self._cover.columns_of(out)
         left = self._reached - self._lost_with(out, columns[self._left[columns] == 0])
         return int(self.weight @ np.maximum(0, self._cover.needed - left))
 
     def after_swaps(self, out: int) -> tuple[IntArray, IntArray]:
-        """What is missing in all, and how much of the whole is covered (rows,), by who comes for `out`."""
+        """Weighted shortfall and covered weight after `out` is exchanged for each row (rows,)."""
         columns = self._cover.columns_of(out)
         alone, almost = (columns[self._left[columns] == short] for short in (0, 1))
         left = self._reached - self._lost_with(out, alone)
@@ -80,7 +80,7 @@ class Board:
         return self.weight[open_demands] @ short, left[0] + adds[0]
 
     def _lost_with(self, out: int, alone: IntArray) -> IntArray:
-        """What the columns that hang on a row are worth to each demand; anew when they change."""
+        """Worth to each demand of the columns that only this row covers; cached while they are the same."""
         known = alone.tobytes()
         if out not in self._losses or self._losses[out][0] != known:
             self._losses[out] = known, self._worth_of(alone)
@@ -89,9 +89,9 @@ class Board:
     def _regains_after(
         self, out: int, alone: IntArray, almost: IntArray, demands: IntArray
     ) -> tuple[IntArray, IntArray]:
-        """What each row would add again, less what it would add no longer: columns that are then two short.
+        """Change of each row's gain once `out` leaves: columns it could cover again, less those two short.
 
-        Worked out anew where a swap has changed something nearby.
+        Cached until a swap changes the columns or the demands.
         """
         known = b"|".join(part.tobytes() for part in (alone, almost, demands))
         if out not in self._regains or self._regains[out][0] != known:
@@ -103,12 +103,12 @@ class Board:
         return self._regains[out][1:]
 
     def _worth_of(self, columns: IntArray) -> IntArray:
-        """What columns are worth to each demand (demands,)."""
+        """Worth of columns to each demand (demands,)."""
         _, demand, worth = self._entries(columns)
         return np.bincount(demand, worth, len(self._cover.needed)).astype(np.int64)
 
     def _entries(self, columns: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-        """How many demands each column adds to, which, and how much to each."""
+        """Number of demands that each column adds to, their indices, and the worth to each."""
         turned = self._cover.adds_to
         counts = turned.indptr[columns + 1] - turned.indptr[columns]
         entry = ranges(turned.indptr[columns], counts)
@@ -132,11 +132,11 @@ class Board:
         return np.repeat(columns, counts), turned.indices[ranges(turned.indptr[columns], counts)]
 
     def _reach(self, columns: IntArray, *, sign: int) -> None:
-        """Count what these columns are worth (1), which nobody can add any more, or give it back (-1)."""
+        """Count the worth of these columns as reached (1), or as no longer reached (-1)."""
         self._reached += sign * self._worth_of(columns)
         self._offer(columns, sign=-sign)
 
     def _offer(self, columns: IntArray, *, sign: int) -> None:
-        """Let every row that sees these columns add their worth at once (1), or no longer (-1)."""
+        """Add the worth of these columns to the gain of every row that sees them (1), or remove it (-1)."""
         demands = np.flatnonzero(self._worth_of(columns))
         self._adds[demands] += sign * self._regained(columns, demands)

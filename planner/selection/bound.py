@@ -1,4 +1,4 @@
-"""Proven lower bounds on the number of stops, each by weak duality from prices it has checked itself."""
+"""Proven lower bounds on the number of stops, each by weak duality from prices checked here."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
 
 LARGEST = 150_000
-"""Entries of the covering matrix above which the relaxation is not solved: it takes seconds then."""
+"""Entries of the covering matrix above which the relaxation is not solved: it would take seconds."""
 STEPS = 1000
 """Most steps of the multiplier bound; a count, so that no bound depends on speed."""
 WORK = 200_000_000
-"""Entries looked at in all those steps together, so that large floors get fewer of them."""
+"""Entries evaluated in all those steps together, so that large floors get fewer steps."""
 PATIENCE = 20
 """Steps without a better bound after which steps are halved."""
 FIRST_STEP = 1.5
@@ -23,7 +23,7 @@ SMOOTHING = 0.7
 
 
 def counting_bound(cover: Cover) -> int:
-    """Fewest rows whose views could meet the hardest demand if none overlapped more than is asked for."""
+    """Fewest rows whose views could meet the hardest demand, if no views overlapped without need."""
     gains = (cover.sees @ cover.worth.T).tocsc()
     simple = max((_fewest(gains[:, [k]].data, need) for k, need in enumerate(cover.views_needed)), default=0)
     return max(simple, int(cover.asks.min(initial=simple)) if cover.needed.any() else 0)
@@ -34,9 +34,9 @@ def _fewest(gains: IntArray, needed: int) -> int:
 
 
 def lower_bound(cover: Cover, *, found: int) -> int:
-    """No selection has fewer rows than this; `found` rows are known to be enough.
+    """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
-    The relaxation is solved where that is quick, prices are searched for where it is not.
+    Small problems use the linear relaxation, large ones the multiplier bound.
     """
     simple = counting_bound(cover)
     if simple >= found or not cover.needed.any():
@@ -71,7 +71,7 @@ def multiplier_bound(cover: Cover, *, found: int) -> int:
 
 
 class _Priced:
-    """The problem with weights in shares of the largest view, to be asked for its value at prices."""
+    """The problem with weights as fractions of the largest view; gives the dual value at prices."""
 
     def __init__(self, cover: Cover, scale: float) -> None:
         self._cover = cover
@@ -80,7 +80,7 @@ class _Priced:
         self._rest = cover.worth[1:].astype(float) / scale
 
     def value(self, prices: FloatArray) -> tuple[float, FloatArray]:
-        """The bound at prices of columns, then demands; and the direction in which it rises."""
+        """The lower bound at prices of columns, then demands; and its subgradient."""
         cover = self._cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
         spare = 1.0 - cover.sees @ column
@@ -92,7 +92,7 @@ class _Priced:
         return value, np.concatenate([cover.asks * bought - seen, self._needed[1:] - self._rest @ bought])
 
     def _cheapest(self, cost: FloatArray) -> FloatArray:
-        """Shares of columns, at these costs, that meet the whole's demand; what costs nothing is taken."""
+        """Fractions of columns that meet the whole's demand at least cost; negative costs are taken."""
         worth = np.maximum(self._weight, 1e-300)
         order = np.argsort(cost / worth, kind="stable")
         before = np.cumsum(self._weight[order]) - self._weight[order]
@@ -104,7 +104,7 @@ class _Priced:
 def relaxation_bound(cover: Cover) -> int:
     """Rounded-up optimum of: min Σ x_i, v_j y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 
-    Where columns ask for more than one view, x_i <= 1 too. The number does not rest on the solver's
+    Where columns need more than one view, x_i <= 1 too. The result does not depend on the solver's
     tolerances: any prices u_j >= 0 of columns and p >= 0 of demands give the bound Σ needed_k p_k
     - Σ_j max(0, Σ w_kj p_k - v_j u_j) - Σ_i max(0, Σ_j in i u_j - 1) by weak duality, and it is computed
     from the solver's.
@@ -114,7 +114,7 @@ def relaxation_bound(cover: Cover) -> int:
 
 
 def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:
-    """Dual prices of the columns (columns,) and of the demands, or None where the solver gives up."""
+    """Dual prices of the columns (columns,) and of the demands; None if the solver fails."""
     rows, columns = cover.rows, cover.columns
     seen = hstack([-cover.sees.T, diags_array(cover.asks.astype(float))], format="csr")
     worth, needed, scale = scaled(cover)
@@ -133,13 +133,13 @@ def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:
 
 
 def scaled(cover: Cover) -> tuple[csr_array, FloatArray, float]:
-    """Worth and needs as a solver likes them, of about one per column; and by what they were divided."""
+    """Worth and needs scaled to about one per column for the solver; and the divisor."""
     scale = max(1.0, float(cover.weight.mean())) if cover.columns else 1.0
     return (cover.worth / scale).tocsr(), cover.needed / scale, scale
 
 
 def _dual_value(cover: Cover, column_price: FloatArray, demand_price: FloatArray) -> float:
-    """The bound that these prices give; where one view is enough, they are first made small enough."""
+    """The bound at these prices; where one view suffices, the prices are first scaled to be feasible."""
     paid_to = cover.sees @ column_price
     if cover.once:
         heaviest = max(1.0, float(paid_to.max(initial=0.0)))

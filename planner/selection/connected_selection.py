@@ -1,10 +1,10 @@
-"""Selection that hangs together: as few rows as meet every demand and form one network by overlap.
+"""Connected selection: the fewest rows that meet every demand and form one network by overlap.
 
-Between two pieces of a selection that do not hang together lie rows of which every selection that does must
-have one. That is one more demand on the covering problem, so the problem grows until what solves it hangs
-together, and its bound is one for selections that do. (Cuts by node separators: Álvarez-Miranda, Ljubić and
-Mutzel, "The maximum weight connected subgraph problem", 2013.) What still lies apart is joined by further
-rows, and rows that have become idle leave.
+Rows that separate two components of a selection are a node separator: every connected selection has one
+of them. This is one more demand on the covering problem. So the problem grows until its solution is
+connected, and its lower bound holds for connected selections. (Álvarez-Miranda, Ljubić and Mutzel, "The
+maximum weight connected subgraph problem", 2013.) Components that remain are connected by more rows, and
+rows without further use are removed.
 """
 
 from __future__ import annotations
@@ -16,98 +16,99 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
+from stopgo.planner.selection.connecting_rows import connecting_rows
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.greedy import greedy
 from stopgo.planner.selection.separators import (
     Conditions,
+    components_of,
     conditions_between,
-    grounds_of,
     meets,
-    pieces_of,
+    regions_of,
     separators,
 )
-from stopgo.planner.selection.steps_between import steps_between
 
 Search = Callable[[Cover, IntArray, Conditions], tuple[IntArray, int]]
-"""`(problem, start, conditions) -> (rows, bound)`: rows that solve the problem, from ones that do."""
+"""`(problem, start, conditions) -> (rows, bound)`: an improved solution, from the solution `start`."""
 QUICK_ROUNDS = 20
-"""Times that a greedy selection is looked at for what parts it."""
+"""Rounds in which a greedy selection is searched for separators."""
 
 
 @dataclass(eq=False)
-class JoinedCover:
-    """What a selection must see, and how it must hang together; grows by what parts selections."""
+class ConnectedCover:
+    """A covering problem with the demand for connection; it grows by the separators of selections."""
 
     cover: Cover
     links: csr_array
     """1 where two rows register with one another (rows, rows)."""
     offered: IntArray
-    grounds: list[IntArray] = field(init=False)
-    """Rows offered, parted where no link joins them; only as many of these as are needed."""
+    regions: list[IntArray] = field(init=False)
+    """Connected components of the rows offered; only as many of them as are needed."""
     cuts: dict[bytes, IntArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.grounds = grounds_of(self.cover, pieces_of(self.links, self.offered))
+        self.regions = regions_of(self.cover, components_of(self.links, self.offered))
 
     @property
     def problem(self) -> Cover:
-        """The covering problem with a demand for each set of rows that must not be left out."""
-        rows = np.sort(np.concatenate([np.empty(0, np.int64), *self.grounds]))
+        """The covering problem with one demand for each separator found."""
+        rows = np.sort(np.concatenate([np.empty(0, np.int64), *self.regions]))
         return self.cover.offering(rows).with_one_of_each(list(self.cuts.values()))
 
     def take_cuts(self, rows: IntArray) -> bool:
-        """Add what parts these rows to the problem; whether that is anything new."""
+        """Add the separators of these rows to the problem; return True if any is new."""
         before = len(self.cuts)
-        for cut in separators(self.cover, self.links, self.grounds, rows):
+        for cut in separators(self.cover, self.links, self.regions, rows):
             self.cuts.setdefault(cut.tobytes(), cut)
         return len(self.cuts) > before
 
     def parts(self, rows: IntArray) -> int:
-        """Pieces that rows lie in, beyond those that nothing offered can join."""
-        return sum(max(0, len(pieces_of(self.links, np.intersect1d(rows, g))) - 1) for g in self.grounds)
+        """Surplus components of these rows: those that rows on offer could connect."""
+        inside = (np.intersect1d(rows, region) for region in self.regions)
+        return sum(max(0, len(components_of(self.links, own)) - 1) for own in inside)
 
 
-def connected(task: JoinedCover, search: Search, *, rounds: int) -> tuple[IntArray, int]:
-    """Rows that meet every demand and hang together as far as links reach, and a bound on their number."""
+def connected(task: ConnectedCover, search: Search, *, rounds: int) -> tuple[IntArray, int]:
+    """Rows that meet every demand and are connected as far as links allow, and a lower bound."""
     best = _by_greedy(task)
     bound, conditions = 0, Conditions(task.cover.rows)
     for _ in range(rounds):
         rows, at_least = search(task.problem, best, conditions)
         bound = max(bound, at_least)
-        found = hanging_together(task, rows)
+        found = connected_rows(task, rows)
         best = found if len(found) < len(best) else best
         if len(best) <= bound or not task.parts(rows):
             break
         if not task.take_cuts(rows):
-            more = conditions_between(task.cover, task.links, task.grounds, rows)
+            more = conditions_between(task.cover, task.links, task.regions, rows)
             if not conditions.take(more):
                 break
     return best, bound
 
 
-def _by_greedy(task: JoinedCover) -> IntArray:
-    """A first selection that hangs together, and the cuts found on the way."""
+def _by_greedy(task: ConnectedCover) -> IntArray:
+    """A first connected selection by greedy; the problem keeps the separators found."""
     rows = greedy(task.problem)
     for _ in range(QUICK_ROUNDS):
         if not task.take_cuts(rows):
             break
         rows = greedy(task.problem)
-    return hanging_together(task, rows)
+    return connected_rows(task, rows)
 
 
-def hanging_together(task: JoinedCover, rows: IntArray) -> IntArray:
-    """The rows, with others that join their pieces and without those that have become idle."""
-    for ground in task.grounds:
-        while len(pieces := pieces_of(task.links, np.intersect1d(rows, ground))) > 1:
+def connected_rows(task: ConnectedCover, rows: IntArray) -> IntArray:
+    """The rows, with others that connect their components and without superfluous ones."""
+    for region in task.regions:
+        while len(found := components_of(task.links, np.intersect1d(rows, region))) > 1:
             gain = task.cover.sees @ np.where(
                 task.cover.covered_by(rows) < task.cover.asks, task.cover.weight, 0
             )
-            rows = np.union1d(rows, steps_between(task.links, ground, pieces, gain))
+            rows = np.union1d(rows, connecting_rows(task.links, region, found, gain))
     return _without_idle(task, np.unique(rows))
 
 
-def _without_idle(task: JoinedCover, rows: IntArray) -> IntArray:
-    """The rows without those that are neither needed to see enough nor to hang together."""
+def _without_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
+    """The rows without those needed neither for coverage nor for connection."""
     covered = task.cover.covered_by(rows)
     columns = [task.cover.columns_of(int(row)) for row in rows]
     alone = [int(task.cover.weight[seen][covered[seen] <= task.cover.asks[seen]].sum()) for seen in columns]

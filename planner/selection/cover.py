@@ -1,4 +1,4 @@
-"""The covering problem behind a selection: units that look alike to every candidate become one column."""
+"""The covering problem of a selection: units seen by the same candidates become one column."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from stopgo.planner.visibility.unit_ranges import ranges
 class Cover:
     """Rows are candidates, columns groups of units seen by exactly the same candidates.
 
-    Every demand is a share of something that must be seen: demand 0 of the whole, the others of a room
-    or of a kind of element. A column counts once as many chosen rows see it as it asks for.
+    Every demand is a fraction of something that must be seen: demand 0 of the whole, the others of a room
+    or of a kind of element. A column counts once enough chosen rows see it (`asks`).
     """
 
     sees: csr_array
     """(rows, columns), 1 where the candidate sees the group."""
     worth: csr_array
-    """(demands, columns): what seeing a column adds to each demand."""
+    """Weight that each column adds to each demand (demands, columns)."""
     needed: IntArray
-    """What each demand asks for (demands,)."""
+    """Required weight of each demand (demands,)."""
     views: IntArray | int = 1
-    """How many chosen rows must see each column until it counts (columns,), or any column."""
+    """Number of chosen rows that must see each column until it counts (columns,), or one for all."""
 
     @classmethod
     def of_whole(cls, sees: csr_array, weight: IntArray, needed: int) -> Cover:
-        """A problem with the one demand that columns of these weights (columns,) add up to `needed`."""
+        """A problem with one demand: weight `needed` of columns with these weights (columns,)."""
         return cls(sees, csr_array(np.asarray(weight, dtype=np.int64)[None, :]), np.array([needed]))
 
     @property
@@ -47,32 +47,32 @@ class Cover:
 
     @cached_property
     def asks(self) -> IntArray:
-        """How many chosen rows must see each column until it counts (columns,)."""
+        """Number of chosen rows that must see each column until it counts (columns,)."""
         return np.array(np.broadcast_to(self.views, self.columns), dtype=np.int64)
 
     @cached_property
     def once(self) -> bool:
-        """Whether every column counts with the first row that sees it."""
+        """True if every column counts with the first row that sees it."""
         return bool((self.asks == 1).all())
 
     @cached_property
     def weight(self) -> IntArray:
-        """What each column adds to the whole (columns,)."""
+        """Weight that each column adds to the whole (columns,)."""
         return self.worth[[0]].toarray()[0].astype(np.int64)
 
     @property
     def total(self) -> int:
-        """All that any candidate sees, by weight."""
+        """Weight of everything that any candidate sees."""
         return int(self.weight.sum())
 
     @cached_property
     def seen_by(self) -> csr_array:
-        """(columns, rows), the same matrix turned."""
+        """The transpose of `sees` (columns, rows)."""
         return _sorted(self.sees.T)
 
     @cached_property
     def adds_to(self) -> csr_array:
-        """(columns, demands): the worth of each column, turned."""
+        """The transpose of `worth` (columns, demands)."""
         return _sorted(self.worth.T)
 
     def columns_of(self, row: int) -> IntArray:
@@ -80,23 +80,23 @@ class Cover:
         return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]]
 
     def covered_by(self, rows: IntArray) -> IntArray:
-        """How many of `rows` see each column."""
+        """Number of `rows` that see each column (columns,)."""
         return np.asarray(self.sees[rows].sum(axis=0)).ravel().astype(np.int64)
 
     def seen_weight(self, covered: IntArray) -> int:
-        """Weight of the columns that are covered as often as they ask for."""
+        """Weight of the columns that have all views they need."""
         return int(self.weight[covered >= self.asks].sum())
 
     def reached(self, covered: IntArray) -> IntArray:
-        """What each demand has got (demands,); `covered` counts the chosen rows that see each column."""
+        """Weight reached for each demand (demands,); `covered` counts chosen rows per column."""
         return np.asarray(self.worth @ (covered >= self.asks).astype(np.int64)).ravel()
 
     def missing(self, covered: IntArray) -> IntArray:
-        """What each demand still asks for (demands,)."""
+        """Shortfall of each demand (demands,)."""
         return np.maximum(0, self.needed - self.reached(covered))
 
     def after(self, rows: IntArray) -> Cover:
-        """What is left to cover once `rows` are chosen; row numbers stay."""
+        """The problem that remains after `rows` are chosen; row numbers stay."""
         if not len(rows):
             return self
         covered = self.covered_by(rows)
@@ -106,7 +106,7 @@ class Cover:
         return Cover(_sorted(more[:, left]), _sorted(self.worth[:, left]), self.missing(covered), views)
 
     def offering(self, rows: IntArray) -> Cover:
-        """The same, where only `rows` can be chosen: the others see nothing, nor is it needed."""
+        """The problem where only `rows` can be chosen; demands that they cannot meet are lowered."""
         if len(rows) == self.rows:
             return self
         sees = _without(self.sees, np.setdiff1d(np.arange(self.rows), rows))
@@ -125,10 +125,10 @@ class Cover:
         return np.asarray(taken @ asks, dtype=np.int64)
 
     def with_one_of_each(self, sets: Sequence[IntArray]) -> Cover:
-        """The same, where of each of these sets of rows (n,) one must be chosen: one more demand each."""
+        """The problem with one more demand for each set of rows (n,): one of the set must be chosen."""
         if not sets:
             return self
-        worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, for greedy's sake
+        worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, to guide greedy
         sizes = [len(rows) for rows in sets]
         entries = (np.ones(sum(sizes)), (np.concatenate(sets), np.repeat(np.arange(len(sets)), sizes)))
         chosen = coo_array(entries, shape=(self.rows, len(sets)))
@@ -142,22 +142,22 @@ class Cover:
 
 
 def cover_of(visibility: Visibility, demands: Demands) -> Cover:
-    """Merge equal columns, without loss: within a run's ends nothing changes, then equal sets join."""
-    piece_first = _pieces(visibility)
-    sees = _piece_matrix(visibility, piece_first)
-    group = _alike(sees, demands.weight, piece_first)
+    """Merge equal columns without loss: first units between ends of runs, then equal sets of rows."""
+    stretch_first = _first_of_stretches(visibility)
+    sees = _stretch_matrix(visibility, stretch_first)
+    group = _alike(sees, demands.weight, stretch_first)
     seen = group >= 0
     _, first = np.unique(group[seen], return_index=True)
     merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
-    worth = _worth(demands, np.repeat(group, np.diff(np.append(piece_first, len(demands.weight)))))
+    worth = _worth(demands, np.repeat(group, np.diff(np.append(stretch_first, len(demands.weight)))))
     needed = demands.needed(np.asarray(worth.sum(axis=1)).ravel())
-    return Cover(merged, worth, needed, visibility.asked[piece_first[seen][first]])
+    return Cover(merged, worth, needed, visibility.asked[stretch_first[seen][first]])
 
 
-def _alike(sees: csr_array, weight: IntArray, piece_first: IntArray) -> IntArray:
-    """The group of each piece by who sees it; -1 where nobody does, or where it counts for nothing."""
+def _alike(sees: csr_array, weight: IntArray, stretch_first: IntArray) -> IntArray:
+    """Group of each stretch by the rows that see it; -1 where no row does, or where it has no weight."""
     by_column = _sorted(sees.T)
-    counts = np.add.reduceat(weight, piece_first) > 0
+    counts = np.add.reduceat(weight, stretch_first) > 0
     groups: dict[bytes, int] = {}
     group = np.full(by_column.shape[0], -1, dtype=np.int64)
     for column in np.flatnonzero(counts & (np.diff(by_column.indptr) > 0)):
@@ -167,13 +167,13 @@ def _alike(sees: csr_array, weight: IntArray, piece_first: IntArray) -> IntArray
 
 
 def _worth(demands: Demands, column: IntArray) -> csr_array:
-    """(demands, columns): the weight of the units of each column (of each unit, or -1) in each demand."""
+    """Weight in each demand of the units of each column (demands, columns); `column` is -1 for none."""
     counted = np.flatnonzero(column >= 0)
     unit = np.tile(counted, len(demands.member))
     demand = demands.member[:, counted].ravel()
     belongs = demand >= 0
     entries = (demands.weight[unit][belongs], (demand[belongs], column[unit][belongs]))
-    shape = (len(demands.share), int(column.max(initial=-1)) + 1)
+    shape = (len(demands.fraction), int(column.max(initial=-1)) + 1)
     worth = coo_array(entries, shape=shape, dtype=np.int64).tocsr()
     worth.sum_duplicates()
     return _sorted(worth)
@@ -181,9 +181,9 @@ def _worth(demands: Demands, column: IntArray) -> csr_array:
 
 def _without(sees: csr_array, rows: IntArray) -> csr_array:
     """The matrix in which these rows see nothing."""
-    kept = np.ones(sees.shape[0])
-    kept[rows] = 0
-    left = _sorted((diags_array(kept) @ sees).tocsr().astype(np.int64))
+    factor = np.ones(sees.shape[0])
+    factor[rows] = 0
+    left = _sorted((diags_array(factor) @ sees).tocsr().astype(np.int64))
     left.eliminate_zeros()
     return left
 
@@ -194,19 +194,19 @@ def _sorted(matrix: csr_array) -> csr_array:
     return matrix
 
 
-def _pieces(visibility: Visibility) -> IntArray:
-    """First units of the stretches within which no run begins or ends."""
+def _first_of_stretches(visibility: Visibility) -> IntArray:
+    """First unit of each stretch within which no run begins or ends."""
     cuts = np.concatenate([[0], visibility.first, visibility.last + 1])
     return np.unique(cuts[cuts < visibility.targets.total])
 
 
-def _piece_matrix(visibility: Visibility, piece_first: IntArray) -> csr_array:
+def _stretch_matrix(visibility: Visibility, stretch_first: IntArray) -> csr_array:
     row = np.repeat(np.arange(visibility.rows), np.diff(visibility.pointer))
-    begin = np.searchsorted(piece_first, visibility.first)
-    end = np.searchsorted(piece_first, visibility.last, side="right")
+    begin = np.searchsorted(stretch_first, visibility.first)
+    end = np.searchsorted(stretch_first, visibility.last, side="right")
     rows = np.repeat(row, end - begin)
     columns = ranges(begin, end - begin)
-    shape = (visibility.rows, len(piece_first))
+    shape = (visibility.rows, len(stretch_first))
     matrix = csr_array((np.ones(len(rows), dtype=np.int64), (rows, columns)), shape=shape)
     matrix.data[:] = 1
     return matrix

@@ -1,4 +1,4 @@
-"""What a selection must see: a share of the whole, and of every room and every kind of element."""
+"""Coverage demands: required fractions of the whole, of every room and of every kind of element."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from stopgo.mission.stages import Visibility, weights_of
 
 @dataclass(frozen=True, eq=False)
 class Demands:
-    """Shares of what is visible; demand 0 is of the whole."""
+    """Required fractions of what is visible; demand 0 is of the whole."""
 
     weight: IntArray
-    """What each unit counts (units,); 0 where no candidate sees it."""
+    """Weight of each unit (units,); 0 where no candidate sees it."""
     member: IntArray
     """(memberships, units): demands that each unit belongs to, -1 for none."""
-    share: FloatArray
-    """Least share of each demand (demands,)."""
+    fraction: FloatArray
+    """Required fraction of each demand (demands,)."""
 
     def needed(self, visible: IntArray) -> IntArray:
-        """Least weights that are the shares of these weights (demands,)."""
-        return needed_of(visible, self.share)
+        """Least weights that meet the required fractions of these weights (demands,)."""
+        return needed_of(visible, self.fraction)
 
 
 def demands_of(visibility: Visibility) -> Demands:
-    """The shares asked for in the settings.
+    """The required fractions of the settings.
 
-    The paper asks for a share of all units together and for nothing else; by length, every room and
-    every kind has a least share of its own.
+    The paper requires a fraction of all units together and nothing else. By length, every room and
+    every kind has its own required fraction.
     """
     space = visibility.candidates.space
     settings, targets = space.settings, visibility.targets
@@ -44,10 +44,10 @@ def demands_of(visibility: Visibility) -> Demands:
     rooms = len(space.rooms)
     kind = 1 + rooms + kind_of[targets.element[targets.unit_segment]]
     room = np.where(space.unit_room >= 0, 1 + space.unit_room, -1)
-    share = [settings.coverage, *[room_share] * rooms, *[kind_share] * len(kinds)]
-    return Demands(frozen(weight, np.int64), np.stack([whole, room, kind]), frozen(share))
+    fraction = [settings.coverage, *[room_share] * rooms, *[kind_share] * len(kinds)]
+    return Demands(frozen(weight, np.int64), np.stack([whole, room, kind]), frozen(fraction))
 
 
-def needed_of(visible: IntArray, share: FloatArray | float) -> IntArray:
-    """Least whole numbers that are at least `share` of these."""
-    return np.ceil(np.asarray(share) * visible - 1e-9 * np.maximum(1, visible)).astype(np.int64)
+def needed_of(visible: IntArray, fraction: FloatArray | float) -> IntArray:
+    """Least whole numbers that are at least the fraction `fraction` of these."""
+    return np.ceil(np.asarray(fraction) * visible - 1e-9 * np.maximum(1, visible)).astype(np.int64)

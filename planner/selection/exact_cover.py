@@ -15,7 +15,7 @@ from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.separators import Conditions
 
 WHOLE = 1e-6
-"""The solver's bound may exceed the truth by its tolerance; this much is taken off before rounding up."""
+"""The solver's bound may exceed the truth by its tolerance; it is lowered by this before rounding up."""
 
 
 def exact(
@@ -24,9 +24,9 @@ def exact(
     """Fewest rows that meet every demand, and a lower bound on their number.
 
     min Σ x_i, v_j y_j <= Σ x_i that see j, Σ w_kj y_j >= needed_k; x whole, y in [0, 1], and whole too where
-    v_j > 1, since a column counts for nothing until it is seen as often as it asks for. The search begins
-    at the rows `start`, runs on one thread and ends at a node limit, so that it repeats; where it does not
-    close, the bound stays below the number of rows found.
+    v_j > 1, since a column counts for nothing until it has all views it needs. The search begins at the
+    rows `start`, runs on one thread and ends at a node limit, so that it is reproducible. If it ends
+    before the gap closes, the bound stays below the number of rows found.
     """
     import highspy
 
@@ -60,7 +60,7 @@ def _options(settings: Settings) -> dict[str, Any]:
 
 
 def _model(cover: Cover, conditions: Conditions) -> Any:
-    """The programme in HiGHS's form: columns x then y, rows the coverings, the demands, the conditions."""
+    """The programme in HiGHS's form: columns x then y; rows for coverage, demands, then conditions."""
     import highspy
 
     rows, columns = cover.rows, cover.columns

@@ -1,4 +1,4 @@
-"""Greedy selection (paper, 3.4): the candidate that sees most first, then always the largest gain."""
+"""Greedy selection (paper, 3.4): first the candidate that sees most, then always the largest gain."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from stopgo.planner.visibility.unit_ranges import ranges
 
 
 def greedy(cover: Cover) -> IntArray:
-    """Rows in the order they are chosen, until every demand is met or nothing is left to gain."""
+    """Rows in the order of choice, until every demand is met or no row adds anything."""
     return _by_gain(cover, range(cover.rows), until_met=True)
 
 
 def in_greedy_order(cover: Cover, rows: IntArray) -> IntArray:
-    """The same rows, each time the one with the largest gain first."""
+    """The same rows, ordered so that each next row has the largest gain."""
     return _by_gain(cover, rows.tolist(), until_met=False)
 
 
 def _by_gain(cover: Cover, rows: Iterable[int], *, until_met: bool) -> IntArray:
-    """Rows by what they add to demands not yet met, then by what they add at all; then the lower row.
+    """Rows by their gain for unmet demands, then by their total gain, then by the lower row number.
 
-    Both only fall as rows are chosen, so a row whose gain is known to be old is looked at again only
-    when it comes up (Minoux, 1978).
+    Gains only fall while rows are chosen. So an outdated gain is computed again only when its row
+    reaches the head of the queue (Minoux, 1978).
     """
     covered = np.zeros(cover.columns, dtype=np.int64)
     short, missing = cover.views_needed.copy(), cover.needed
@@ -51,8 +51,10 @@ def _by_gain(cover: Cover, rows: Iterable[int], *, until_met: bool) -> IntArray:
 def _gain(
     cover: Cover, row: int, covered: IntArray, short: IntArray, missing: IntArray
 ) -> tuple[int, int, int]:
-    """What a row adds, negative, so that the least is the best: views that are short; where it adds none,
-    views of demands not met, which may be others than were reckoned with; and views of the whole.
+    """Negative gain of a row, so that the least is the best.
+
+    First the views that are short. If there are none: views of unmet demands, which may be of columns
+    not counted as short. Last the views of the whole.
     """
     adds = _adds(cover, row, covered)
     gain = int(np.minimum(adds, short).sum())
@@ -60,7 +62,7 @@ def _gain(
 
 
 def _adds(cover: Cover, row: int, covered: IntArray) -> IntArray:
-    """What a row adds to each demand, by weight of what still asks for views (demands,)."""
+    """Weight that a row adds to each demand, counting columns that still need views (demands,)."""
     columns = cover.columns_of(row)
     new = columns[covered[columns] < cover.asks[columns]]
     pointer = cover.adds_to.indptr

@@ -1,4 +1,4 @@
-"""Drop-and-repair: try to do with one stop fewer, by swapping stops until every demand is met again."""
+"""Drop-and-repair: remove one stop, then swap stops until every demand is met again."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from stopgo.planner.selection.board import Board
 from stopgo.planner.selection.cover import Cover
 
 SWAPS = 400
-"""Most swaps tried before a smaller selection is given up; a count, so that no plan depends on speed."""
+"""Most swaps in the search for a smaller selection; a count, so that no plan depends on speed."""
 TRIALS = 24_000
-"""Stops looked at for all those swaps together, so that large floors get fewer swaps."""
+"""Stops evaluated in all those swaps together, so that large floors get fewer swaps."""
 ENTRIES = 50_000_000
-"""Views of columns looked at for them together, so that open floors and long ranges get fewer of them too."""
+"""Views of columns evaluated in all swaps, so that open floors and long ranges also get fewer swaps."""
 TENURE = 7
-"""Swaps for which a row that left may not come back."""
+"""Swaps for which a removed row may not return."""
 
 
 def improved(cover: Cover, chosen: IntArray, *, at_least: int, swaps: int = SWAPS) -> IntArray:
-    """A selection with as few rows as drop-and-repair finds, never fewer than the bound `at_least`."""
+    """The smallest selection that drop-and-repair finds, never below the lower bound `at_least`."""
     best = chosen
     at_once = len(chosen) * cover.sees.nnz**2 // max(1, cover.rows * cover.columns)
     least = min(TRIALS // max(1, len(chosen)), ENTRIES // max(1, at_once))
@@ -35,14 +35,14 @@ def improved(cover: Cover, chosen: IntArray, *, at_least: int, swaps: int = SWAP
 
 
 def _without_least(cover: Cover, chosen: IntArray) -> list[int]:
-    """The selection without the row that least hangs on."""
+    """The selection without the row whose removal uncovers least."""
     covered = cover.covered_by(chosen)
     alone = [int(cover.weight[c][covered[c] == cover.asks[c]].sum()) for c in map(cover.columns_of, chosen)]
     return np.delete(chosen, int(np.argmin(alone))).tolist()
 
 
 def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
-    """Swap one row for another while that helps, or hurts least (tabu), until every demand is met."""
+    """Swap rows by tabu search until every demand is met; None after the last swap."""
     board = Board(cover, rows)
     tabu: deque[int] = deque(maxlen=TENURE)
     for _ in range(swaps):
@@ -51,9 +51,9 @@ def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
         if len(rows) == cover.rows:
             return None
         if len(set(rows) | set(tabu)) == cover.rows:
-            tabu.clear()  # nobody else is left to come
+            tabu.clear()  # no other row is left to add
         out, into = _best_swap(board, rows, tabu)
-        board.insist()
+        board.raise_penalties()
         board.drop(out)
         board.take(into)
         rows[rows.index(out)] = into
@@ -62,7 +62,7 @@ def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
 
 
 def _best_swap(board: Board, rows: list[int], tabu: deque[int]) -> tuple[int, int]:
-    """The swap after which least is missing, and of those the one after which most is covered."""
+    """The swap with the least shortfall; of equal ones, the one with the most coverage."""
     best, swap = (np.inf, np.inf), (rows[0], rows[0])
     blocked = np.array([*rows, *tabu], dtype=np.int64)
     for out in sorted(rows):

@@ -1,8 +1,8 @@
-"""Selection -> selection: places beside the chosen stops are offered too, and may save a stop.
+"""Selection -> selection: adds candidates near the chosen stops, which may save a stop.
 
-Candidates stand on a coarse pattern; a stop is seldom best right there. Offering every place of a fine
-pattern would be dear, so only those round the chosen stops are added and the choice is made again. What is
-visible is still asked of the pattern's candidates, so that the coverage asked for stays the same.
+Candidates lie on a coarse pattern, and the best stop is seldom on it. A fine pattern everywhere would
+take too long. So only positions around the chosen stops are added, and the selection runs again. The
+visible targets are still those of the pattern's candidates, so that the required coverage is the same.
 """
 
 from __future__ import annotations
@@ -23,46 +23,47 @@ from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
 
 STEPS = (-0.5, -0.25, 0.0, 0.25, 0.5)
-"""Where places are offered beside a stop, along both axes of its room, in spacings of the grid."""
+"""Offsets of new candidates from a stop along both axes of its room, in spacings of the grid."""
 MOST = 25
-"""Stops up to which this is done unless it is asked for: beyond, it takes more than a second."""
+"""Most stops for which refinement is the default: beyond, it takes more than a second."""
 
 
 def refined(selection: Selection) -> Selection:
-    """A selection with fewer stops, some of them beside the pattern; the same where none is saved."""
+    """A selection with fewer stops, some of them off the pattern; the given one where none is saved."""
     settings = selection.visibility.candidates.space.settings
     if settings.coverage_rule == "paper" or settings.fov < 360:
         return selection
     if not (len(selection.chosen) <= MOST if settings.refine is None else settings.refine):
         return selection
-    beside = _beside(selection)
-    if beside is None:
+    nearby = _nearby_candidates(selection)
+    if nearby is None:
         return selection
-    again = select(joined(selection.visibility, visibility(beside)))
+    again = select(merged(selection.visibility, visibility(nearby)))
     return again if len(again.chosen) < len(selection.chosen) else selection
 
 
-def _beside(selection: Selection) -> Candidates | None:
-    """Places round the chosen stops where a stop may be and is not offered yet, if there are any."""
+def _nearby_candidates(selection: Selection) -> Candidates | None:
+    """Allowed positions around the chosen stops that are not candidates yet; None if there are none."""
     candidates = selection.visibility.candidates
     free = np.setdiff1d(selection.chosen, np.union1d(candidates.must_rows, candidates.doorway_rows))
     chosen = candidates.kept[free]
-    places = np.concatenate([np.empty((0, 2)), *(_around(candidates, int(index)) for index in chosen)])
+    around = [_positions_around(candidates, int(index)) for index in chosen]
+    positions = np.concatenate([np.empty((0, 2)), *around])
     room = np.repeat(candidates.room[chosen], len(STEPS) ** 2)
-    found = judged(candidates.space, places, room, part=candidates.chosen_part)
-    known = {_place(point) for point in candidates.xy}
-    new = {_place(found.xy[k]): k for k in found.kept[::-1] if _place(found.xy[k]) not in known}
-    return taken(found, np.array([new[place] for place in sorted(new)])) if new else None
+    found = judged(candidates.space, positions, room, part=candidates.chosen_part)
+    known = {_rounded(point) for point in candidates.xy}
+    new = {_rounded(found.xy[k]): k for k in found.kept[::-1] if _rounded(found.xy[k]) not in known}
+    return extra_candidates(found, np.array([new[xy] for xy in sorted(new)])) if new else None
 
 
-def _place(point: FloatArray) -> tuple[float, float]:
-    """A position to the micrometre, for telling places apart."""
+def _rounded(point: FloatArray) -> tuple[float, float]:
+    """A position rounded to the micrometre, for comparison."""
     x, y = np.round(point, 6).tolist()
     return x, y
 
 
-def _around(candidates: Candidates, index: int) -> FloatArray:
-    """Places (n, 2) round a candidate, along the axes of its room."""
+def _positions_around(candidates: Candidates, index: int) -> FloatArray:
+    """Positions (n, 2) around a candidate, along the axes of its room."""
     space = candidates.space
     axes = main_axes(to_shape(space.rooms[candidates.room[index]].area, local_origin(space.floor)))
     along = np.array(STEPS) * space.settings.grid
@@ -71,17 +72,17 @@ def _around(candidates: Candidates, index: int) -> FloatArray:
 
 
 PER_CANDIDATE = ("xy", "room", "reason", "part", "doorway", "must")
-"""Arrays of `Candidates` that are joined; headings there are none."""
+"""Arrays of `Candidates` with one entry per candidate; these candidates have no headings."""
 
 
-def taken(found: Candidates, index: IntArray) -> Candidates:
+def extra_candidates(found: Candidates, index: IntArray) -> Candidates:
     """Some of the candidates, marked as extra ones."""
-    taken: dict[str, Any] = {name: _frozen(getattr(found, name)[index]) for name in PER_CANDIDATE}
-    return replace(found, **taken, extra=_frozen(np.ones(len(index), dtype=np.bool_)))
+    some: dict[str, Any] = {name: _frozen(getattr(found, name)[index]) for name in PER_CANDIDATE}
+    return replace(found, **some, extra=_frozen(np.ones(len(index), dtype=np.bool_)))
 
 
-def joined(seen: Visibility, more: Visibility) -> Visibility:
-    """The candidates of both with what they see."""
+def merged(seen: Visibility, more: Visibility) -> Visibility:
+    """The visibility of both sets of candidates together."""
     one, other = seen.candidates, more.candidates
     both: dict[str, Any] = {name: _frozen(getattr(one, name), getattr(other, name)) for name in PER_CANDIDATE}
     before = one.extra if len(one.extra) else np.zeros(len(one.xy), dtype=np.bool_)
@@ -97,7 +98,7 @@ def joined(seen: Visibility, more: Visibility) -> Visibility:
 
 
 def with_rows(seen: Visibility, rows: IntArray) -> Visibility:
-    """The visibility where of the reachable candidates only some are left (k,), ascending."""
+    """The visibility of some of the reachable candidates (k,), ascending."""
     candidates = seen.candidates
     left_out = np.delete(candidates.kept, rows)
     index = np.setdiff1d(np.arange(len(candidates.xy)), left_out)

@@ -1,4 +1,4 @@
-"""Pieces of a selection that do not hang together -> what every selection that does must have."""
+"""Components of a selection -> node separators: sets of rows that every connected selection must use."""
 
 from __future__ import annotations
 
@@ -13,56 +13,55 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
 
 
-def pieces_of(links: csr_array, rows: IntArray) -> list[IntArray]:
-    """The rows, parted where no link joins them; the largest piece first, then by the lowest row."""
+def components_of(links: csr_array, rows: IntArray) -> list[IntArray]:
+    """Connected components of the rows, the largest first, then by the lowest row."""
     rows = np.unique(rows).astype(np.int64)
     if not len(rows):
         return []
     count, label = connected_components(links[rows][:, rows], directed=False)
     found = [rows[label == k] for k in range(count)]
-    return sorted(found, key=lambda piece: (-len(piece), int(piece[0])))
+    return sorted(found, key=lambda component: (-len(component), int(component[0])))
 
 
-def grounds_of(cover: Cover, pieces: list[IntArray]) -> list[IntArray]:
-    """Of pieces of all that is offered, as many as meet every demand: the smallest that can go, go first."""
-    kept = list(pieces)
-    for piece in reversed(pieces):
-        rest = [other for other in kept if other is not piece]
+def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
+    """The components needed to meet every demand: the smallest superfluous ones are dropped first."""
+    needed = list(components)
+    for component in reversed(components):
+        rest = [other for other in needed if other is not component]
         if rest and meets(cover, np.concatenate(rest)):
-            kept = rest
-    return kept
+            needed = rest
+    return needed
 
 
 @dataclass(frozen=True, eq=False)
 class NodeSeparator:
-    """Rows of a ground that part it in two: a way from one side to the other leads over them."""
+    """Rows that split a region in two: every path from one side to the other contains one of them."""
 
     between: IntArray
     here: IntArray
     beyond: IntArray
     elsewhere: IntArray
-    """All rows of other grounds."""
+    """All rows of other regions."""
 
     def enough(self, cover: Cover) -> tuple[bool, bool]:
-        """Whether each side by itself, with all other grounds, meets every demand."""
+        """True for each side that meets every demand by itself, with all other regions."""
         here, beyond = (np.concatenate([side, self.elsewhere]) for side in (self.here, self.beyond))
         return meets(cover, here), meets(cover, beyond)
 
 
-def separators(cover: Cover, links: csr_array, grounds: list[IntArray], rows: IntArray) -> Iterator[IntArray]:
-    """Sets of rows (n,), each of which every selection that hangs together on each ground has a row of.
+def separators(cover: Cover, links: csr_array, regions: list[IntArray], rows: IntArray) -> Iterator[IntArray]:
+    """Sets of rows (n,) of which every selection that is connected in each region has at least one.
 
-    What parts a piece of a ground from other pieces of it is such a set where neither side, with all other
-    grounds, meets every demand by itself.
+    A node separator is such a set if neither side meets every demand by itself, with all other regions.
     """
-    for parting, _, _ in _partings(links, grounds, rows):
-        if not any(parting.enough(cover)):
-            yield parting.between
+    for separator, _, _ in _separators(links, regions, rows):
+        if not any(separator.enough(cover)):
+            yield separator.between
 
 
 @dataclass(eq=False)
 class Conditions:
-    """Rows of a linear programme that only hold where some row is chosen: `matrix` x >= `least`."""
+    """Constraints of a linear programme that bind only if some rows are chosen: `matrix` x >= `least`."""
 
     columns: int
 
@@ -70,7 +69,7 @@ class Conditions:
         self._known: dict[tuple[bytes, tuple[int, ...]], None] = {}
 
     def take(self, found: Iterable[tuple[IntArray, tuple[int, ...]]]) -> bool:
-        """Add conditions: of a set of rows one is chosen if all of some others are; whether any is new."""
+        """Add conditions: one of a set of rows is chosen if all of its ends are; True if any is new."""
         before = len(self._known)
         self._known |= {(between.tobytes(), ends): None for between, ends in found}
         return len(self._known) > before
@@ -89,40 +88,40 @@ class Conditions:
 
 
 def conditions_between(
-    cover: Cover, links: csr_array, grounds: list[IntArray], rows: IntArray
+    cover: Cover, links: csr_array, regions: list[IntArray], rows: IntArray
 ) -> Iterator[tuple[IntArray, tuple[int, ...]]]:
-    """Where one side would do by itself: whoever chooses a row of the other side must come across.
+    """Separators where one side suffices: they bind only if rows of both sides are chosen.
 
-    A set of rows of which one is chosen if all the rows named with it are.
+    Each is a set of rows and its ends: one row of the set is chosen if all the ends are.
     """
-    for parting, piece, others in _partings(links, grounds, rows):
-        here, beyond = parting.enough(cover)
-        far = int(np.intersect1d(parting.beyond, others)[0])
-        ends = ((int(piece[0]),) if beyond else ()) + ((far,) if here else ())
-        yield parting.between, ends
+    for separator, component, others in _separators(links, regions, rows):
+        here, beyond = separator.enough(cover)
+        far = int(np.intersect1d(separator.beyond, others)[0])
+        ends = ((int(component[0]),) if beyond else ()) + ((far,) if here else ())
+        yield separator.between, ends
 
 
-def _partings(
-    links: csr_array, grounds: list[IntArray], rows: IntArray
+def _separators(
+    links: csr_array, regions: list[IntArray], rows: IntArray
 ) -> Iterator[tuple[NodeSeparator, IntArray, IntArray]]:
-    """What parts each piece of a ground from regions that hold others: with the piece, and those others."""
-    for k, ground in enumerate(grounds):
-        elsewhere = np.concatenate([np.empty(0, np.int64), *grounds[:k], *grounds[k + 1 :]])
-        inner = pieces_of(links, np.intersect1d(rows, ground))
-        for piece in inner if len(inner) > 1 else []:
-            others = np.setdiff1d(np.concatenate(inner), piece)
-            for region in pieces_of(links, np.setdiff1d(ground, neighbours(links, piece))):
-                if np.intersect1d(region, others).size:
-                    between = neighbours(links, region)
-                    here = np.setdiff1d(ground, np.union1d(region, between))
-                    yield NodeSeparator(between, here, region, elsewhere), piece, others
+    """Node separators between each component of the rows and its others, with both."""
+    for k, region in enumerate(regions):
+        elsewhere = np.concatenate([np.empty(0, np.int64), *regions[:k], *regions[k + 1 :]])
+        inner = components_of(links, np.intersect1d(rows, region))
+        for component in inner if len(inner) > 1 else []:
+            others = np.setdiff1d(np.concatenate(inner), component)
+            for beyond in components_of(links, np.setdiff1d(region, neighbours(links, component))):
+                if np.intersect1d(beyond, others).size:
+                    between = neighbours(links, beyond)
+                    here = np.setdiff1d(region, np.union1d(beyond, between))
+                    yield NodeSeparator(between, here, beyond, elsewhere), component, others
 
 
 def neighbours(links: csr_array, rows: IntArray) -> IntArray:
-    """Rows beside these that a link joins to one of them."""
+    """Other rows that have a link to one of these."""
     return np.setdiff1d(links[rows].indices, rows).astype(np.int64)
 
 
 def meets(cover: Cover, rows: IntArray) -> bool:
-    """Whether these rows see all that is asked for."""
+    """True if these rows meet every demand."""
     return not cover.missing(cover.covered_by(rows)).any()

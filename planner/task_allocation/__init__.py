@@ -1,1 +1,1 @@
-"""Shares the stops of a route out: among robots that drive at once, or tours that come back in time."""
+"""Task allocation: divides a route's stops among robots that drive at once, or among tours within a time."""

@@ -1,4 +1,4 @@
-"""Route -> division: its stops shared out, with a route for each robot or tour, and a proven bound."""
+"""Route -> division: its stops allocated to robots or tours, a route for each, and a proven lower bound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stopgo.mission.geometry import IntArray, frozen, polyline_length
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route, Selection
 from stopgo.mission.stages.division import DividedRoute
-from stopgo.planner.routing import Ends, check_place, tour_bound
+from stopgo.planner.routing import Ends, check_position, tour_bound
 from stopgo.planner.routing.assemble import assemble
 from stopgo.planner.selection import coverage_steps
 from stopgo.planner.selection.cover import cover_of
@@ -25,32 +25,32 @@ from stopgo.planner.task_allocation.tour_times import Tour, TourTimes, tour_time
 from stopgo.planner.task_allocation.vehicles import vehicle_tours
 
 TURNING = (0.2, 0.4, 0.7, 1.0)
-"""Shares of half a turn allowed for each way while tours are looked for, until they keep their time."""
+"""Fractions of half a turn added to each path in the search, tried in order until tours meet their limit."""
 SPARE_S = 1e-3
 """Seconds that a tour stays below its limit, since missions are rounded to micrometres."""
 WIDER = (1.0, 1.02, 1.05, 1.1, 1.2, 1.4, 2.0, 4.0, 16.0)
-"""Times of the bound in which tours of a fleet are looked for."""
+"""Multiples of the bound used as time limit in the search for a fleet's tours."""
 HALVINGS = 4
-"""Of the time between what was found and what was not."""
+"""Bisections between a time limit with tours and one without."""
 METHOD = "PyVRP, then moves and exchanges by the schedule's times"
 
 
 def divided(route: Route) -> DividedRoute:
-    """The stops of a route in tours, as the settings ask for it.
+    """The stops of a route divided into tours, as the settings require.
 
     Raises
     ------
     NegativeResult
-        When a stop is too far for a tour of its own within the time.
+        If a stop is too far for a tour of its own within the time.
     InputError
-        When there are more robots than stops, or a start is where none can be.
+        If there are more robots than stops, or the robot does not fit at a start.
     """
     settings = route.selection.visibility.candidates.space.settings
     return _fleet(route, settings) if settings.robots is not None else _shifts(route, settings)
 
 
-def taken_by(divided: DividedRoute) -> tuple[float, float]:
-    """What a division is judged by: the longest tour, or how many there are; then the time of all (s)."""
+def division_cost(divided: DividedRoute) -> tuple[float, float]:
+    """Cost of a division: the longest tour (s), or the number of tours; then the total time (s)."""
     times = [schedule(assemble(route)).total_s for route in divided.routes]
     return (max(times) if divided.kind == "robot" else float(len(times))), sum(times)
 
@@ -59,31 +59,31 @@ def _fleet(route: Route, settings: Settings) -> DividedRoute:
     selection, robots = route.selection, settings.robots or 1
     if robots > len(selection.chosen):
         raise InputError(
-            f"robots = {robots}: the floor takes {len(selection.chosen)} stops, fewer than there are robots; "
+            f"robots = {robots}: more than the plan's {len(selection.chosen)} stops; "
             f"give at most --robots {len(selection.chosen)}"
         )
-    places = settings.starts
-    for place in places[1:]:
-        check_place(selection.visibility.candidates, "start", place)
+    starts = settings.starts
+    for start in starts[1:]:
+        check_position(selection.visibility.candidates, "start", start)
     closed = settings.tour != "open"
     clock = tour_times(
         selection,
-        np.array([place[:2] for place in places]),
-        tuple(math.radians(place[2]) for place in places),
+        np.array([start[:2] for start in starts]),
+        tuple(math.radians(start[2]) for start in starts),
         closed=closed,
     )
-    numbers = list(range(robots)) if len(places) > 1 else [0] * robots
+    numbers = list(range(robots)) if len(starts) > 1 else [0] * robots
     bound = least_makespan(clock, np.array(numbers))
-    tours = _shared_evenly(clock, numbers, bound, route, seed=settings.seed)
-    if len(places) == 1:
+    tours = _balanced(clock, numbers, bound, route, seed=settings.seed)
+    if len(starts) == 1:
         rank = {stop: k for k, stop in enumerate(route.order.tolist())}
         tours = tuple(sorted(tours, key=lambda tour: min(rank[stop] for stop in tour)))
     routes = [_route(route, clock, tour, k) for tour, k in zip(tours, numbers, strict=True)]
     return DividedRoute("robot", tuple(routes), None, bound, METHOD)
 
 
-def _shared_evenly(clock: TourTimes, numbers: list[int], bound: float, route: Route, *, seed: int) -> Tours:
-    """Tours, one from each of the starts `numbers`, of which the longest is as short as was found."""
+def _balanced(clock: TourTimes, numbers: list[int], bound: float, route: Route, *, seed: int) -> Tours:
+    """Tours, one from each of the starts `numbers`, with the shortest longest tour found."""
     best = shorter_longest(clock, _cut(clock, route, numbers), numbers)
     low, high = bound, _longest(clock, best, numbers)
     for factor in WIDER:
@@ -113,12 +113,12 @@ def _longest(clock: TourTimes, tours: Tours, numbers: list[int]) -> float:
 
 
 def _cut(clock: TourTimes, route: Route, numbers: list[int]) -> Tours:
-    """The route's stops in stretches of even number, each for the start that reaches it soonest."""
-    pieces = [tuple(piece.tolist()) for piece in np.array_split(route.order, len(numbers))]
+    """The route's stops in equal stretches, each for the start that reaches it first."""
+    stretches = [tuple(stretch.tolist()) for stretch in np.array_split(route.order, len(numbers))]
     least, tours = clock.least, []
     for number in numbers:
-        nearest = min(pieces, key=lambda piece: min(least[clock.stops + number, list(piece)]))
-        pieces.remove(nearest)
+        nearest = min(stretches, key=lambda stretch: min(least[clock.stops + number, list(stretch)]))
+        stretches.remove(nearest)
         tours.append(nearest)
     return tuple(tours)
 
@@ -159,13 +159,13 @@ def _check_reach(clock: TourTimes, route: Route, key: str, limit_s: float) -> No
         if needed > limit_s - SPARE_S:
             x, y = route.selection.xy[stop]
             raise NegativeResult(
-                f"{key} = {limit_s:g} s: stop {number} of the route, at ({x:.2f}, {y:.2f}), takes "
-                f"{math.ceil(needed)} s there and back alone; give more time, or a start nearer to it"
+                f"{key} = {limit_s:g} s: stop {number} of the route, at ({x:.2f}, {y:.2f}), needs "
+                f"{math.ceil(needed)} s there and back alone; give more time or a closer start"
             )
 
 
 def _fewest(clock: TourTimes, route: Route, bound: int, limit_s: float, *, seed: int) -> Tours:
-    """As few tours within the time as were found."""
+    """The fewest tours found within the time."""
     greedy = _cut_in_time(clock, route, limit_s)
     for count in range(bound, len(greedy)):
         for turning in TURNING:
@@ -175,7 +175,7 @@ def _fewest(clock: TourTimes, route: Route, bound: int, limit_s: float, *, seed:
                 limit_s=limit_s, closed=True, seed=seed,
             )  # fmt: skip
             if found is None:
-                break  # nor with more time for turning
+                break  # more time for turning finds none either
             tours = shorter_longest(clock, tuple(tour for _, tour in found), [0] * len(found))
             if _longest(clock, tours, [0] * len(tours)) <= limit_s:
                 return tours
@@ -183,7 +183,7 @@ def _fewest(clock: TourTimes, route: Route, bound: int, limit_s: float, *, seed:
 
 
 def _cut_in_time(clock: TourTimes, route: Route, limit_s: float) -> Tours:
-    """The route's stops in stretches, each as long as its time allows."""
+    """The route's stops in stretches, each as long as the time allows."""
     tours: list[Tour] = []
     for stop in route.order.tolist():
         longer = shorter(clock, (*tours[-1], stop), 0) if tours else (stop,)
@@ -195,7 +195,7 @@ def _cut_in_time(clock: TourTimes, route: Route, limit_s: float) -> Tours:
 
 
 def _route(whole: Route, clock: TourTimes, tour: Tour, start: int) -> Route:
-    """The route of one tour, over a selection of its own stops."""
+    """The route of one tour, over the selection of its own stops."""
     selection, order = _selected(whole.selection, tour)
     line = [clock.stops + start, *tour]
     approaches = [clock.line(a, b) for a, b in pairwise(line)]
@@ -218,13 +218,13 @@ def _route(whole: Route, clock: TourTimes, tour: Tour, start: int) -> Route:
 
 
 def _selected(whole: Selection, tour: Tour) -> tuple[Selection, IntArray]:
-    """The selection of a tour's stops in the order they were chosen, and where in it each stop is."""
-    places = sorted(tour)
-    chosen = whole.chosen[places]
+    """The selection of a tour's stops in the order of choice, and the index in it of each stop."""
+    stops = sorted(tour)
+    chosen = whole.chosen[stops]
     visibility = whole.visibility
     steps = coverage_steps(cover_of(visibility, demands_of(visibility)), chosen)
     part = replace(
         whole, chosen=frozen(chosen, np.int64), coverage_steps=frozen(steps), required=0.0, bound=0,
         method=f"{whole.method}, shared out",
     )  # fmt: skip
-    return part, frozen([places.index(stop) for stop in tour], np.int64)
+    return part, frozen([stops.index(stop) for stop in tour], np.int64)

@@ -1,4 +1,4 @@
-"""Makes tours shorter by moving a stop, exchanging two, or turning a stretch, by the schedule's own times."""
+"""Local search over tours: moves a stop, exchanges two, or reverses a stretch, by the schedule's times."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from itertools import pairwise
 from stopgo.planner.task_allocation.tour_times import Tour, TourTimes
 
 ROUNDS = 200
-"""Improvements made at most; a count, so that plans do not depend on speed."""
+"""Most improvements; a count, so that plans do not depend on speed."""
 GAIN = 1e-6
-"""Seconds below which nothing is gained."""
+"""Seconds below which a change is no improvement."""
 
 Tours = tuple[Tour, ...]
 
 
 def shorter_longest(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Tours:
-    """Tours, none without a stop, of which the longest is no longer, and then all together no longer."""
+    """Tours, none without a stop, with a shorter longest tour, then with a shorter total; else the same."""
     tours = tuple(shorter(clock, tour, start) for tour, start in zip(tours, starts, strict=True))
     worth = _worth(clock, tours, starts)
     for _ in range(ROUNDS):
@@ -33,7 +33,7 @@ def shorter_longest(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> To
 
 
 def filled(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Tours:
-    """The same stops, with one in every tour, taken from where that leaves the longest tour shortest."""
+    """The same stops, with at least one in every tour; each move leaves the longest tour shortest."""
     while any(not tour for tour in tours):
         empty = next(k for k, tour in enumerate(tours) if not tour)
         moved = [
@@ -45,7 +45,7 @@ def filled(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Tours:
 
 
 def shorter(clock: TourTimes, tour: Tour, start: int) -> Tour:
-    """The same stops in an order that no turned or moved stretch of up to three stops makes shorter."""
+    """The same stops in an order that no reversal, and no move of up to three stops, makes shorter."""
     best = clock.seconds(tour, start)
     for _ in range(ROUNDS):
         order, seconds = min(
@@ -59,13 +59,13 @@ def shorter(clock: TourTimes, tour: Tour, start: int) -> Tour:
 
 
 def _worth(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> tuple[float, float]:
-    """The longest tour's seconds, and those of all."""
+    """Seconds of the longest tour, and of all tours."""
     times = [clock.seconds(tour, start) for tour, start in zip(tours, starts, strict=True)]
     return max(times), sum(times)
 
 
 def _exchanged(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Iterator[Tours]:
-    """Tours with a stop of the longest in another, or exchanged for one of another."""
+    """Tours with a stop of the longest tour moved to another, or exchanged for one of another."""
     times = [clock.seconds(tour, start) for tour, start in zip(tours, starts, strict=True)]
     longest = times.index(max(times))
     for stop in tours[longest]:
@@ -82,12 +82,12 @@ def _exchanged(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Iterato
 
 
 def _inserted(clock: TourTimes, tour: Tour, stop: int, start: int) -> Tour:
-    """The tour with a stop more, where its ways grow least."""
+    """The tour with one more stop, where the driving time grows least."""
     least, depot = clock.least, clock.stops + start
     line = (depot, *tour, depot)
     added = [(least[a, stop] + least[stop, b] - least[a, b], k) for k, (a, b) in enumerate(pairwise(line))]
-    place = min(added)[1]
-    return (*tour[:place], stop, *tour[place:])
+    at = min(added)[1]
+    return (*tour[:at], stop, *tour[at:])
 
 
 def _reordered(tour: Tour) -> Iterator[Tour]:

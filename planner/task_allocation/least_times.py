@@ -1,7 +1,7 @@
-"""What no way of sharing stops out goes below: the longest tour's seconds, the number of tours.
+"""Lower bounds on every division of the stops: on the longest tour's seconds, and on the number of tours.
 
-Every bound counts ways by `TourTimes.least`, a metric below every way's time, and turns at stops not at
-all.
+Every bound counts paths by `TourTimes.least`, a metric below every path's time, and does not count turns
+at stops.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.routing.proof import proved
+from stopgo.planner.routing.proof import tour_proof
 from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from stopgo.planner.task_allocation.tour_times import TourTimes
 
 NOISE = 1e-6
-"""Seconds by which float noise may lift a bound."""
+"""Seconds by which floating-point noise may raise a bound."""
 
 
 def least_makespan(clock: TourTimes, starts: IntArray) -> float:
-    """Seconds that the longest of the tours, one from each of `starts` (numbers, may repeat), takes at least.
+    """Lower bound in seconds on the longest of the tours, one from each of `starts` (numbers, may repeat).
 
-    The most of three: the time of all tours together shared out evenly; that of the tour with the most
-    stops, which are at least the even number; and that of the farthest stop alone.
+    It is the largest of three: the mean time of all tours; the time of the tour with the most stops, which
+    are at least the mean number; and the time of the farthest stop alone.
     """
     times = clock.least
     tours, stops = len(starts), clock.stops
@@ -35,9 +35,10 @@ def least_makespan(clock: TourTimes, starts: IntArray) -> float:
 
 
 def least_tours(clock: TourTimes, limit_s: float) -> int:
-    """How many closed tours within the limit all stops take at least.
+    """Lower bound on the number of closed tours within the limit.
 
-    By the time of all tours together, and by how many stops the shortest ways leave time for in one.
+    It follows from the time of all tours together, and from the most stops that fit in one tour by the
+    shortest paths.
     """
     times, stops = clock.least, clock.stops
     together = stops * clock.pause_s + driven_together(times, stops, closed=True) - NOISE
@@ -52,9 +53,9 @@ def alone(clock: TourTimes, times: FloatArray) -> FloatArray:
 
 
 def seconds_of(clock: TourTimes, times: FloatArray, stops: int) -> float:
-    """Seconds below which no tour of so many stops is.
+    """Lower bound in seconds on a tour of so many stops.
 
-    Its first stop is reached from a start, each other one from a stop, by its shortest way at least.
+    Its first stop is reached from a start, each other one from a stop, by at least its shortest path.
     """
     among = times[: clock.stops, : clock.stops].copy()
     np.fill_diagonal(among, np.inf)
@@ -64,17 +65,17 @@ def seconds_of(clock: TourTimes, times: FloatArray, stops: int) -> float:
 
 
 def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:
-    """Seconds below which no tours from the starts over all stops are, taken together.
+    """Lower bound in seconds on the total driving time of tours from the starts over all stops.
 
-    With all starts as one point, closed tours make one closed walk, which no shortest tour over the points
-    is longer than. Open ones join every stop with a start, as no tree does in less.
+    With all starts as one point, closed tours make one closed walk, at least as long as a shortest tour
+    over the points. Open tours connect every stop with a start, at least as long as a spanning tree.
     """
     there = times[:stops, stops:].min(axis=1)
     among = np.minimum(times[:stops, :stops], there[:, None] + there[None, :])
     np.fill_diagonal(among, 0.0)
     whole = np.block([[among, there[:, None]], [there[None, :], np.zeros((1, 1))]])
     if not closed:
-        # an edge of no length would be none to the sparse solver
+        # the sparse solver would ignore an edge of length 0
         return max(0.0, float(minimum_spanning_tree(whole + 1e-9).sum()) - 1e-9 * (stops + 1))
     order = shortest_tour(whole, seed=1)
-    return proved(nanometres(whole), order).bound / NANOMETRES
+    return tour_proof(nanometres(whole), order).bound / NANOMETRES

@@ -1,4 +1,4 @@
-"""How long a tour over some of the stops takes, counted as `stopgo.mission.document.schedule` counts it.
+"""Duration of tours over some of the stops, counted as in `stopgo.mission.document.schedule`.
 
 Points are the stops, in the order of the selection, and after them the starts.
 """
@@ -24,14 +24,14 @@ Tour = tuple[int, ...]
 """Stops in the order of driving."""
 
 NEAR = 30
-"""Points to which a way's corners are counted from each point, before a tour is driven over it."""
+"""Nearest points of each point to which corners of paths are counted in advance."""
 
 
 @dataclass(frozen=True)
 class LegFacts:
-    """A way between two points: seconds from rest to rest, and the headings at its ends.
+    """A path between two points: seconds from rest to rest, and the headings at its ends.
 
-    There are no headings where nothing is driven.
+    A path without length has no headings.
     """
 
     seconds: float
@@ -49,12 +49,12 @@ class TourTimes:
     pause_s: float
     """Settling and scanning at a stop."""
     heading: FloatArray
-    """Heading of the scan at each stop; empty where it is that of the arrival."""
+    """Heading of the scan at each stop; empty if scans keep the heading of arrival."""
     start_heading: tuple[float, ...]
     """In radians."""
     closed: bool
     _facts: dict[tuple[int, int], LegFacts] = field(default_factory=dict)
-    """What was worked out, by points."""
+    """Cache by points."""
 
     @property
     def starts(self) -> range:
@@ -85,17 +85,17 @@ class TourTimes:
         return turn_time(wanted - heading, turn_rate=self.robot.turn_rate)
 
     def facts(self, a: int, b: int) -> LegFacts:
-        """The way from point a to point b."""
+        """The path from point a to point b."""
         if (a, b) not in self._facts:
-            self._facts[a, b] = self._told(self.line(a, b))
+            self._facts[a, b] = self._facts_of(self.line(a, b))
         return self._facts[a, b]
 
     def line(self, a: int, b: int) -> FloatArray:
         """The polyline (n, 2) from point a to point b: the same in both directions."""
-        line = self.legs.way(min(a, b), max(a, b))
+        line = self.legs.path(min(a, b), max(a, b))
         return line if a <= b else frozen(line[::-1])
 
-    def _told(self, line: FloatArray) -> LegFacts:
+    def _facts_of(self, line: FloatArray) -> LegFacts:
         steps = np.diff(line, axis=0)
         steps = steps[np.any(steps != 0, axis=1)]
         if not len(steps):
@@ -106,9 +106,9 @@ class TourTimes:
 
     @cached_property
     def least(self) -> FloatArray:
-        """Seconds (n, n) that no way is driven in less, and for which no detour is shorter.
+        """Lower bounds in seconds (n, n) on every path, for which no detour is shorter.
 
-        Where no corners were counted, a way takes at least as long as a straight one of its length.
+        Where corners were not counted, a path takes at least as long as a straight one of its length.
         """
         times = np.array(self._driven_s)
         for k in range(len(times)):
@@ -117,9 +117,9 @@ class TourTimes:
 
     @cached_property
     def _driven_s(self) -> FloatArray:
-        """Seconds (n, n) of ways from rest to rest, without turns at their ends.
+        """Seconds (n, n) of paths from rest to rest, without turns at their ends.
 
-        Corners are counted on ways to the nearest points and to the starts only.
+        Corners are counted only on paths to the nearest points and to the starts.
         """
         speed, acceleration = self.robot.speed, self.robot.acceleration
         times = straight_times(self.legs.lengths, speed=speed, acceleration=acceleration)
@@ -130,7 +130,7 @@ class TourTimes:
         return frozen(times)
 
     def estimate(self, turning: float) -> FloatArray:
-        """Seconds (n, n) of every way, and of a share of half a turn before it."""
+        """Seconds (n, n) of every path, and of a fraction of half a turn before it."""
         turn = turning * math.pi / self.robot.turn_rate
         return frozen(np.where(self.legs.lengths > 0, self._driven_s + turn, 0.0))
 

@@ -1,4 +1,4 @@
-"""Candidates -> visibility: which units each candidate sees.
+"""Candidates -> visibility: the units that each candidate sees.
 
 A method is a function `(candidates) -> Visibility`.
 """
@@ -23,36 +23,36 @@ METHODS: dict[str, VisibilityMethod] = {"exact": exact, "bresenham": bresenham}
 
 
 def visibility(candidates: Candidates) -> Visibility:
-    """What the kept candidates see, by the method named in the settings.
+    """The units that the kept candidates see, by the method of the settings.
 
-    What is not seen within the settings' limits counts as not seen, whatever the method. With a field of view
-    below 360° the candidates of the result are positions with headings.
+    Units outside the settings' limits on views count as not seen, with any method. With a field of
+    view below 360° the candidates of the result are positions with headings.
     """
     settings = candidates.space.settings
     method = variant("visibility", settings.visibility, METHODS)
-    found = _sound(method, method.called(candidates), candidates)
+    found = _checked(method, method.called(candidates), candidates)
     if not len(found.first):
         raise NegativeResult(
-            f"{candidates.space.floor.name}: no target is within {settings.range:g} m of a candidate "
-            "and in its sight; raise --range or lower --grid"
+            f"{candidates.space.floor.name}: no target is visible within {settings.range:g} m of a "
+            "candidate; raise --range or lower --grid"
         )
-    return seen_well(found)
+    return within_all_limits(found)
 
 
-def seen_well(in_sight: Visibility) -> Visibility:
-    """What of the things in sight is seen within the settings' limits, and along which headings.
+def within_all_limits(visible: Visibility) -> Visibility:
+    """The part of a visibility within the settings' limits on views, and along the scanner's headings.
 
     Raises
     ------
     NegativeResult
-        When the limits leave nothing.
+        If the limits leave nothing.
     """
-    seen = within_limits(in_sight)
-    return with_headings(seen) if in_sight.candidates.space.settings.fov < 360 else seen
+    seen = within_limits(visible)
+    return with_headings(seen) if visible.candidates.space.settings.fov < 360 else seen
 
 
-def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candidates) -> Visibility:
-    """What a method gives, if it is runs of units on segments, in order, for each kept candidate."""
+def _checked(method: Variant[VisibilityMethod], given: object, candidates: Candidates) -> Visibility:
+    """A method's result, checked: ordered runs of units on segments for each kept candidate."""
     found: Visibility = method.of_kind(given, Visibility)
     if found.candidates is not candidates:
         raise method.wrong("is of other candidates than those it was given")
@@ -74,4 +74,4 @@ def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candida
     return Visibility(candidates, pointer, segment, first, last, found.method)
 
 
-__all__ = ["METHODS", "VisibilityMethod", "seen_well", "visibility"]
+__all__ = ["METHODS", "VisibilityMethod", "visibility", "within_all_limits"]

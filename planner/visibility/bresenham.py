@@ -1,7 +1,7 @@
 """The paper's visibility: Bresenham's line over a binary occupancy map (paper, 3.3). For comparison.
 
-A raster errs where sight lines graze walls, and errs more where the drawing stands at an angle to it;
-so the paper turns the drawing to its main axes first. The default method, `exact`, needs neither.
+A raster is wrong where lines of sight graze walls, and more so where the drawing is at an angle to it. So
+the paper first rotates the drawing to its main axes. The default method, `exact`, needs neither.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from stopgo.planner.visibility.raster import Raster, raster_of
 from stopgo.planner.visibility.unit_ranges import visibility_of
 
 COMPILE_ABOVE = 10_000_000
-"""Cells to be walked, were all units as far away as the range, above which compiling pays."""
+"""Cells to walk, if all units were at the end of the range, above which the compiled kernel is faster."""
 
 
 def bresenham(candidates: Candidates, *, aligned: bool = True) -> Visibility:
     """Units within range whose line from the candidate's cell to the unit's cell is free.
 
     The walk goes from the candidate to the unit. Any occupied cell on it blocks, the candidate's own
-    included; the unit's own cell does not block where the unit lies on an occluder. So a wall seen at a
-    flat angle hides behind its own other cells: that is the paper's raster, not an oversight.
+    included. The unit's own cell does not block if the unit lies on an occluder. So a wall at a flat
+    angle hides behind its own other cells, as in the paper's raster.
 
     Parameters
     ----------
     aligned
-        Whether the raster lies along the main axes of the floor's outline, as in the paper, or along
+        True: the raster lies along the main axes of the floor's outline, as in the paper. False: along
         the axes of the drawing.
     """
     raster = raster_of(candidates, aligned=aligned)

@@ -1,4 +1,4 @@
-"""Exact visibility: triangular expansion over open space, independent of how the drawing is turned."""
+"""Exact visibility: triangular expansion over open space, independent of the drawing's rotation."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from stopgo.planner.space.targets import LINE_WALL
 from stopgo.planner.visibility.sight.mesh import Mesh, mesh_of
 from stopgo.planner.visibility.sight.sight import scene_of, sight
 
-BESIDE = 2 * LINE_WALL
-"""Distance in metres from a closed door's line at which a scanner in its doorway looks."""
+DOOR_OFFSET = 2 * LINE_WALL
+"""Distance in metres between a closed door's line and the viewpoints of a scanner in its doorway."""
 MARGIN = 1.0
 """Open space around everything, in metres."""
 
 
 def exact(candidates: Candidates) -> Visibility:
-    """Units in range whose midpoint is in sight; the rule for corners is that of `sight.kernel`."""
+    """Units in range whose midpoint is visible; the rule for corners is that of `sight.kernel`."""
     space, targets = candidates.space, candidates.space.targets
     origin = local_origin(space.floor)
     places, row = viewpoints_of(candidates)
@@ -39,9 +39,9 @@ def exact(candidates: Candidates) -> Visibility:
 
 
 def viewpoints_of(candidates: Candidates) -> tuple[FloatArray, IntArray]:
-    """Where each kept candidate looks from (n, 2), and its row (n,), ascending.
+    """Viewpoints of the kept candidates (n, 2), and the row of each (n,), ascending.
 
-    A scanner in a doorway keeps that door open: where doors are closed for the laser, it looks from
+    A scanner in a doorway keeps that door open. So where doors are closed for the laser, it looks from
     both sides of the door's line.
     """
     xy = candidates.xy[candidates.kept]
@@ -57,19 +57,19 @@ def viewpoints_of(candidates: Candidates) -> tuple[FloatArray, IntArray]:
 
 
 def sides_of_door(space: NavigableSpace, point: FloatArray) -> FloatArray:
-    """The two places (2, 2) that a scanner in a doorway looks from, both sides of the door's line."""
+    """The two viewpoints (2, 2) of a scanner in a doorway, on both sides of the door's line."""
     lines = [shapely.LineString(item.opening.line) for item in space.openings]
     nearest = lines[int(np.argmin(shapely.distance(lines, shapely.Point(point))))]
     a, b = shapely.get_coordinates(nearest)[[0, -1]]
     across = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
-    return np.array([point + BESIDE * across, point - BESIDE * across])
+    return np.array([point + DOOR_OFFSET * across, point - DOOR_OFFSET * across])
 
 
 def open_space(candidates: Candidates) -> Mesh:
-    """A mesh of everything that light crosses: a frame around the floor, minus the occluders.
+    """A mesh of the open space: a frame around the floor, minus the occluders.
 
-    Taken from whole grid steps, where their outlines meet at vertices only, so that the mesh's edges are
-    the very faces of the occluders.
+    The occluders are in whole grid steps, where their outlines meet only at vertices. So the mesh's edges
+    are exactly the faces of the occluders.
     """
     space = candidates.space
     origin = local_origin(space.floor)

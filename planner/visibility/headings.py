@@ -1,8 +1,8 @@
 """A field of view below 360°: each position becomes one candidate per heading of the scanner.
 
 The paper has the field of view as a parameter and plans with v = 360°, where no heading is needed. Below
-that the heading is a choice like the position, so the selection makes it: a place that must be looked
-at all round is chosen more than once, each time turned elsewhere.
+that the selection chooses the heading with the position. If a stop must look all round, its position is
+chosen more than once, each time with another heading.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from stopgo.planner.visibility.unit_ranges import visibility_of
 FEWEST = 8
 """Headings of each position, at least; more where the field of view is below 90°."""
 SLACK = 1e-6
-"""Radians by which a field of view is wider: what lies on its limits belongs to it, rounded as they are."""
+"""Radians added to a field of view, so that its rounded limits belong to it."""
 
 
 def with_headings(seen: Visibility) -> Visibility:
-    """What the candidates see when each looks along one of several headings, as rows of their own.
+    """The visibility with one row for each candidate and heading.
 
-    Where a stop must be, and in doorways, only the heading that sees most is kept, so that one stop is
-    made there. Whether a unit's midpoint is within heading ± fov / 2 is decided in floating point.
+    Required stops and doorways keep only the heading that sees most, so that one stop is made there. The
+    test of a unit's midpoint against heading ± fov / 2 is in floating point.
     """
     candidates = seen.candidates
     fov = math.radians(candidates.space.settings.fov)
@@ -60,16 +60,16 @@ def _views(
 ) -> Iterator[tuple[float, IntArray]]:
     """Headings of one position and the units seen along each; with `once` the best one only."""
     candidates, units = seen.candidates, seen.seen_by(row)
-    way = seen.targets.unit_xy[units] - candidates.xy[candidates.kept[row]]
-    inside = in_view(way, headings[:, None], fov=fov)
+    offset = seen.targets.unit_xy[units] - candidates.xy[candidates.kept[row]]
+    inside = in_view(offset, headings[:, None], fov=fov)
     wanted = [int(inside.sum(axis=1).argmax())] if once else range(len(headings))
     for k in wanted:
         yield float(headings[k]), units[inside[k]]
 
 
-def in_view(way: FloatArray, heading: FloatArray | float, *, fov: float) -> BoolArray:
-    """Whether what lies at `way` (n, 2) from a scanner is within heading ± fov / 2 (radians)."""
-    bearing = np.arctan2(way[:, 1], way[:, 0])
+def in_view(offset: FloatArray, heading: FloatArray | float, *, fov: float) -> BoolArray:
+    """True for points at `offset` (n, 2) from a scanner that are within heading ± fov / 2 (radians)."""
+    bearing = np.arctan2(offset[:, 1], offset[:, 0])
     aside = np.abs((bearing - heading + math.pi) % math.tau - math.pi)
     inside: BoolArray = aside <= fov / 2 + SLACK
     return inside

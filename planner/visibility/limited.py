@@ -1,4 +1,4 @@
-"""Visibility -> visibility: of what is in sight, what is seen well enough."""
+"""Visibility -> visibility: the part of it within the limits on views."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from stopgo.planner.visibility.sight.well_seen import SeenSegments, clipped
 
 
 def within_limits(in_sight: Visibility) -> Visibility:
-    """The same with what is seen within the limits of the settings only; itself where there are none.
+    """The visibility within the limits of the settings; itself if there are none.
 
     Raises
     ------
     NegativeResult
-        When they leave nothing, naming the limits.
+        If the limits leave nothing; the message names them.
     """
     settings = in_sight.candidates.space.settings
     limits = limits_of(settings)
@@ -34,7 +34,7 @@ def within_limits(in_sight: Visibility) -> Visibility:
     if not len(seen.first):
         name = in_sight.candidates.space.floor.name
         raise NegativeResult(
-            f"{name}: nothing in sight is seen well enough: {_why_nothing(in_sight, settings)}"
+            f"{name}: no visible target is within the limits: {_empty_reason(in_sight, settings)}"
         )
     return seen
 
@@ -62,31 +62,31 @@ LIMITS = ("max_incidence", "near", "density", "wall_height", "views")
 """The parameters that set limits."""
 
 
-def without(settings: Settings, key: str) -> Settings:
+def without_limit(settings: Settings, key: str) -> Settings:
     """The settings with one limit switched off."""
     off: dict[str, Any] = dict.fromkeys((key, "blind_cone") if key == "near" else (key,))
     return replace(settings, **off)
 
 
-def _why_nothing(in_sight: Visibility, settings: Settings) -> str:
-    """Which limits leave nothing alone, else all of them together, and what to do."""
-    told = {
+def _empty_reason(in_sight: Visibility, settings: Settings) -> str:
+    """The limits that leave nothing by themselves, else all of them, and the remedies."""
+    set_limits = {
         key: words
         for key, words in limits_in_words(limits_spec_of(settings)).items()
         if key not in ("views", "wall_height")
     }
-    alone = {key: words for key, words in told.items() if not _shows(in_sight, settings, key)}
+    alone = {key: words for key, words in set_limits.items() if not _leaves_some(in_sight, settings, key)}
     better = {"max_incidence": "raise --max-incidence", "near": "lower --near or --blind-cone"}
     step, away = settings.angular_step or 0.0, max(settings.d_sec, settings.radius)
     square_on = f"{1000 * math.radians(step) * away:.2g} mm at {away:g} m"
     better["density"] = f"raise --density or scan finer than --angular-step {step:g} ({square_on})"
-    ways_out = ", ".join(better[key] for key in alone or told)
-    return f"{', '.join((alone or told).values())}; {ways_out}, or lower --grid"
+    remedies = ", ".join(better[key] for key in alone or set_limits)
+    return f"{', '.join((alone or set_limits).values())}; {remedies}, or lower --grid"
 
 
-def _shows(in_sight: Visibility, settings: Settings, key: str) -> bool:
-    """Whether anything is left with this limit alone."""
+def _leaves_some(in_sight: Visibility, settings: Settings, key: str) -> bool:
+    """True if this limit alone leaves anything."""
     for other in LIMITS:
         if other != key:
-            settings = without(settings, other)
+            settings = without_limit(settings, other)
     return bool(len(_clipped(in_sight, limits_of(settings)).first))

@@ -13,8 +13,8 @@ from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, segments_of, to_shape
 
 MARGIN = 2.25
-"""Free cells around everything; the quarter keeps faces and units, which often lie on multiples of half
-a cell, off the borders between cells, where float noise would decide."""
+"""Free cells around everything. The quarter keeps faces and units, which often lie on multiples of half
+a cell, off the borders between cells, where floating-point noise would decide."""
 LARGEST = 400_000_000
 """Cells above which no map is made."""
 
@@ -56,7 +56,7 @@ def raster_of(candidates: Candidates, *, aligned: bool) -> Raster:
 def _check_size(name: str, cells: int, cell: float) -> None:
     if cells > LARGEST:
         raise InputError(
-            f"{name}: visibility = bresenham needs {cells} cells of {cell:g} m, more than {LARGEST}; "
+            f"{name}: visibility = bresenham needs {cells} cells of {cell:g} m, at most {LARGEST}; "
             "raise --d-dis or use --visibility exact"
         )
 
@@ -87,7 +87,7 @@ def inside_of(edges: FloatArray, *, width: int, height: int) -> BoolArray:
 
 
 def _counted(numbers: IntArray) -> tuple[IntArray, IntArray]:
-    """For each k, `numbers[k]` times k, beside 0, 1, 2 …"""
+    """For each k, `numbers[k]` times k; and the count 0, 1, 2 … within each."""
     which = np.repeat(np.arange(len(numbers)), numbers)
     return which, np.arange(len(which)) - np.repeat(np.cumsum(numbers) - numbers, numbers)
 
@@ -110,7 +110,7 @@ def crossed_by(edges: FloatArray) -> IntArray:
 
 
 def _border_cuts(along: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Where edges (n, 2), given by one coordinate, cross whole numbers: edge, and share of its length."""
+    """Crossings of edges (n, 2), given by one coordinate, with whole numbers: edge and fraction of it."""
     low, high = np.floor(along.min(axis=1)), np.floor(along.max(axis=1))
     edge, step = _counted((high - low).astype(np.int64))
     start, end = along[edge].T

@@ -82,9 +82,9 @@ def prove_command(
     all connected.
     """
     from stopgo.mission.files.atomic import must_be_writable
-    from stopgo.planner.scan_simulation.proof_files import proof_files
+    from stopgo.planner.scan_simulation.verification_files import verification_files
 
-    files = proof_files(mission.parent if out is None else result_folder(out), mission)
+    files = verification_files(mission.parent if out is None else result_folder(out), mission)
     for path in files.values():
         must_be_writable(path)
     assumed: dict[str, Any] = {"noise_m": noise / 1000, "slant": slant}
@@ -101,10 +101,10 @@ def _simulated(
 ) -> tuple[PlanProof, FloorPlan]:
     """Simulate the mission's scans; returns the proof and the floor, and prints progress and warnings."""
     from stopgo.mission.console.table import printable
-    from stopgo.planner.scan_simulation.proof_files import prove_file
+    from stopgo.planner.scan_simulation.verification_files import verify_file
 
     warnings: list[str] = []
-    proof, planned = prove_file(mission, floor, coverage, assumed, say=_show_progress, warn=warnings.append)
+    proof, planned = verify_file(mission, floor, coverage, assumed, say=_show_progress, warn=warnings.append)
     _show_progress("")
     for warning in warnings:
         typer.echo(f"stopgo: {printable(warning)}", err=True)

@@ -17,7 +17,7 @@ from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
-from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.space.targets import face_segments
 from tests.faults.sizes import FULL
 from tests.planner.oracle import visible_pairs
@@ -222,7 +222,7 @@ def check_rooms_are_joined(space: NavigableSpace) -> int:
     points = [point for found in places.values() for point in found]
     keys = [(k, n) for k, found in places.items() for n in range(len(found))]
     index = {key: position for position, key in enumerate(keys)}
-    lengths = ways_between(space, np.array(points).reshape(-1, 2)).lengths
+    lengths = paths_between(space, np.array(points).reshape(-1, 2)).lengths
     joined = 0
     for item in space.openings:
         one, other = item.rooms

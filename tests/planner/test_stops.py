@@ -16,7 +16,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import DROP_REASONS, KEPT, Candidates
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.candidates import STRATEGIES, candidates
-from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 from tests.planner.worlds import (
@@ -167,7 +167,7 @@ def check_candidates(found: Candidates) -> None:
     again = place.reasons(found.xy, found.room)
     assert np.all(again[found.kept] == KEPT)
     assert np.all((found.reason != KEPT) | (found.part == found.chosen_part))
-    lengths = ways_between(found.space, found.xy[found.kept]).lengths
+    lengths = paths_between(found.space, found.xy[found.kept]).lengths
     assert np.isfinite(lengths).all()
     assert len(np.unique(np.round(found.xy[found.kept], 6), axis=0)) == len(found.kept)
 

@@ -1,10 +1,10 @@
-"""Selection -> selection over every place where a stop may be, not only over the candidates offered.
+"""Selection -> selection over every allowed position of a stop, not only over the candidates.
 
-The relaxed covering problem has a row for every place. It is solved over the places known; its prices are
-held against cells that hold all places. Where a cell may see units that cost more than a stop, the cell is
-cut, and its quarters' middles are tried: those that really see so much are new places. What then is still too
-dear in a cell is made cheaper there, so that the prices prove a bound over every place, whatever was left
-uncut. All limits are counts, so that the same floor gives the same plan.
+The relaxed covering problem has a row for every position. It is solved over the known positions, and its
+prices are compared with cells that contain all positions. A cell that may see units worth more than one
+stop is cut in four. The centres of the quarters are tried: those that see so much are new positions. Prices
+that are still too high for a cell are lowered, so that they prove a bound over every position. This holds
+whatever cells remain uncut. All limits are counts, so that the same floor gives the same plan.
 """
 
 from __future__ import annotations
@@ -20,33 +20,33 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.candidates import judged
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.selection import posed, select
-from stopgo.planner.selection.continuous_selection.cells import CellVisibility, PlaceCells
+from stopgo.planner.selection import cover_problem, select
+from stopgo.planner.selection.continuous_selection.cells import CellVisibility, PositionCells
 from stopgo.planner.selection.continuous_selection.prices import Prices, WantedUnits, prices_of
 from stopgo.planner.selection.demands import demands_of
-from stopgo.planner.selection.refine import joined, taken, with_rows
+from stopgo.planner.selection.refine import extra_candidates, merged, with_rows
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
 
 ROUNDS = 8
-"""Times that prices are asked for."""
+"""Rounds of prices and cuts."""
 MOST_CUT = 1200
-"""Cells cut in each round, the dearest first."""
+"""Cells cut in each round, those with the highest worth first."""
 TOLERATED = 1e-3
-"""What the units in sight of a cell may cost beyond a stop without the cell being cut."""
+"""Worth of a cell's visible units above one stop, up to which the cell is not cut."""
 MOST_OFFERED = 600
-"""New places that are offered in the end, those that see what costs most."""
+"""Most new positions offered at the end, those of the highest worth."""
 SELECTOR = "anywhere"
 
 
 def anywhere(selection: Selection) -> Selection:
-    """The selection with places offered wherever they help, and the bound over every place.
+    """The selection with new positions offered wherever they help, and a bound over every position.
 
     Raises
     ------
     InputError
-        Where something is asked for that the bound does not hold for.
+        If the settings use a parameter for which the bound does not hold.
     """
     seen = selection.visibility
     _check(seen.candidates.space.settings)
@@ -61,7 +61,7 @@ def anywhere(selection: Selection) -> Selection:
 
 
 def _check(settings: Settings) -> None:
-    """Refuse what changes what a stop sees or needs in ways that cells do not know."""
+    """Refuse parameters that the visibility of cells does not model."""
     wrong = {
         f"overlap = {settings.least_overlap:g}": settings.least_overlap > 0,
         f"views = {settings.views}": settings.least_views > 1,
@@ -69,13 +69,13 @@ def _check(settings: Settings) -> None:
         f"visibility = {settings.visibility}": settings.visibility != "exact",
         "refine = true": bool(settings.refine),
     }
-    for told, asked in wrong.items():
-        if asked:
-            raise InputError(f"selector = {SELECTOR}: is not done with {told}; leave one of them out")
+    for given, is_set in wrong.items():
+        if is_set:
+            raise InputError(f"selector = {SELECTOR}: not possible with {given}; remove one of them")
 
 
 def _best_of(selection: Selection, wide: Visibility) -> Selection:
-    """The selection, or one with fewer stops out of more places; of these only the chosen stay offered."""
+    """The selection, or one with fewer stops from more positions; of these only the chosen ones stay."""
     again = select(wide)
     if len(again.chosen) >= len(selection.chosen):
         return selection
@@ -87,19 +87,19 @@ def _best_of(selection: Selection, wide: Visibility) -> Selection:
 
 
 class _CellSearch:
-    """Places and cells, refined in turn until the bound is as high as the relaxation allows."""
+    """Positions and cells, refined in turn until the bound is as high as the relaxation allows."""
 
     def __init__(self, seen: Visibility) -> None:
         self._seen, self._known = seen, seen
         self._asked, self.fixed = _asked(seen)
-        self._overlook = CellVisibility(seen.candidates)
+        self._cell_visibility = CellVisibility(seen.candidates)
         self._place = StopFeasibility(seen.candidates.space)
-        self._cells = self._overlook.whole()
+        self._cells = self._cell_visibility.all_cells()
         self._prices: Prices | None = None
         self.bound = 0
 
     def run(self) -> None:
-        """Ask for prices, hold them against cells, cut cells and take new places, so many times."""
+        """Repeat: compute prices, compare them with cells, cut cells, and add new positions."""
         for _ in range(ROUNDS if self._asked.needed.any() else 0):
             row, _, first, last = self._known.runs_apart
             prices = prices_of(self._asked, row, first, last, self._known.rows)
@@ -114,7 +114,7 @@ class _CellSearch:
             self._refine(prices, dear[np.argsort(-worth[dear], kind="stable")][:MOST_CUT])
 
     def offered(self) -> Visibility:
-        """What was seen at first, and from new places that are worth most at the last prices."""
+        """The first visibility, with the new positions of the highest worth at the last prices."""
         if self._prices is None:
             return self._seen
         worth = _worth_of(self._known, self._prices.unit)
@@ -123,7 +123,7 @@ class _CellSearch:
         return with_rows(self._known, np.concatenate([np.arange(first), np.sort(more)]))
 
     def _proved(self, prices: Prices, worth: FloatArray) -> int:
-        """The bound over every place: units are made as cheap as the dearest cell asks that may see them."""
+        """The bound over every position, with each unit's price lowered by its most expensive cell."""
         dearest = _most_on_each(self._cells, worth, len(prices.unit))
         known = _worth_of(self._known, prices.unit).max(initial=1.0)
         unit = prices.unit / (np.maximum(1.0, dearest) * max(1.0, known))
@@ -132,15 +132,15 @@ class _CellSearch:
         return int(np.ceil(max(least, alike, 0.0) - 1e-6))
 
     def _refine(self, prices: Prices, dear: IntArray) -> None:
-        """Cut these cells, and take what is seen from the new cells' middles where it costs too much."""
-        quarters = self._overlook.cut(self._cells.among(dear))
+        """Cut these cells, and try the centres of the new cells whose worth exceeds one stop."""
+        quarters = self._cell_visibility.cut(self._cells.among(dear))
         rest = np.setdiff1d(np.arange(len(self._cells)), dear)
         self._cells = self._cells.among(rest).joined(quarters)
         worth = quarters.worth(prices.unit)
         self._take(quarters.middle[worth > 1 + TOLERATED], prices)
 
     def _take(self, local: FloatArray, prices: Prices) -> None:
-        """Know these places (n, 2) too, where a stop may be there and sees more than a stop costs."""
+        """Add those of these positions (n, 2) that are allowed and whose worth exceeds one stop."""
         space = self._seen.candidates.space
         xy = local + local_origin(space.floor)
         tree = shapely.STRtree(self._place.rooms)
@@ -149,32 +149,32 @@ class _CellSearch:
         if not len(found.kept):
             return
         try:
-            seen = visibility(taken(found, found.kept))
-        except NegativeResult:  # nothing is in sight from any of them
+            seen = visibility(extra_candidates(found, found.kept))
+        except NegativeResult:  # none of them sees anything
             return
         good = np.flatnonzero(_worth_of(seen, prices.unit) > 1 + TOLERATED)
         if len(good):
-            self._known = joined(self._known, with_rows(seen, good))
+            self._known = merged(self._known, with_rows(seen, good))
 
 
 def _asked(seen: Visibility) -> tuple[WantedUnits, IntArray]:
-    """What stops must see besides what those see that are chosen in any case; and the rows of these."""
+    """Demands that remain after the required stops, and the rows of the required stops."""
     demands = demands_of(seen)
-    _, fixed, problem = posed(seen)
+    _, fixed, problem = cover_problem(seen)
     weight = demands.weight.copy()
     weight[seen.seen_from(fixed)] = 0
     return WantedUnits(weight, demands.member, problem.needed.astype(float)), fixed
 
 
 def _worth_of(seen: Visibility, price: FloatArray) -> FloatArray:
-    """What the units that each row sees cost together (rows,)."""
+    """Total price of the units that each row sees (rows,)."""
     before = np.concatenate([[0.0], np.cumsum(price)])
     row, _, first, last = seen.runs_apart
     return np.bincount(row, before[last + 1] - before[first], seen.rows).astype(float)
 
 
-def _most_on_each(cells: PlaceCells, worth: FloatArray, units: int) -> FloatArray:
-    """Of each unit the most that the units in sight of one cell cost which may see it (units,)."""
+def _most_on_each(cells: PositionCells, worth: FloatArray, units: int) -> FloatArray:
+    """For each unit the highest worth of a cell that may see it, at least 1 (units,)."""
     most = np.ones(units)
     dear = np.flatnonzero(worth > 1)
     for cell in dear[np.argsort(worth[dear], kind="stable")]:

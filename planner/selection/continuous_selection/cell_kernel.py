@@ -1,11 +1,11 @@
-"""Everything that is in sight of any place in a cell: triangular expansion from a rectangle.
+"""Triangular expansion from a rectangle: all units that any position in a cell may see.
 
-As `stopgo.planner.visibility.sight.kernel`, which has the numbers' bounds, but from all places of a cell at
-once. A line of sight from a place c that passes a corner R on its right meets points p with
-turn(c, R, p) >= 0, so p is in sight of the cell only if the largest of these turns over
-the cell, which is at a corner, is not below 0.
-Each limit is held against the cell by itself: what is found may be in sight of no place, but nothing that is
-in sight is left out. As a cell becomes small, what is too much vanishes.
+It works like `stopgo.planner.visibility.sight.kernel`, which has the bounds of the numbers, but from all
+positions of a cell at once. A line of sight from a position c that passes a corner R on its right meets
+points p with turn(c, R, p) >= 0. So the cell may see p only if the largest of these turns over the cell is
+not negative. That maximum is at a corner of the cell.
+Each limit is tested by itself: a unit found may be visible from no position, but no visible unit is left
+out. As a cell becomes small, the surplus vanishes.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from stopgo.planner.visibility.sight import kernel
 
 turn, clip_side, clip_reach = kernel.turn, kernel.clip_side, kernel.clip_reach
 
-TOO_MUCH = -2
-"""Told of a cell whose lines of sight do not come to an end: it stands in a wall."""
+NO_END = -2
+"""Result for a cell whose expansion does not end, because it lies in a wall."""
 MOST_STEPS = 64
-"""Triangles entered, for each triangle there is, after which a cell is given up."""
+"""Triangles entered, per triangle of the mesh, after which a cell is given up."""
 
 
 def most_turn(x0: int, y0: int, x1: int, y1: int, rx: int, ry: int, px: int, py: int) -> int:
-    """The largest turn c, r, p over the places c of a rectangle: at one of its corners."""
+    """The largest turn c, r, p over the positions c of a rectangle, which is at one of its corners."""
     cx = x0 if py > ry else x1
     cy = y1 if px > rx else y0
     return (rx - cx) * (py - cy) - (ry - cy) * (px - cx)
@@ -32,7 +32,7 @@ def most_turn(x0: int, y0: int, x1: int, y1: int, rx: int, ry: int, px: int, py:
 def part_too_far(
     x: int, y: int, ax: int, ay: int, bx: int, by: int, ra: int, rb: int, la: int, lb: int, reach: int
 ) -> bool:
-    """Whether the part of edge a-b where two linear functions are not negative is beyond reach of x, y."""
+    """True if the part of edge a-b where two linear functions are not negative is beyond reach of x, y."""
     from_t, to_t = 0.0, 1.0
     if ra < 0 < rb:
         from_t = float(ra) / (float(ra) - float(rb))
@@ -50,7 +50,7 @@ def part_too_far(
     return dx * dx + dy * dy > limit * limit
 
 
-def overlook(
+def look_from_cell(
     row: int,
     begin: int,
     cells: Any,
@@ -77,11 +77,11 @@ def overlook(
     out_low: Any,
     out_high: Any,
 ) -> int:
-    """Write the runs of units that cell `row` may see from `begin` on; returns the end of what is written.
+    """Write the runs of units that cell `row` may see from index `begin` on; return the end of the output.
 
-    Returns -1 when the room left in the output may not be enough, and TOO_MUCH where it comes to no end.
-    `cells` are the rectangles' x0, y0, x1, y1 one after the other, `wide` the distance from the middle to a
-    corner, rounded up; the rest is as in `stopgo.planner.visibility.sight.kernel.look`.
+    Returns -1 if the output may have too little room, and NO_END if the expansion does not end.
+    `cells` are the rectangles' x0, y0, x1, y1 one after the other, `wide` the distance from the centre to a
+    corner, rounded up. The other arguments are those of `stopgo.planner.visibility.sight.kernel.look`.
     """
     x0, y0, x1, y1 = cells[4 * row], cells[4 * row + 1], cells[4 * row + 2], cells[4 * row + 3]
     x, y = (x0 + x1) // 2, (y0 + y1) // 2
@@ -96,7 +96,7 @@ def overlook(
     while top > 0:
         most -= 1
         if most < 0 or top + 16 > room:
-            return TOO_MUCH
+            return NO_END
         top -= 4
         triangle, entry = stack[top], stack[top + 1]
         right, left = stack[top + 2], stack[top + 3]
@@ -170,16 +170,16 @@ def overlook(
     return count
 
 
-def overlook_all(first_row: int, pointer: Any, cells: Any, wide: Any, *scene_and_output: Any) -> int:
-    """Look from every cell from `first_row` on; returns the first row that found no room, or came to no end.
+def look_from_all_cells(first_row: int, pointer: Any, cells: Any, wide: Any, *scene_and_output: Any) -> int:
+    """Process every cell from `first_row` on; return the first row without room or without an end.
 
-    `pointer[row + 1]` becomes the end of what is written for each row. Of a row that comes to no end, the
-    number is returned as -1 - row.
+    `pointer[row + 1]` becomes the end of the output of each row. A row without an end is returned as
+    -1 - row.
     """
     row = first_row
     while row < len(wide):
-        end = overlook(row, pointer[row], cells, wide, *scene_and_output)
-        if end == TOO_MUCH:
+        end = look_from_cell(row, pointer[row], cells, wide, *scene_and_output)
+        if end == NO_END:
             return -1 - row
         if end < 0:
             return row

@@ -1,8 +1,8 @@
-"""Prices of units that prove how many stops are needed: from places known, held against all of them.
+"""Dual prices of units that prove a lower bound on the number of stops, over all positions.
 
-Whatever is asked for, prices of demands p_k >= 0 and of units u_j >= 0 give, where no stop sees units that
-cost more than M together, the bound (Σ needed_k p_k - Σ_j max(0, Σ_k w_kj p_k - u_j)) / M: weak duality of
-the covering problem with a row for every place there is.
+Take any prices of demands p_k >= 0 and of units u_j >= 0 such that no stop sees units that cost more than M
+together. They give the bound (Σ needed_k p_k - Σ_j max(0, Σ_k w_kj p_k - u_j)) / M, by weak duality of the
+covering problem with a row for every position.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from stopgo.planner.visibility.unit_ranges import ranges
 
 @dataclass(frozen=True, eq=False)
 class WantedUnits:
-    """What stops must see: every demand a least weight of the units that belong to it."""
+    """Coverage demands: each one a least weight of the units that belong to it."""
 
     weight: IntArray
-    """Of each unit (units,); 0 where it does not count."""
+    """Weight of each unit (units,); 0 where it does not count."""
     member: IntArray
     """(memberships, units): demands that each unit belongs to, -1 for none."""
     needed: FloatArray
     """(demands,)."""
 
     def paid(self, demand: FloatArray) -> FloatArray:
-        """What is paid for each unit, at prices of demands (units,)."""
+        """Amount paid for each unit, at prices of demands (units,)."""
         rate = np.where(self.member >= 0, demand[self.member], 0.0).sum(axis=0)
         paid: FloatArray = rate * self.weight
         return paid
@@ -37,13 +37,13 @@ class WantedUnits:
 
 @dataclass(frozen=True, eq=False)
 class Prices:
-    """Prices and the bound that they prove where no stop sees units of more than 1."""
+    """Prices, and the bound that they prove if no stop sees units worth more than 1."""
 
     unit: FloatArray
     demand: FloatArray
     value: float
     stops: FloatArray
-    """How much of each place the relaxation takes (rows,)."""
+    """Amount of each position in the relaxed solution (rows,)."""
 
     @classmethod
     def of(cls, asked: WantedUnits, unit: FloatArray, demand: FloatArray, stops: FloatArray) -> Prices:
@@ -52,7 +52,7 @@ class Prices:
 
 
 def prices_of(asked: WantedUnits, row: IntArray, first: IntArray, last: IntArray, rows: int) -> Prices | None:
-    """The prices that prove most for these rows' runs of units; None where the solver gives up."""
+    """The prices with the highest bound for these rows' runs of units; None if the solver fails."""
     group, sees = _groups(asked, row, first, last, rows)
     inside = np.flatnonzero(group >= 0)
     groups, scale = sees.shape[1], max(1.0, float(asked.weight.sum()) / max(1, sees.shape[1]))
@@ -86,7 +86,7 @@ def prices_of(asked: WantedUnits, row: IntArray, first: IntArray, last: IntArray
 def _groups(
     asked: WantedUnits, row: IntArray, first: IntArray, last: IntArray, rows: int
 ) -> tuple[IntArray, csr_array]:
-    """The group of each unit by who sees it and what asks for it (-1: does not count); who sees each."""
+    """Group of each unit by its rows and demands (-1: does not count); and the rows that see each group."""
     total = len(asked.weight)
     changes = (np.diff(asked.member, axis=1) != 0).any(axis=0) | (np.diff(asked.weight > 0) != 0)
     begin = np.unique(np.concatenate([[0], first, last + 1, np.flatnonzero(changes) + 1]))

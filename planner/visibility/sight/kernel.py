@@ -1,21 +1,45 @@
-"""Triangular expansion: from a point through the mesh, edge by edge, to everything it sees.
+"""Triangular expansion: from a viewpoint through the mesh, edge by edge, to everything it sees.
 
-Plain functions over lists or arrays, so that the same source runs interpreted and compiled. All
-coordinates are whole grid steps; every decision is exact.
+The functions are plain functions over lists or arrays. So the same source runs interpreted and compiled.
+`look` stays one loop with many arguments, because it is a compiled kernel over flat arrays of whole numbers.
 
-The rule for rays through a vertex: a point is seen if it can be seen by a ray turned to one side by
-an arbitrarily small angle. A gap of no width is not looked through, a face is not seen edge-on, and a
-wedge's limits, which are always vertices, belong to it.
+Data, for t triangles, in flat arrays
+-------------------------------------
+- Mesh: triangle i has corners `corner[3 * i + k]`, k = 0, 1, 2, counter-clockwise. Edge k runs from corner k
+  to corner k + 1. `neighbour[3 * i + k]` is the triangle across edge k, or -1 at the boundary; there
+  `face[3 * i + k]` is the target segment on that edge, or -1. `vx`, `vy` are the vertices, and after them the
+  points that limit the views of viewpoints.
+- Targets: segment s runs from (`ax[s]`, `ay[s]`) to (`bx[s]`, `by[s]`) and has `units[s]` equal units.
+  Segments off the mesh's edges lie in buckets: triangle i has entries `bucket_pointer[i]` to
+  `bucket_pointer[i + 1]`.
+- Viewpoints: `start_*` hold the triangles that contain each viewpoint; a vertex has several.
+- Output: runs (segment, first unit, last unit). A unit is seen if its midpoint is seen.
 
-No number exceeds 64 bits, where machine code and Python would part. What is given lies within these
-bounds, which `stopgo.planner.visibility.sight.sight` sees to:
+The stack
+---------
+Each entry has four numbers: a triangle, the edge by which the view entered it (-1 at the start), and the
+vertices that limit the wedge of view on the right and on the left (-1: all round). Entering an edge narrows
+the wedge to the rays through that edge. A wedge that becomes empty, or surely out of range, is dropped. So
+every ray is followed to a boundary edge or to the end of the range.
+
+Invariants
+----------
+- All coordinates are whole grid steps, and every decision is exact. Floating point only guesses
+  (`first_not_negative`, `last_not_negative`, `clip_reach`), or skips edges surely out of range
+  (`edge_too_far`).
+- After the start a wedge is less than a half turn, its limits are vertices, and they belong to it.
+- A ray through a vertex: a point is seen if a ray rotated to one side by an arbitrarily small angle sees it.
+  A gap of no width is not looked through, and a face is not seen edge-on.
+
+No number exceeds 64 bits, where machine code and Python would differ. The arguments lie within these bounds,
+which `stopgo.planner.visibility.sight.sight` ensures:
 
 - coordinates within ±2**29, so differences within 2**30 and turns within 2**61; what a viewpoint looks
   between lies within 2**30 of it;
 - at most 2**26 units on a segment, so `pieces`, two per unit, within 2**27;
 - a range of at most 2**31, which is beyond any two points.
 
-Greater products are held in parts, each multiplied by itself.
+Greater products are stored in parts, each multiplied by itself.
 """
 
 from __future__ import annotations
@@ -39,12 +63,12 @@ def turn(px: int, py: int, qx: int, qy: int, rx: int, ry: int) -> int:
 
 
 def between(px: int, py: int, rx: int, ry: int, qx: int, qy: int, lx: int, ly: int) -> bool:
-    """Whether the ray from p to q lies strictly between those to r and, less than a half turn on, to l."""
+    """True if the ray from p to q lies strictly between those to r and, less than a half turn on, to l."""
     return turn(px, py, rx, ry, qx, qy) > 0 and turn(px, py, qx, qy, lx, ly) > 0
 
 
 def not_negative(at_a: Any, at_b: Any, odd: Any, pieces: Any) -> Any:
-    """Whether the linear function that is `at_a` at a and `at_b` at b is >= 0 at the fraction odd / pieces.
+    """True if the linear function that is `at_a` at a and `at_b` at b is >= 0 at the fraction odd / pieces.
 
     For numbers as for arrays. Both are turns, each of a high part within 2**30 and a low part below 2**31:
     times `pieces`, within 2**57 and 2**58.
@@ -55,7 +79,7 @@ def not_negative(at_a: Any, at_b: Any, odd: Any, pieces: Any) -> Any:
 
 
 def within_reach(ax: int, ay: int, bx: int, by: int, odd: int, pieces: int, reach: int) -> bool:
-    """Whether the point at the fraction odd / pieces of the way from a to b is at most `reach` from 0, 0.
+    """True if the point at the fraction odd / pieces of the line from a to b is at most `reach` from 0, 0.
 
     Times `pieces`, it is within 2**57 and the range within 2**58: squared as high part, within 2**29, and
     low part, below 2**29, every sum of products is within 2**61.
@@ -146,7 +170,7 @@ def clip_reach(
 def edge_too_far(
     qx: int, qy: int, ax: int, ay: int, bx: int, by: int, rx: int, ry: int, lx: int, ly: int, reach: int
 ) -> bool:
-    """Whether the part of edge a-b between the rays through r and l is surely beyond reach."""
+    """True if the part of edge a-b between the rays through r and l is surely beyond reach."""
     ra, rb = float(turn(qx, qy, rx, ry, ax, ay)), float(turn(qx, qy, rx, ry, bx, by))
     la, lb = float(turn(qx, qy, lx, ly, ax, ay)), float(turn(qx, qy, lx, ly, bx, by))
     from_t = ra / (ra - rb) if ra < 0.0 < rb else 0.0
@@ -188,15 +212,15 @@ def look(
     out_low: Any,
     out_high: Any,
 ) -> int:
-    """Write the runs of units that viewpoint `row` sees from `begin` on; returns the end of what is written.
+    """Write the runs of units that viewpoint `row` sees from index `begin` on; return the end of the output.
 
-    Returns -1 when the room left in the output may not be enough.
+    Returns -1 if the output may have too little room. The module explains the arrays and the stack.
 
     Parameters
     ----------
     qx, qy
-        Viewpoints. `start_pointer[row]` to `start_pointer[row + 1]` index the triangles that hold one,
-        and the vertices right and left of what it looks at, less than a half turn; or -1 for all round.
+        Viewpoints. `start_pointer[row]` to `start_pointer[row + 1]` index the triangles that contain one,
+        and the vertices right and left of its view, less than a half turn apart; or -1 for all round.
     vx, vy, corner, neighbour, face
         The mesh, three entries per triangle; `face` is the target segment on that edge or -1.
     bucket_pointer, bucket_segment, bucket_low, bucket_high
@@ -304,9 +328,9 @@ def look(
 
 
 def look_all(first_row: int, pointer: Any, qx: Any, *scene_and_output: Any) -> int:
-    """Let every viewpoint from `first_row` on look; returns the first row that found no room left.
+    """Process every viewpoint from `first_row` on; return the first row that found no room left.
 
-    `pointer[row + 1]` becomes the end of what is written for each row; the other arguments are `look`'s.
+    `pointer[row + 1]` becomes the end of the output of each row; the other arguments are those of `look`.
     """
     row = first_row
     while row < len(qx):

@@ -1,4 +1,4 @@
-"""A triangle mesh of open space, on the integer grid: what sight lines and roads are looked up in."""
+"""A triangle mesh of open space on the integer grid, for lines of sight and roadmaps."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def mesh_of(region: BaseGeometry) -> Mesh:
     Raises
     ------
     StopgoError
-        Naming the place, if the region is not valid or one of its edges is no edge of the mesh: it would be
-        there for nobody.
+        If the region is not valid, or the mesh lacks one of its edges, which would then be invisible; the
+        message names the position.
     """
     if not shapely.is_valid(region):
         raise StopgoError(f"open space, in steps of {GRID:g} m: {shapely.is_valid_reason(region)}; redraw it")
@@ -59,12 +59,12 @@ def mesh_of(region: BaseGeometry) -> Mesh:
 
 
 def _check_rim(mesh: Mesh, region: BaseGeometry) -> None:
-    """The mesh ends where the region does, edge by edge."""
+    """Check that the mesh's boundary is the region's boundary, edge by edge."""
     _, _, rim = rim_of(mesh)
     drawn = np.rint(segments_of(shapely.orient_polygons(region))).astype(np.int64)
     if not np.array_equal(_sorted(rim), _sorted(drawn)):
         edge = min({*map(_key, rim)} ^ {*map(_key, drawn)})
-        raise StopgoError(f"open space has no triangle along {place_of(edge)}; redraw that place")
+        raise StopgoError(f"open space: no triangle along {ends_of(edge)}; redraw the floor there")
 
 
 def rim_of(mesh: Mesh) -> tuple[IntArray, IntArray, IntArray]:
@@ -74,7 +74,7 @@ def rim_of(mesh: Mesh) -> tuple[IntArray, IntArray, IntArray]:
     return triangle, number, np.stack(ends, axis=1)
 
 
-def place_of(edge: tuple[int, ...]) -> str:
+def ends_of(edge: tuple[int, ...]) -> str:
     """An edge's ends in words."""
     ax, ay, bx, by = (GRID * step for step in edge)
     return f"({ax:.5f}, {ay:.5f}) to ({bx:.5f}, {by:.5f}) m from the floor's lower left corner"
@@ -109,7 +109,7 @@ def _neighbours(corners: IntArray) -> IntArray:
 
 
 def containing(mesh: Mesh, points: NDArray[np.int64]) -> tuple[IntArray, IntArray]:
-    """(point, triangle) pairs for every triangle, edges included, that holds a grid point."""
+    """(point, triangle) pairs for every triangle, edges included, that contains a grid point."""
     point, triangle = mesh.tree.query(shapely.points(points * GRID), predicate="dwithin", distance=2 * GRID)
     inside = np.ones(len(point), dtype=bool)
     q = points[point]

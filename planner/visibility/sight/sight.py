@@ -15,17 +15,17 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.shapes import GRID, to_grid
 from stopgo.planner.visibility.sight.kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
-from stopgo.planner.visibility.sight.mesh import Mesh, containing, place_of, rim_of
+from stopgo.planner.visibility.sight.mesh import Mesh, containing, ends_of, rim_of
 
 COMPILE_ABOVE = 2_000_000
-"""Viewpoints × mesh triangles above which loading the compiled kernel pays for itself."""
+"""Viewpoints × mesh triangles above which the compiled kernel is faster, its loading time included."""
 UNLIMITED = 10
-"""Looking without a range costs about this many times as much."""
+"""Factor by which looking without a range takes longer."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Things to be seen in a mesh: faces on its boundary, and free segments within it."""
+    """Targets in a mesh: faces on its boundary, and free segments within it."""
 
     mesh: Mesh
     a: IntArray
@@ -43,7 +43,7 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What each viewpoint sees: runs of units on segments, viewpoint by viewpoint."""
+    """Visible runs of units on segments, viewpoint by viewpoint."""
 
     pointer: IntArray
     segment: IntArray
@@ -70,10 +70,10 @@ def scene_of(mesh: Mesh, a: FloatArray, b: FloatArray, units: IntArray, on_bound
 
 
 def _check_units(units: IntArray) -> None:
-    """Refuse more units on a segment than whole numbers stay exact for."""
+    """Refuse more units on a segment than 64-bit numbers allow."""
     most = int(units.max(initial=0))
     if most > MOST_UNITS:
-        raise InputError(f"{most} units on one face, more than {MOST_UNITS}; raise --d-dis")
+        raise InputError(f"targets: {most} units on one face, more than {MOST_UNITS}; raise --d-dis")
 
 
 def _faces(mesh: Mesh, a: IntArray, b: IntArray, faces: IntArray) -> IntArray:
@@ -82,14 +82,14 @@ def _faces(mesh: Mesh, a: IntArray, b: IntArray, faces: IntArray) -> IntArray:
     Raises
     ------
     StopgoError
-        Naming the place, if a face is on no mesh edge: nobody would ever see it.
+        If a face is on no mesh edge and so could never be seen; the message names the position.
     """
     segment_at = {(*a[k].tolist(), *b[k].tolist()): int(k) for k in faces}
     found = np.full(mesh.corners.shape, -1, dtype=np.int64)
     for triangle, edge, ends in zip(*rim_of(mesh), strict=True):
         found[triangle, edge] = segment_at.pop(tuple(ends.ravel().tolist()), -1)
     for lost in segment_at:
-        raise StopgoError(f"no open space along the face {place_of(lost)}; redraw that place")
+        raise StopgoError(f"open space: none along the face {ends_of(lost)}; redraw the floor there")
     return found
 
 
@@ -141,7 +141,7 @@ def _turns(p: IntArray, q: IntArray, r: IntArray) -> IntArray:
 def sight(
     scene: Scene, viewpoints: NDArray[np.int64], *, reach: float | None, between: IntArray | None = None
 ) -> Runs:
-    """Everything each viewpoint (n, 2), in grid steps, sees within `reach` metres (None: no limit).
+    """Runs of units that each viewpoint (n, 2), in grid steps, sees within `reach` metres (None: no limit).
 
     With `between` (n, 2, 2) it looks only from the direction of the first point on, to the left, to that of
     the second, less than a half turn; all round where both points are the viewpoint itself.
@@ -170,7 +170,7 @@ def sight(
 
 
 def _limits(mesh: Mesh, viewpoints: IntArray, limits: IntArray, side: int) -> IntArray:
-    """The vertex, after those of the mesh, that limits what each viewpoint looks at on one side; else -1."""
+    """The vertex, numbered after the mesh's, that limits each viewpoint's view on one side; else -1."""
     if not len(limits):
         return np.full(len(viewpoints), -1, dtype=np.int64)
     number = len(mesh.vertices) + side * len(limits) + np.arange(len(limits))
@@ -180,7 +180,7 @@ def _limits(mesh: Mesh, viewpoints: IntArray, limits: IntArray, side: int) -> In
 def _run(
     kernel: Callable[..., int], arrays: list[Any], reach: int, triangles: int, *, interpreted: bool
 ) -> Runs:
-    """Call the kernel, again with more room for its output whenever that ran out."""
+    """Call the kernel, again with more room for its output whenever it runs out."""
     rows = len(arrays[0])
     stack = _zeros(4 * (2 * triangles + 16), interpreted=interpreted)
     pointer = _zeros(rows + 1, interpreted=interpreted)

@@ -1,12 +1,12 @@
-"""Which of the units in sight are seen well enough: not too flat, not too near, not too sparsely scanned.
+"""Limits on views: the visible units that are not too flat, not too near and not too sparsely scanned.
 
-From a place, the points of a line that are not too flat lie on one stretch of it, round the foot of the
-perpendicular; so do those that are not too sparse, and those that are too near. So of a run of units in sight
-there is left one stretch, with at most one hole. `clipped` gives it in closed form; `well_seen` asks of one
-midpoint after the other. Both decide exactly, the limits being what their floating point numbers are, and
-what is exactly at a limit is seen.
+From one position, the points of a line that are not too flat form one stretch around the foot of the
+perpendicular. The same holds for points that are not too sparse, and for points that are too near. So of a
+run of visible units one stretch remains, with at most one hole. `clipped` computes it in closed form;
+`well_seen` tests single midpoints. Both decide exactly, with the limits' floating-point values as exact
+numbers. A midpoint exactly at a limit is seen.
 
-Coordinates are whole grid steps from the place, within 2**30, and units are at least 1 mm long, as in
+Coordinates are whole grid steps from the position, within 2**30, and units are at least 1 mm long, as in
 `stopgo.planner.visibility.sight.sightlines`.
 """
 
@@ -25,33 +25,33 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.geometry.shapes import GRID
 
 CLOSE = 1e-9
-"""Numbers that differ by less than this share are compared exactly."""
+"""Relative difference below which numbers are compared exactly."""
 
 
 @dataclass(frozen=True, eq=False)
 class SeenSegments:
-    """Segments as places see them, each in a number of equal units."""
+    """Segments relative to positions that see them, each in a number of equal units."""
 
     a: IntArray
-    """Start of each segment, from the place (n, 2)."""
+    """Start of each segment, relative to the position (n, 2)."""
     b: IntArray
     units: IntArray
     """(n,)."""
 
     def among(self, chosen: IntArray) -> SeenSegments:
-        """Some of them."""
+        """Some of the segments."""
         return SeenSegments(self.a[chosen], self.b[chosen], self.units[chosen])
 
 
 def well_seen(stretches: SeenSegments, unit: IntArray, limits: ViewLimits) -> BoolArray:
-    """Whether the midpoint of a unit (n,) of each segment is seen within the limits."""
+    """True where the midpoint of a unit (n,) of each segment is within the limits."""
     return _square_on(stretches, unit, limits) & ~_too_near(stretches, unit, limits)
 
 
 def clipped(
     stretches: SeenSegments, low: IntArray, high: IntArray, limits: ViewLimits
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """What is seen well of the runs of units low..high (n,): run, first and last unit of each piece."""
+    """The part within the limits of the runs of units low..high (n,): run, first and last unit."""
     middle, half = _round_the_foot(stretches, limits)
     nearest = np.clip(np.rint(middle), low, high).astype(np.int64)
     nearest = _first_that(
@@ -68,7 +68,7 @@ def clipped(
 
 
 def _first_that(test: Callable[[IntArray], BoolArray], *guesses: IntArray) -> IntArray:
-    """Of guesses (n,) the first that passes, else the last one."""
+    """The first guess that passes, else the last one (n,)."""
     found = guesses[-1].copy()
     for guess in guesses[-2::-1]:
         found = np.where(test(guess), guess, found)
@@ -79,20 +79,20 @@ def _end_of(
     test: Callable[[IntArray], BoolArray], inner: IntArray, outer: IntArray, guess: FloatArray
 ) -> IntArray:
     """The unit farthest from `inner` towards `outer` up to which all units pass; `inner` does (n,)."""
-    way = np.sign(outer - inner)
-    at = np.clip(np.where(way > 0, np.floor(guess), np.ceil(guess)), *np.sort([inner, outer], axis=0))
+    step = np.sign(outer - inner)
+    at = np.clip(np.where(step > 0, np.floor(guess), np.ceil(guess)), *np.sort([inner, outer], axis=0))
     at = at.astype(np.int64)
     while (wrong := (at != inner) & ~test(at)).any():
-        at[wrong] -= way[wrong]
-    while (more := (at != outer) & test(np.where(at == outer, at, at + way))).any():
-        at[more] += way[more]
+        at[wrong] -= step[wrong]
+    while (more := (at != outer) & test(np.where(at == outer, at, at + step))).any():
+        at[more] += step[more]
     return at
 
 
 def _without_near(
     stretches: SeenSegments, run: IntArray, low: IntArray, high: IntArray, limits: ViewLimits
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """The pieces left of the runs low..high when what is too near is taken out."""
+    """The runs low..high without the units that are too near."""
     middle = _foot(stretches)
     nearest = np.clip(np.rint(middle), low, high).astype(np.int64)
 
@@ -116,20 +116,20 @@ def _without_near(
 
 
 def _foot(stretches: SeenSegments) -> FloatArray:
-    """Where the perpendicular from the place meets the line, counted in units from the first's midpoint."""
+    """Foot of the perpendicular from the position, counted in units from the first unit's midpoint."""
     a, along = stretches.a.astype(float), (stretches.b - stretches.a).astype(float)
     return -(a * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1.0) * stretches.units - 0.5
 
 
 def _units_within(stretches: SeenSegments, squared_reach: FloatArray | float) -> FloatArray:
-    """Units on either side of the foot up to which the line lies within reach; negative where none does."""
+    """Units on either side of the foot that are within reach; negative where none is."""
     length, away = _length_and_distance(stretches)
     square = squared_reach - away**2
     return np.where(square < 0, -1.0, np.sqrt(np.maximum(square, 0.0)) / length * stretches.units)
 
 
 def _length_and_distance(stretches: SeenSegments) -> tuple[FloatArray, FloatArray]:
-    """Length of each segment, and the distance of the place from its line, in grid steps."""
+    """Length of each segment, and the distance of the position from its line, in grid steps."""
     length = np.maximum(np.hypot(*(stretches.b - stretches.a).astype(float).T), 1e-9)
     return length, np.abs(_area(stretches).astype(float)) / length
 
@@ -140,7 +140,7 @@ def _area(stretches: SeenSegments) -> IntArray:
 
 
 def _round_the_foot(stretches: SeenSegments, limits: ViewLimits) -> tuple[FloatArray, FloatArray]:
-    """The foot, and how many units on either side of it are neither too flat nor too sparse."""
+    """The foot, and the number of units on either side of it that are neither too flat nor too sparse."""
     length, away = _length_and_distance(stretches)
     rise = limits.rise / GRID
     half = np.full(len(length), np.inf)
@@ -153,21 +153,21 @@ def _round_the_foot(stretches: SeenSegments, limits: ViewLimits) -> tuple[FloatA
 
 @dataclass(frozen=True)
 class _Measures:
-    """Of midpoints: whole numbers, or arrays of floating point numbers that are nearly these."""
+    """Measures of midpoints: exact whole numbers, or arrays of approximate floating-point numbers."""
 
     area: Any
-    """Twice the triangle of the place and the segment."""
+    """Twice the area of the triangle of the position and the segment."""
     along: Any
     """The segment's length, squared."""
     squared: Any
     """The distance of the midpoint times `pieces`, squared."""
     slant: Any
-    """The same of the point straight above or below it that is farthest off."""
+    """The same for the farthest point straight above or below it."""
     pieces: Any
 
 
 def _square_on(stretches: SeenSegments, unit: IntArray, limits: ViewLimits) -> BoolArray:
-    """Whether units are seen neither too flat nor too sparsely."""
+    """True for units that are neither too flat nor too sparse."""
     found, rise = np.ones(len(unit), dtype=bool), round(limits.rise / GRID)
     if limits.max_incidence is not None:
         found &= _at_most(stretches, unit, _incidence, math.cos(limits.max_incidence), rise)
@@ -201,11 +201,11 @@ def _at_most(
     limit: float,
     rise: int = 0,
 ) -> BoolArray:
-    """Whether the left side is at most the right one, for each midpoint; exact where they are close."""
+    """True where the left side is at most the right one, for each midpoint; exact where they are close."""
     odd, pieces = 2 * unit + 1, 2 * stretches.units
-    way = (pieces - odd)[:, None] * stretches.a + odd[:, None] * stretches.b
+    offset = (pieces - odd)[:, None] * stretches.a + odd[:, None] * stretches.b
     area, along = _area(stretches), stretches.b - stretches.a
-    squared = (way.astype(float) ** 2).sum(axis=1)
+    squared = (offset.astype(float) ** 2).sum(axis=1)
     rough = _Measures(
         area.astype(float),
         (along.astype(float) ** 2).sum(axis=1),
@@ -216,7 +216,7 @@ def _at_most(
     left, right = sides(rough, limit)
     found: BoolArray = left < right
     for k in np.flatnonzero(np.abs(left - right) <= CLOSE * right):
-        (x, y), (dx, dy), p = way[k].tolist(), along[k].tolist(), int(pieces[k])
+        (x, y), (dx, dy), p = offset[k].tolist(), along[k].tolist(), int(pieces[k])
         slant = x * x + y * y + (rise * p) ** 2
         exact = _Measures(int(area[k]), dx * dx + dy * dy, x * x + y * y, slant, p)
         least, most = sides(exact, Fraction(limit))

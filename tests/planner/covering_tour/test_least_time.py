@@ -15,14 +15,14 @@ from stopgo.mission.document.schedule import leg_times, schedule, turn_time
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route
-from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import problem_of
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
 from stopgo.planner.routing.assemble import assemble
-from stopgo.planner.selection import posed
-from stopgo.planner.selection.separators import pieces_of
+from stopgo.planner.selection import cover_problem
+from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size, some
 from tests.planner.worlds import box, column, door, floor_of, hall, planned, room, shell, two_rooms, wall
 
@@ -83,7 +83,7 @@ def two_step(world: str, case: int = 0, **more: Any) -> Route:
 
 @cache
 def joint(world: str, case: int) -> Route:
-    return in_least_time(two_step(world, case))
+    return least_time_route(two_step(world, case))
 
 
 def seconds_of(driven: Route) -> float:
@@ -102,7 +102,7 @@ class EveryTour:
         selection = self.driven.selection
         candidates = selection.visibility.candidates
         settings = candidates.space.settings
-        self.cover, fixed, _ = posed(selection.visibility)
+        self.cover, fixed, _ = cover_problem(selection.visibility)
         self.must = set(fixed.tolist())
         everywhere = replace(selection, chosen=np.arange(self.cover.rows))
         points, self.ends = points_and_ends(everywhere)
@@ -180,7 +180,7 @@ class EveryTour:
 
     def _fact(self, a: int, b: int) -> tuple[float, float, float] | None:
         if (a, b) not in self.facts:
-            line = self.legs.way(a, b)
+            line = self.legs.path(a, b)
             if len(line) < 2:
                 self.facts[a, b] = None
             else:
@@ -217,7 +217,7 @@ def test_a_plan_is_never_slower_and_sees_what_is_asked_for(world: str, case: int
     driven, made = two_step(world, case), joint(world, case)
     assert made.time is not None
     assert made.time.bound <= made.time.seconds <= made.time.two_step_s == pytest.approx(seconds_of(driven))
-    whole, fixed, _ = posed(made.selection.visibility)
+    whole, fixed, _ = cover_problem(made.selection.visibility)
     assert not whole.missing(whole.covered_by(made.selection.chosen)).any()
     assert set(fixed.tolist()) <= set(made.selection.chosen.tolist())
     assert sorted(made.order.tolist()) == list(range(len(made.selection.chosen)))
@@ -249,7 +249,7 @@ def test_what_a_change_takes_is_what_the_whole_line_then_takes_more(world: str) 
         times, line = problem.times, problem.line
         for leg in range(len(line) - 1):
             added = times.inserted(line, leg)
-            for place in sorted(set(range(times.places)) - set(line))[:6]:
+            for place in sorted(set(range(times.positions)) - set(line))[:6]:
                 longer = [*line[: leg + 1], place, *line[leg + 1 :]]
                 assert times.total(longer) - times.total(line) == added[place]
         turned = times.turned(line, 1)
@@ -259,7 +259,7 @@ def test_what_a_change_takes_is_what_the_whole_line_then_takes_more(world: str) 
 
 def test_a_zone_is_left_by_no_selection_that_sees_enough() -> None:
     problem = problem_of(two_step("rooms", 0))
-    asked, cover = problem.asked, problem.task.cover
+    asked, cover = problem.bound_problem, problem.task.cover
     assert asked.zones
     for zone in asked.zones:
         beyond = np.setdiff1d(np.arange(cover.rows), zone.rows)
@@ -268,9 +268,9 @@ def test_a_zone_is_left_by_no_selection_that_sees_enough() -> None:
 
 def test_scans_that_are_to_register_still_do() -> None:
     driven = two_step("rooms", 0, overlap=0.1)
-    made = in_least_time(driven)
+    made = least_time_route(driven)
     links = links_of(made.selection.visibility.candidates)
-    pieces = [len(pieces_of(links, one.selection.chosen)) for one in (driven, made)]
+    pieces = [len(components_of(links, one.selection.chosen)) for one in (driven, made)]
     assert pieces[1] <= pieces[0]
     assert made.time is not None and made.time.seconds <= made.time.two_step_s
 
@@ -280,9 +280,9 @@ def test_of_very_many_candidates_the_nearest_are_tried_and_the_bound_is_lower(
     bounded: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     every = joint("rooms", 2).time
-    monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_PLACES", 8)
+    monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_POSITIONS", 8)
     monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_BOUNDED", bounded)
-    some = in_least_time(two_step("rooms", 2)).time
+    some = least_time_route(two_step("rooms", 2)).time
     assert every is not None and some is not None
     assert 0 < some.bound <= every.bound
     assert some.seconds <= some.two_step_s

@@ -1,4 +1,4 @@
-"""`--minimise time` from the command line on: reports, pictures, checks, further missions, sharing out."""
+"""`--minimise time` from the command line on: reports, pictures, checks, follow-up missions, allocation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from stopgo.mission.settings import Settings, recorded_values
 from stopgo.mission.stages import Route
 from stopgo.planner import plan
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
-from stopgo.planner.task_allocation.dividing import taken_by
+from stopgo.planner.task_allocation.dividing import division_cost
 from stopgo.recordings.drawing.markdown import plan_results
 from tests.planner.worlds import box, column, floor_of, hall, shell
 
@@ -116,7 +116,7 @@ def test_shared_out_it_is_never_slower_either(changes: dict[str, Any]) -> None:
         shared = found.divided
         assert shared is not None
         routes = tuple(share.route for share in shared.shares)
-        return taken_by(DividedRoute(shared.kind, routes, None, shared.bound, ""))
+        return division_cost(DividedRoute(shared.kind, routes, None, shared.bound, ""))
 
     plain, quick = (made(start=START, minimise=what, **changes) for what in ("stops", "time"))
     assert worth(quick) <= worth(plain)

@@ -1,4 +1,4 @@
-"""Overlap of two scans, and its registration strength: numbers that can be checked on paper."""
+"""Overlap and registration strength of two scans: numbers that can be checked on paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plans whose scans register: one network, told, checked anew, and what would join what lies apart."""
+"""Plans whose scans register: one network, reported and checked; remedies for separate components."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.overlap import links_of
 from stopgo.planner.overlap.registered import SCANS_APART, registered_pairs
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
-from stopgo.planner.selection.separators import pieces_of
+from stopgo.planner.selection.separators import components_of
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, door, floor_of, room, shell, wall
 
@@ -115,4 +115,4 @@ def test_a_further_mission_joins_the_scans_that_were_taken(made: PlanReport) -> 
     asked = replace(planned.settings, use=tuple(map(tuple, places)))
     rows = candidates(navigable(space.floor, asked))
     taken = np.array([np.flatnonzero((rows.xy[rows.kept] == place).all(axis=1))[0] for place in places])
-    assert len(pieces_of(links_of(rows), taken)) == 1
+    assert len(components_of(links_of(rows), taken)) == 1

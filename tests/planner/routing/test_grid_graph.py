@@ -1,4 +1,4 @@
-"""The paper's grids: legs that keep clear, joined at doors, never shorter than the exact ways."""
+"""The paper's grids: legs with clearance, joined at doors, never shorter than the exact paths."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
 from stopgo.planner.routing import route
 from stopgo.planner.routing.assemble import check_legs
-from stopgo.planner.routing.grid_graph import RESOLUTIONS, grid_ways, ways_on_grids
-from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.grid_graph import RESOLUTIONS, grid_paths, paths_on_grids
+from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.space.navigable import navigable
 from tests.planner.checks import obstacles_of
 from tests.planner.routing.test_routing import floor_with_things, free_points, selection_at, space_with_things
@@ -58,7 +58,7 @@ def room_in_room() -> FloorPlan:
 def test_a_way_over_grids_is_in_the_clear_and_never_shorter_than_the_exact_one(floor: FloorPlan) -> None:
     space = navigable(floor, GRID)
     points = np.array([(0.6, 0.6), (3.2, 3.3), (0.6, 3.4), (5.2, 3.3), (5.4, 1.5)])
-    exact, ways = ways_between(space, points), grid_ways(space, points)
+    exact, ways = paths_between(space, points), grid_paths(space, points)
     assert np.isfinite(ways.lengths).all()
     assert np.all(ways.lengths >= exact.lengths - 1e-9)
     assert np.allclose(ways.lengths, ways.lengths.T)
@@ -75,14 +75,14 @@ def test_a_way_over_grids_is_in_the_clear_and_never_shorter_than_the_exact_one(f
 def test_in_an_open_room_a_way_is_straight_and_diagonal_steps() -> None:
     # Nodes stand at whole metres; from (1, 1) to (5, 3) it is two diagonals and two straight steps.
     space = navigable(hall(6, 4), GRID)
-    ways = grid_ways(space, np.array([(1.0, 1.0), (5.0, 3.0)]))
+    ways = grid_paths(space, np.array([(1.0, 1.0), (5.0, 3.0)]))
     assert ways.lengths[0, 1] == pytest.approx(2 + 2 * np.sqrt(2))
 
 
 def test_a_room_in_a_room_is_entered_by_its_own_door() -> None:
     space = navigable(room_in_room(), GRID)
     points = np.array([(4.5, 4.5), (1.0, 4.5), (9.0, 7.0)])
-    ways = grid_ways(space, points)
+    ways = grid_paths(space, points)
     assert np.isfinite(ways.lengths).all()
     line = shapely.LineString(ways.way(0, 1))
     assert line.intersects(shapely.LineString([(6.05, 4), (6.05, 5)]))
@@ -93,7 +93,7 @@ def test_the_grid_is_refined_until_a_stop_has_a_node_near() -> None:
     floor, point = hall(6, 4), np.array([(1.45, 1.45), (4.0, 2.0)])
     for near in (0.7, 0.4, 0.1):
         space = navigable(floor, Settings(graph="grid", max_err_dist=near))
-        ways = grid_ways(space, point)
+        ways = grid_paths(space, point)
         first = ways.way(0, 1)[1]
         assert np.hypot(*(first - point[0])) <= near
 
@@ -101,7 +101,7 @@ def test_the_grid_is_refined_until_a_stop_has_a_node_near() -> None:
 def test_the_grid_is_refined_until_it_is_dense_enough() -> None:
     points = np.array([(1.0, 1.0), (4.0, 2.0)])
     nodes = [
-        len(grid_ways(navigable(hall(6, 4), Settings(graph="grid", den_grid_min=least)), points).xy)
+        len(grid_paths(navigable(hall(6, 4), Settings(graph="grid", den_grid_min=least)), points).xy)
         for least in (0.5, 2.0, 10.0)
     ]
     free = (6 - 0.7) * (4 - 0.7)
@@ -116,14 +116,14 @@ def test_where_the_finest_grid_fails_the_message_names_the_way_out(monkeypatch: 
     space = navigable(two_rooms(0.9, thick=3.0, at=1.7, with_door=False), GRID)
     points = np.array([(1.0, 1.0), (7.0, 3.0)])
     with pytest.raises(NegativeResult, match=r"does not connect the stop at .*--graph exact"):
-        grid_ways(space, points)
-    assert np.isinf(ways_on_grids(space, points, resolutions=(1.0,)).lengths[0, 1])
-    assert np.isfinite(ways_between(space, points).lengths).all()
+        grid_paths(space, points)
+    assert np.isinf(paths_on_grids(space, points, resolutions=(1.0,)).lengths[0, 1])
+    assert np.isfinite(paths_between(space, points).lengths).all()
 
 
 def test_an_opening_just_as_wide_as_the_robot_joins_grids() -> None:
     space = navigable(two_rooms(0.7), GRID)
-    assert np.isfinite(grid_ways(space, np.array([(1.0, 1.0), (7.0, 3.0)])).lengths).all()
+    assert np.isfinite(grid_paths(space, np.array([(1.0, 1.0), (7.0, 3.0)])).lengths).all()
 
 
 @pytest.mark.parametrize("settings", [GRID, Settings(graph="grid", start=(0.6, 0.6, 0.0), router="aco")])

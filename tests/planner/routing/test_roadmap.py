@@ -15,7 +15,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.shapes import local_origin, snapped, to_shape
 from stopgo.planner.routing import roadmap
-from stopgo.planner.routing.roadmap import outward_corners, ways_between
+from stopgo.planner.routing.roadmap import outward_corners, paths_between
 from stopgo.planner.routing.ways import Ways
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import PAPER, box, column, element, hall, shared, two_rooms, wall
@@ -63,7 +63,7 @@ def shortest(space: NavigableSpace, points: np.ndarray) -> np.ndarray:
 def test_ways_are_as_short_as_over_every_corner(seed: int) -> None:
     space = replace(navigable(random_floor(seed), SETTINGS), gaps=np.empty((0, 2, 2)))
     points = free_points(space, 6, seed)
-    found = ways_between(space, points)
+    found = paths_between(space, points)
     assert np.allclose(found.lengths, shortest(space, points), atol=1e-4)  # slits below 2 µm apart
     for a in range(len(points)):
         for b in range(len(points)):
@@ -84,16 +84,16 @@ def look_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_edges_that_cut_corners_are_not_missed(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     space = navigable(random_floor(seed), SETTINGS)
     points = free_points(space, 8, seed)
-    reduced = ways_between(space, points)
+    reduced = paths_between(space, points)
     look_everywhere(monkeypatch)
-    full = ways_between(space, points)
+    full = paths_between(space, points)
     assert np.array_equal(reduced.lengths, full.lengths)
 
 
 def test_a_way_bends_at_outward_corners_only() -> None:
     space = navigable(random_floor(3), SETTINGS)
     points = free_points(space, 6, 1)
-    ways = ways_between(space, points)
+    ways = paths_between(space, points)
     corners = {tuple(xy) for xy in (outward_corners(space).xy + local_origin(space.floor)).round(6)}
     bends = np.concatenate([ways.way(a, b)[1:-1] for a in range(6) for b in range(6)])
     assert len(bends)
@@ -105,7 +105,7 @@ def test_an_empty_hall_has_no_corner_to_bend_at() -> None:
 
 
 def test_points_in_rooms_that_are_not_connected_have_no_way() -> None:
-    lengths = ways_between(navigable(two_rooms(0.5), SETTINGS), np.array([(1.0, 1.0), (7.0, 1.0)])).lengths
+    lengths = paths_between(navigable(two_rooms(0.5), SETTINGS), np.array([(1.0, 1.0), (7.0, 1.0)])).lengths
     assert np.isinf(lengths[0, 1])
 
 
@@ -139,15 +139,15 @@ def counted(space: NavigableSpace, points: np.ndarray, monkeypatch: pytest.Monke
 
     with monkeypatch.context() as context:
         context.setattr(roadmap, "_tangent", counting)
-        return ways_between(space, points), sum(pairs)
+        return paths_between(space, points), sum(pairs)
 
 
 def test_pairs_are_looked_at_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     space = columned(2)
     points = np.array([(0.5, 0.5), (7.5, 7.5)])
-    whole = ways_between(space, points)
+    whole = paths_between(space, points)
     monkeypatch.setattr(roadmap, "PAIRS", 1000)
-    pieces = ways_between(space, points)
+    pieces = paths_between(space, points)
     assert np.array_equal(whole.lengths, pieces.lengths)
     assert np.array_equal(whole.graph.indices, pieces.graph.indices)
 
@@ -157,6 +157,6 @@ def test_the_reduction_keeps_every_length_on_a_real_floor(name: str, monkeypatch
     space = navigable(shared(name), Settings())
     area = to_shape(space.drive_area, np.zeros(2))
     points = np.array([part.representative_point().coords[0] for part in shapely.get_parts(area)])
-    reduced = ways_between(space, points)
+    reduced = paths_between(space, points)
     look_everywhere(monkeypatch)
-    assert np.array_equal(reduced.lengths, ways_between(space, points).lengths)
+    assert np.array_equal(reduced.lengths, paths_between(space, points).lengths)

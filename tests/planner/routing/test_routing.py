@@ -1,4 +1,4 @@
-"""Ways against an independent visibility graph, and tours against every permutation."""
+"""Paths compared with an independent visibility graph, and tours with every permutation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Route, Selection
 from stopgo.planner.routing import ROUTERS, route
-from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.exact_sight import exact
 from tests.faults.sizes import some
@@ -46,7 +46,7 @@ def selection_at(space: NavigableSpace, xy: np.ndarray) -> Selection:
 
 
 def geodesics(floor: FloorPlan, points: np.ndarray, radius: float) -> dict[int, dict[int, float]]:
-    """Shortest ways between points that keep `radius` from everything, by a graph over all corners."""
+    """Shortest paths between points that keep `radius` from everything, by a graph over all corners."""
     blocked = shapely.union_all([shape.buffer(radius, quad_segs=16) for shape in obstacles_of(floor)])
     ground = shapely.union_all([shape_of(polygon) for polygon in floor.outline])
     free = ground.difference(blocked)
@@ -73,7 +73,7 @@ def test_a_way_is_as_long_as_the_shortest(seed: int) -> None:
     ]
     floor = hall(10, 7, *blocks)
     points = np.array([(0.5, 0.5), (9.5, 6.5), (0.5, 6.5), (9.5, 0.5)])
-    ways = ways_between(navigable(floor, Settings(robot_radius=RADIUS)), points)
+    ways = paths_between(navigable(floor, Settings(robot_radius=RADIUS)), points)
     shortest = geodesics(floor, points, RADIUS)  # corners cut by 16 chords a quarter
     longest = geodesics(floor, points, RADIUS * 1.0205)
     for a, b in combinations(range(len(points)), 2):
@@ -84,7 +84,7 @@ def test_a_way_is_as_long_as_the_shortest(seed: int) -> None:
 
 
 def test_a_way_in_the_open_is_straight() -> None:
-    ways = ways_between(navigable(hall(6, 4), Settings()), np.array([(1.0, 1.0), (5.0, 3.0)]))
+    ways = paths_between(navigable(hall(6, 4), Settings()), np.array([(1.0, 1.0), (5.0, 3.0)]))
     assert ways.lengths[0, 1] == pytest.approx(np.hypot(4, 2))
     assert len(ways.way(0, 1)) == 2
 
@@ -98,13 +98,13 @@ def test_a_way_round_one_corner_is_two_tangents_and_an_arc() -> None:
     reach = 2 * np.pi - np.arccos(np.dot(start - corner, end - corner) / d1 / d2)
     arc = reach - np.arccos(RADIUS / d1) - np.arccos(RADIUS / d2)
     true = np.sqrt(d1**2 - RADIUS**2) + np.sqrt(d2**2 - RADIUS**2) + RADIUS * arc
-    found = ways_between(navigable(floor, Settings()), np.array([start, end])).lengths[0, 1]
+    found = paths_between(navigable(floor, Settings()), np.array([start, end])).lengths[0, 1]
     assert true - 1e-9 <= found <= true + 0.02 * RADIUS
 
 
 def test_ways_are_symmetric_and_keep_the_triangle_inequality() -> None:
     points = np.array([(0.6, 0.6), (3.3, 3.4), (4.6, 2.0), (7.4, 0.5), (7.4, 3.5), (4.6, 0.5)])
-    lengths = ways_between(navigable(floor_with_things(), Settings()), points).lengths
+    lengths = paths_between(navigable(floor_with_things(), Settings()), points).lengths
     assert np.isfinite(lengths).all()
     assert np.allclose(lengths, lengths.T)
     assert np.all(lengths[:, None, :] <= lengths[:, :, None] + lengths[None, :, :] + 1e-9)
@@ -113,7 +113,7 @@ def test_ways_are_symmetric_and_keep_the_triangle_inequality() -> None:
 
 def test_a_point_twice_is_at_no_distance_from_itself() -> None:
     points = np.array([(1.0, 1.0), (1.0, 1.0), (5.0, 3.0)])
-    ways = ways_between(navigable(hall(6, 4), Settings()), points)
+    ways = paths_between(navigable(hall(6, 4), Settings()), points)
     assert ways.lengths[0, 1] == pytest.approx(0, abs=1e-9)
     assert len(ways.way(0, 1)) >= 1
 
@@ -167,7 +167,7 @@ def shortest_of_all(kind: str, count: int, seed: int) -> float:
         last = len(points)
         points.append(np.array(settings.end))
     closed = settings.tour == "closed" or (settings.tour is None and first is not None and last is None)
-    lengths = ways_between(space_with_things(settings), np.array(points)).lengths
+    lengths = paths_between(space_with_things(settings), np.array(points)).lengths
     paths = np.array(list(permutations(range(len(xy)))))
     begin, end = ([] if stop is None else [np.full((len(paths), 1), stop)] for stop in (first, last))
     paths = np.concatenate([*begin, paths, *end], axis=1)

@@ -10,9 +10,9 @@ import pytest
 from stopgo.mission.errors import InputError
 from stopgo.planner.routing import Ends, far_edge, tour_matrix
 from stopgo.planner.routing.cuts import violated_cuts
-from stopgo.planner.routing.proof import proved
+from stopgo.planner.routing.proof import tour_proof
 from stopgo.planner.routing.subsets import best_of_all
-from stopgo.planner.routing.tour import canonical, length_of, nanometres, searched, shortest_tour, trials
+from stopgo.planner.routing.tour import canonical, length_of, nanometres, search, shortest_tour, trials
 from stopgo.planner.routing.tour_bound import one_tree, one_tree_bound, useful_edges
 from tests.faults.sizes import size
 
@@ -59,8 +59,8 @@ def test_comparing_subsets_finds_the_shortest_of_all_tours(n: int, lengths) -> N
 def test_compiled_and_interpreted_search_find_the_same_tour(n: int, lengths) -> None:
     cost = nanometres(lengths(n, n))
     perturbations = trials(cost, 15 * n, seed=3)
-    interpreted = searched(cost, perturbations, interpreted=True)
-    assert np.array_equal(interpreted, searched(cost, perturbations, interpreted=False))
+    interpreted = search(cost, perturbations, interpreted=True)
+    assert np.array_equal(interpreted, search(cost, perturbations, interpreted=False))
 
 
 def test_the_same_seed_finds_the_same_tour() -> None:
@@ -88,13 +88,13 @@ def test_two_hundred_points_are_within_one_percent_of_the_shortest_known(seed: i
     lengths = scattered(200, seed)
     cost = nanometres(lengths)
     known = min(
-        length_of(cost, searched(cost, trials(cost, 40_000, seed=s), interpreted=False)) for s in (8, 9)
+        length_of(cost, search(cost, trials(cost, 40_000, seed=s), interpreted=False)) for s in (8, 9)
     )
     assert length_of(cost, shortest_tour(lengths, seed=1)) <= 1.01 * known
 
 
 def test_lengths_that_overflow_are_refused() -> None:
-    with pytest.raises(InputError, match=r"a way of 1e\+10 m between 2 stops"):
+    with pytest.raises(InputError, match=r"a path of 1e\+10 m between 2 stops"):
         nanometres(np.array([[0.0, 1e10], [1e10, 0.0]]))
 
 
@@ -131,7 +131,7 @@ def test_branching_proves_what_comparing_all_tours_finds(lengths, monkeypatch: p
             poor = np.random.default_rng(seed).permutation(n)
             with monkeypatch.context() as patched:
                 patched.setattr("stopgo.planner.routing.proof.COMPARE_ALL_UP_TO", 3)
-                proof = proved(cost, poor)
+                proof = tour_proof(cost, poor)
             assert proof.closed
             assert proof.bound <= shortest <= proof.length <= shortest + 1_000
 
@@ -142,7 +142,7 @@ def test_tours_up_to_fifty_points_are_proved_optimal(n: int, seed: int) -> None:
     lengths = scattered(n, seed)
     cost = nanometres(lengths)
     order = shortest_tour(lengths, seed=1)
-    proof = proved(cost, order)
+    proof = tour_proof(cost, order)
     assert proof.closed
     assert length_of(cost, order) == proof.length  # the search alone has found it
 
@@ -150,8 +150,8 @@ def test_tours_up_to_fifty_points_are_proved_optimal(n: int, seed: int) -> None:
 def test_a_poor_tour_is_replaced_unless_it_is_to_be_kept() -> None:
     cost = nanometres(scattered(25, 2))
     poor = np.arange(25)
-    proof = proved(cost, poor)
-    kept = proved(cost, poor, improve=False)
+    proof = tour_proof(cost, poor)
+    kept = tour_proof(cost, poor, improve=False)
     assert proof.closed
     assert length_of(cost, proof.order) == proof.length < length_of(cost, poor)
     assert np.array_equal(proof.order, canonical(proof.order))
@@ -163,10 +163,10 @@ def test_a_poor_tour_is_replaced_unless_it_is_to_be_kept() -> None:
 
 def test_the_bound_holds_when_the_search_for_a_proof_is_cut_short(monkeypatch: pytest.MonkeyPatch) -> None:
     cost = nanometres(any_lengths(30, 1))
-    full = proved(cost, np.arange(30))
+    full = tour_proof(cost, np.arange(30))
     for limit in (0, 1, 2, 3, 5, 8):
         monkeypatch.setattr("stopgo.planner.routing.proof.SOLVE_LIMIT", limit)
-        assert proved(cost, np.arange(30)).bound <= full.length
+        assert tour_proof(cost, np.arange(30)).bound <= full.length
 
 
 def test_every_tour_keeps_every_cut() -> None:

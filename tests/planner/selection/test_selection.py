@@ -53,7 +53,7 @@ def is_enough(cover: Cover, rows: np.ndarray) -> bool:
 
 
 def any_is_enough(cover: Cover, sets: np.ndarray) -> bool:
-    """True if any of the sets of this many rows (sets, rows) is enough."""
+    """True if any of some sets of as many rows (sets, rows) is enough."""
     seen = (cover.sees.toarray()[sets] > 0).sum(axis=1) >= cover.views
     return bool(np.any(np.all(seen @ cover.worth.toarray().T >= cover.needed, axis=1)))
 

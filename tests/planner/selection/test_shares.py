@@ -1,4 +1,4 @@
-"""Counting of coverage: no room and no kind of element is neglected for the whole."""
+"""Coverage demands: the units they count, and required fractions of every room and kind of element."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every face of the drawing is a face that can be seen: none is lost between the drawing and the mesh."""
+"""Every face of the drawing can be seen: none is lost between the drawing and the mesh."""
 
 from __future__ import annotations
 

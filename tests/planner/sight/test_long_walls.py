@@ -1,4 +1,4 @@
-"""Sight along walls of up to a kilometre: machine code, Python and exact sight lines tell the same."""
+"""Visibility along walls of up to a kilometre: machine code, Python and exact sight lines agree."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from tests.planner.oracle import visible_pairs
 
 
 def matrix(runs: Runs, units: np.ndarray) -> np.ndarray:
-    """True where a viewpoint sees a unit (viewpoints, units)."""
+    """True where a viewpoint sees a unit."""
     first = np.concatenate([[0], np.cumsum(units)])
     seen = np.zeros((len(runs.pointer) - 1, int(first[-1])), dtype=bool)
     for row in range(len(seen)):
@@ -144,7 +144,7 @@ def test_sight_between_free_points_is_symmetric(reach: float | None) -> None:
 def test_a_limited_look_sees_what_lies_between_its_limits(
     compile_above: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A point on a limit may need a ray beyond it, so only points between the limits are certain."""
+    """Points on a limit may need a ray rotated beyond it, so only points between are certain."""
     monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", compile_above)
     for seed in range(20):
         world = lattice_world(6000 + seed)

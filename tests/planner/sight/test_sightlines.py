@@ -1,4 +1,4 @@
-"""Sight lines held against every edge, checked in fractions on walls too long for 64-bit products."""
+"""Sight lines tested against every edge, checked in fractions on walls too long for 64-bit products."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, OpeningState
-from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.space.gaps import Site
 from stopgo.planner.space.navigable import navigable
 from tests.faults.sizes import some
@@ -45,7 +45,7 @@ def way(floor: FloorPlan, settings: Settings | None = None, *, degrees: float = 
 
 
 def length_in(space: NavigableSpace, points: np.ndarray) -> float:
-    return float(ways_between(space, points).lengths[0, 1])
+    return float(paths_between(space, points).lengths[0, 1])
 
 
 def state(floor: FloorPlan, settings: Settings | None = None) -> OpeningState:

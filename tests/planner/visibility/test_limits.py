@@ -1,4 +1,4 @@
-"""Limits on views: a view outside the limits does not count in any figure; and their cost."""
+"""Units outside the limits on views count as not seen in every stage; and the cost of limits."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_no_set_of_candidates_is_smaller_than_the_bound(views: int) -> None:
 
 
 def enough(counts: np.ndarray, seen: Visibility, settings: Settings) -> bool:
-    """True if the coverage of the whole, of the room and of every kind is met."""
+    """True if the required fractions of the whole, of the room and of every kind are met."""
     space, targets = seen.candidates.space, seen.targets
     kinds = np.array([item.kind for item in space.floor.elements])[targets.element][targets.unit_segment]
     groups = [(np.ones(targets.total, bool), settings.coverage), (space.unit_room == 0, 0.7)]
@@ -173,5 +173,5 @@ def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
     ],
 )
 def test_limits_that_leave_nothing_are_named(limits: dict[str, Any], told: str) -> None:
-    with pytest.raises(NegativeResult, match=rf"^test: nothing in sight is seen well enough: .*{told}"):
+    with pytest.raises(NegativeResult, match=rf"^test: no visible target is within the limits: .*{told}"):
         plan(FLOOR, replace(Settings(), **limits))

@@ -48,7 +48,7 @@ TURNED = [(name, degrees) for name in REAL for degrees in (0.0, 17.0, 45.0)]
 
 
 def rows_of(seen: Visibility, rows: Iterable[int]) -> np.ndarray:
-    """True where one of these candidates sees a unit (candidates, units)."""
+    """True where one of these candidates sees a unit."""
     found = np.zeros((len(list(rows)), seen.targets.total), dtype=bool)
     for k, row in enumerate(rows):
         found[k, seen.seen_by(row)] = True
@@ -251,7 +251,7 @@ def test_a_wall_drawn_as_a_line_hides_and_is_scanned_on_both_sides() -> None:
 def test_nothing_in_sight_is_an_answer() -> None:
     far = hall(6, 4, targets := column("c", 20.0, 20.0))
     assert targets.target
-    with pytest.raises(StopgoError, match="in its sight"):
+    with pytest.raises(StopgoError, match="no target is visible"):
         visibility(candidates(navigable(far, Settings(targets=("columns",)))))
 
 

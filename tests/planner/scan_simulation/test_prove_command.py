@@ -1,4 +1,4 @@
-"""`stopgo prove` as a user calls it: its files, its answers, and what it refuses in one line."""
+"""`stopgo prove` as a user calls it: its files, its results, and its errors in one line."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_a_damaged_coverage_beside_the_mission_is_told(planned: Path, tmp_path: 
     told = prove(tmp_path)
     assert told.returncode in (0, 1)
     assert "coverage.json: not a coverage.json" in told.stderr and told.stderr.count("\n") == 1
-    assert "only the mission's counts are held against the scans" in told.stderr
+    assert "only the mission's counts are compared with the scans" in told.stderr
 
 
 def test_another_floor_is_refused(planned: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Scan + limits of the plan -> the units that it shows as well as was asked, by what was measured."""
+"""Scan + limits of the plan -> the units that the measured points show as well as the plan requires."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from stopgo.planner.scan_simulation.scanning import ScanCount
 from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 SLACK_DEG = 0.5
-"""Angles are those of a cell's middle, up to 5 cm off the unit's."""
+"""Tolerance of angles, which are those of a cell's centre, up to 5 cm off the unit's midpoint."""
 
 
 @dataclass(frozen=True, eq=False)
-class AskedPoints:
-    """What a unit must show: points anywhere, or in certain cells, so dense and so steep."""
+class UnitRequirements:
+    """Requirements on a unit's points: any point, or certain cells at a density and an angle."""
 
     strips: Strips
     cells: BoolArray
-    """Whether a cell must be shown as well as asked (cells,); none where any point will do."""
+    """True for cells that must meet the limits (cells,); for none if any point suffices."""
     steepest: float | None
-    """Radians from square on."""
+    """Largest angle from the surface normal, radians; None without a limit."""
     spacing: float | None
-    """Metres between neighbouring points."""
+    """Largest distance between neighbouring points, metres; None without a limit."""
     needed: IntArray
-    """How many of its cells each unit must show (units,)."""
+    """Number of cells that each unit must show (units,)."""
 
     @classmethod
-    def of(cls, settings: Settings, strips: Strips) -> AskedPoints:
-        """By a plan's limits: at the scanner's height, or from the floor up to `wall_height`.
+    def of(cls, settings: Settings, strips: Strips) -> UnitRequirements:
+        """The requirements of a plan's limits: at the scanner's height, or from the floor to `wall_height`.
 
-        What hangs is asked for points only: a plan's angles are those in the plane.
+        Beams need only points, because a plan's angles are angles in the plane.
         """
         limits, height = limits_of(settings), scanner_height(settings)
         unit = strips.unit_of_cell
@@ -53,7 +53,7 @@ class AskedPoints:
         return cls(strips, cells, steepest, limits.spacing, needed)
 
     def shown(self, scan: ScanCount) -> BoolArray:
-        """Units of which a scan shows what is asked (units,)."""
+        """True for each unit that a scan shows as required (units,)."""
         unit = self.strips.unit_of_cell[scan.cell]
         good = self.cells[scan.cell] & self._steep(scan) & self._dense(scan, unit)
         many = np.bincount(unit, good, minlength=len(self.needed))
@@ -65,7 +65,7 @@ class AskedPoints:
         return True if self.steepest is None else scan.incidence <= self.steepest
 
     def _dense(self, scan: ScanCount, unit: IntArray) -> BoolArray | bool:
-        """Whether points are as near as asked, both ways; one more may lie just beside a cell."""
+        """True where points are dense enough in both directions; one more point may lie next to a cell."""
         if self.spacing is None:
             return True
         columns = np.maximum(scan.columns, 1)
@@ -75,7 +75,7 @@ class AskedPoints:
 
     @property
     def _width(self) -> FloatArray:
-        """Of each unit, from the area of its first cell."""
+        """Width of each unit, from the area of its first cell (units,)."""
         first = self.strips.first_cell[:-1]
         tall = np.minimum(CELL_M, self.strips.tall)
         found: FloatArray = self.strips.area[first] / tall

@@ -1,9 +1,9 @@
-"""Mission + its floor -> its proof: every stop scanned in the order of driving, measured, and registered."""
+"""Mission + floor -> verification result: scans from every stop in driving order, measured and registered."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 
@@ -22,98 +22,140 @@ from stopgo.mission.proof.plan_proof import (
     PlanProof,
     PromisedShare,
     ScanCloud,
+    ScanNetwork,
     Simulation,
     StopScan,
 )
 from stopgo.mission.stages import NavigableSpace, Targets, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE
-from stopgo.planner.scan_simulation.asked import AskedPoints
 from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
-from stopgo.planner.scan_simulation.joining import joined
-from stopgo.planner.scan_simulation.registering import registered, surface_of
-from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, scanned, stand_of
+from stopgo.planner.scan_simulation.registration import OrientedCloud, registered, surface_of
+from stopgo.planner.scan_simulation.scan_network import network_of
+from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, pose_of, scanned
 from stopgo.planner.scan_simulation.strips import Strips, strips_of
+from stopgo.planner.scan_simulation.unit_requirements import UnitRequirements
 
 SPACINGS_MM = (2, 5, 10, 20, 50)
 INCIDENCES_DEG = (45, 60, 70, 80)
 STOPS = (1, 2, 3)
 IN_DOORWAY_M = 0.1
-"""A stop so near a door's line stands in it."""
+"""A stop this close to a door's line is in the doorway."""
 SAME_PLACE_M = 1e-4
-"""Ends of segments in coverage.json are rounded."""
+"""Tolerance for the ends of segments in coverage.json, which are rounded."""
 MOST_DRAWN = 1_000_000
-"""Points that a proof keeps to be drawn, of all scans together."""
+"""Points kept for drawing, of all scans together."""
 BELOW_M = 0.05
-"""What is drawn ends so far below the ceiling."""
+"""Points closer to the ceiling than this are not drawn."""
 Say = Callable[[str], None]
-"""Told what has been done, for watching."""
+"""Callback for progress messages."""
 REACH_SLACK_M = 1e-4
 """A midpoint exactly at the range is within it, as in the plan."""
 GRAZED, HIDDEN = "in sight, but so flat that it falls between two rays", "hidden from every stop"
-"""Why something is missed."""
+"""Reasons for a missed target, as in proof.json."""
 NOT_AS_ASKED = "in sight, but too flat, too far apart or from too few stops"
 
 
-def prove(
+def verify(
     mission: Mission,
     space: NavigableSpace,
     simulation: Simulation,
     coverage: Coverage | None,
     say: Say = lambda line: None,
 ) -> PlanProof:
-    """Scan a floor from every stop, and hold what comes of it against what the plan promises.
+    """Scan a floor from every stop of a mission, and compare the scans with the plan's promised coverage.
 
-    `coverage` is the mission's own coverage.json; without it only the mission's counts are held against it.
+    `coverage` is the mission's own coverage.json; without it only the mission's counts are compared.
 
     Raises
     ------
     NegativeResult
-        When the mission has no stops.
+        If the mission has no stops.
     InputError
-        When coverage.json is of another reading of the floor.
+        If coverage.json belongs to another reading of the floor.
     """
-    for library in ("embreex", "small_gicp", *(() if simulation.poses else ("kiss_matcher",))):
-        import_module(library)  # whatever is missing is told before anything is done
+    _check_libraries(simulation)
     if not mission.stops:
-        raise NegativeResult(f"{mission.name}: has no stops; there is nothing to prove")
-    doors = _closed_doors(space)
-    solids = extruded(space.floor, doors, simulation.ceiling_m)
-    strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
-    tally = _PointTally(strips, AskedPoints.of(space.settings, strips), simulation)
-    stands = [
-        replace(
-            stand_of(stop, origin=solids.origin, height=simulation.height_m, number=index),
-            open_door=_own_door(stop, doors),
-        )
-        for index, stop in enumerate(mission.stops)
-    ]
-    surfaces, clouds = [], []
-    for stop, stand in zip(mission.stops, stands, strict=True):  # of a scan little is kept: there may be many
-        scan = scanned(solids, strips, stand, simulation)
-        tally.take(scan, _sighted(space, solids, stand, simulation.ceiling_m))
-        surfaces.append(surface_of(scan.cloud))
-        most = MOST_DRAWN // len(stands)
-        points = _drawn(stand, scan, most, simulation.ceiling_m, solids.origin)
-        clouds.append(ScanCloud(stop.id, points))
-        say(f"{stop.id} scanned, {len(clouds)} of {len(stands)}")
-    places = frozen([stand.place for stand in stands])
-    seen = frozen(tally.views >= np.clip(tally.sights, 1, space.settings.least_views), np.bool_)
+        raise NegativeResult(f"{mission.name}: no stops; nothing to verify")
+    site = _ScanSite.of(space, simulation)
+    poses = [site.pose_of(stop, number) for number, stop in enumerate(mission.stops)]
+    tally = _PointTally(site.strips, UnitRequirements.of(space.settings, site.strips), simulation)
+    surfaces, clouds = _scans(mission, site, poses, tally, say)
     names = [stop.id for stop in mission.stops]
+    positions = frozen([pose.position for pose in poses])
     pairs = []
-    for pair in registered(names, places, surfaces, simulation):
+    for pair in registered(names, positions, surfaces, simulation):
         pairs.append(pair)
         say(f"{pair.pair.a} and {pair.pair.b} registered")
-    promise = _Promise.of(mission, space, coverage)
+    promise = _PromisedCoverage.of(mission, space, coverage)
+    return _proof(mission, site, tally, promise, network_of(names, positions, pairs), clouds)
+
+
+def _check_libraries(simulation: Simulation) -> None:
+    """Report a missing library before any work starts."""
+    for library in ("embreex", "small_gicp", *(() if simulation.poses else ("kiss_matcher",))):
+        import_module(library)
+
+
+@dataclass(frozen=True, eq=False)
+class _ScanSite:
+    """A floor prepared for simulated scans: its solids, and its targets as strips of cells."""
+
+    space: NavigableSpace
+    simulation: Simulation
+    doors: list[FloatArray]
+    """Lines of the doors that are closed for the laser."""
+    solids: ExtrudedFloor
+    strips: Strips
+
+    @classmethod
+    def of(cls, space: NavigableSpace, simulation: Simulation) -> _ScanSite:
+        doors = _closed_doors(space)
+        solids = extruded(space.floor, doors, simulation.ceiling_m)
+        strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
+        return cls(space, simulation, doors, solids, strips)
+
+    def pose_of(self, stop: Stop, number: int) -> ScannerPose:
+        """The scanner's pose at a stop."""
+        pose = pose_of(stop, origin=self.solids.origin, height=self.simulation.height_m, number=number)
+        return replace(pose, open_door=_own_door(stop, self.doors))
+
+
+def _scans(
+    mission: Mission, site: _ScanSite, poses: Sequence[ScannerPose], tally: _PointTally, say: Say
+) -> tuple[list[OrientedCloud], list[ScanCloud]]:
+    """Scan from every pose into the tally; of each scan only a thinned cloud and a drawing remain."""
+    surfaces, clouds = [], []
+    ceiling, origin = site.simulation.ceiling_m, site.solids.origin
+    for stop, pose in zip(mission.stops, poses, strict=True):
+        scan = scanned(site.solids, site.strips, pose, site.simulation)
+        tally.take(scan, _sighted(site.space, site.solids, pose, ceiling))
+        surfaces.append(surface_of(scan.cloud))
+        clouds.append(ScanCloud(stop.id, _drawn(pose, scan, MOST_DRAWN // len(poses), ceiling, origin)))
+        say(f"{stop.id} scanned, {len(clouds)} of {len(poses)}")
+    return surfaces, clouds
+
+
+def _proof(
+    mission: Mission,
+    site: _ScanSite,
+    tally: _PointTally,
+    promise: _PromisedCoverage,
+    network: ScanNetwork,
+    clouds: Sequence[ScanCloud],
+) -> PlanProof:
+    """The result of the simulation: what was promised, what was acquired, and how scans register."""
+    settings = site.space.settings
+    seen = frozen(tally.views >= np.clip(tally.sights, 1, settings.least_views), np.bool_)
     return PlanProof(
         mission=mission,
-        simulation=simulation,
-        targets=space.targets,
+        simulation=site.simulation,
+        targets=site.space.targets,
         seen=seen,
         promised=promise.units,
         grain=float(promise.weight.max()),
         missed=promise.missed(seen, frozen(tally.sights > 0, np.bool_)),
-        unit="units" if space.settings.coverage_rule == "paper" else "m",
+        unit="units" if settings.coverage_rule == "paper" else "m",
         whole=promise.whole(seen),
         rooms=promise.rooms(seen),
         kinds=promise.kinds(seen),
@@ -122,7 +164,7 @@ def prove(
             for stop, counts in zip(mission.stops, tally.of_stop, strict=True)
         ),
         quality=tally.quality(),
-        network=joined(names, places, pairs),
+        network=network,
         clouds=tuple(clouds),
     )
 
@@ -134,7 +176,7 @@ def _closed_doors(space: NavigableSpace) -> list[FloatArray]:
 
 
 def _own_door(stop: Stop, doors: list[FloatArray]) -> int:
-    """The closed door in which a stop stands, if it does."""
+    """Index of the closed door in whose doorway the stop is, else NONE."""
     if not (stop.doorway and doors):
         return NONE
     away = shapely.distance(shapely.linestrings(doors), shapely.Point(stop.x, stop.y))
@@ -142,30 +184,30 @@ def _own_door(stop: Stop, doors: list[FloatArray]) -> int:
     return nearest if away[nearest] <= IN_DOORWAY_M else NONE
 
 
-def _drawn(stand: ScannerPose, scan: ScanCount, most: int, ceiling: float, origin: FloatArray) -> FloatArray:
-    """A scan's points, thinned evenly to about `most`; without the ceiling, that hides the rooms."""
+def _drawn(pose: ScannerPose, scan: ScanCount, most: int, ceiling: float, origin: FloatArray) -> FloatArray:
+    """A scan's points, thinned evenly to about `most`, without the ceiling, which would hide the rooms."""
     every = max(1, -(-len(scan.cloud) // max(1, most)))
-    points = scan.cloud[::every] + stand.place + np.append(origin, 0.0)
+    points = scan.cloud[::every] + pose.position + np.append(origin, 0.0)
     return frozen(points[points[:, 2] < ceiling - BELOW_M])
 
 
 class _PointTally:
-    """What all scans came to, cell by cell."""
+    """Totals of all scans, cell by cell."""
 
-    def __init__(self, strips: Strips, asked: AskedPoints, simulation: Simulation) -> None:
+    def __init__(self, strips: Strips, asked: UnitRequirements, simulation: Simulation) -> None:
         self._strips, self._asked = strips, asked
         self._step = math.radians(simulation.step_deg)
         self.views = np.zeros(len(strips.low), np.int16)
-        """Stops that show each unit as well as was asked."""
+        """Stops that show each unit as well as required (units,)."""
         self._spacing = np.full(strips.cells, np.inf)
         self._unit = strips.unit_of_cell
         self._points = np.zeros(strips.cells)
         self._stops = np.zeros(strips.cells, np.int16)
         self._incidence = np.full(strips.cells, np.inf)
         self.sights = np.zeros(len(strips.low), np.int64)
-        """Stops that have each unit's midpoint in sight as was asked; more views are asked of none."""
+        """Stops that see each unit's midpoint as required; no unit needs more views than these (units,)."""
         self.of_stop: list[tuple[int, int, int]] = []
-        """Units in sight, units with points, and points of each scan."""
+        """Visible units, units with points, and points of each scan."""
 
     def take(self, scan: ScanCount, sighted: BoolArray) -> None:
         self.sights += sighted
@@ -197,21 +239,21 @@ class _PointTally:
 
 
 @dataclass(frozen=True, eq=False)
-class _Promise:
-    """What the plan promises, unit by unit where its coverage.json tells."""
+class _PromisedCoverage:
+    """The plan's promised coverage, unit by unit if its coverage.json is given."""
 
     space: NavigableSpace
     coverage: Coverage | None
     alone: bool
-    """Whether the mission sees the floor by itself; of one of several no room's or kind's share is asked."""
+    """True if one mission covers the floor; one of several need not reach a room's or kind's fraction."""
     weight: FloatArray
-    """Metres, or 1, of each unit."""
+    """Weight of each unit: its metres, or 1."""
     units: BoolArray | None
-    """Whether each unit is promised; None where only their number is known."""
+    """True for each promised unit; None if only their number is known."""
     claimed: int
 
     @classmethod
-    def of(cls, mission: Mission, space: NavigableSpace, coverage: Coverage | None) -> _Promise:
+    def of(cls, mission: Mission, space: NavigableSpace, coverage: Coverage | None) -> _PromisedCoverage:
         paper = space.settings.coverage_rule == "paper"
         weight = frozen(weights_of(space.targets, space.settings) * (1.0 if paper else 1e-6))
         units = None if coverage is None else _promised(coverage, space.targets, space.floor)
@@ -231,22 +273,22 @@ class _Promise:
             got = int(seen.sum())
             kept, beyond = min(got, self.claimed) * mean, max(0, got - self.claimed) * mean
             return PromisedShare("all", self.claimed * mean, kept, beyond)
-        told = None if self.coverage is None else self.coverage.total.coverage
+        stated = None if self.coverage is None else self.coverage.total.coverage
         return self._share(
-            "all", every, seen, coverage=told, required=self._asked(self.space.settings.coverage)
+            "all", every, seen, coverage=stated, required=self._required(self.space.settings.coverage)
         )
 
     def rooms(self, seen: BoolArray) -> tuple[PromisedShare, ...]:
-        """Rooms of which something is promised or acquired, in the floor's order."""
-        told = {} if self.coverage is None else {row.room: row.coverage for row in self.coverage.rooms}
+        """Rooms with promised or acquired targets, in the floor's order."""
+        stated = {} if self.coverage is None else {row.room: row.coverage for row in self.coverage.rooms}
         names = [room.name for room in self.space.rooms]
         shares = [
             self._share(
                 name,
                 self.space.unit_room == k,
                 seen,
-                coverage=told.get(name) if names.count(name) == 1 else None,
-                required=self._asked(self.space.settings.least_of_room),
+                coverage=stated.get(name) if names.count(name) == 1 else None,
+                required=self._required(self.space.settings.least_of_room),
             )
             for k, name in enumerate(names)
         ]
@@ -256,27 +298,27 @@ class _Promise:
     def kinds(self, seen: BoolArray) -> tuple[PromisedShare, ...]:
         targets, elements = self.space.targets, self.space.floor.elements
         kind = np.array([item.kind for item in elements])[targets.element[targets.unit_segment]]
-        told = {} if self.coverage is None else self.coverage.kinds
+        stated = {} if self.coverage is None else self.coverage.kinds
         return tuple(
             self._share(
                 str(name),
                 kind == name,
                 seen,
-                coverage=told[name].coverage if name in told else None,
-                required=self._asked(self.space.settings.least_of_kind),
+                coverage=stated[name].coverage if name in stated else None,
+                required=self._required(self.space.settings.least_of_kind),
             )
             for name in np.unique(kind)
         )
 
-    def _asked(self, share: float | None) -> float | None:
-        return share if self.alone else None
+    def _required(self, fraction: float | None) -> float | None:
+        return fraction if self.alone else None
 
     def missed(self, seen: BoolArray, sighted: BoolArray) -> dict[str, float]:
-        """What of the promised units was missed, by reason; `sighted` have their midpoint in sight."""
+        """Amount of promised units missed, by reason; `sighted` units have visible midpoints."""
         if self.units is None:
             return {}
-        why = GRAZED if limits_of(self.space.settings).none else NOT_AS_ASKED
-        masks = {why: self.units & ~seen & sighted, HIDDEN: self.units & ~seen & ~sighted}
+        reason = GRAZED if limits_of(self.space.settings).none else NOT_AS_ASKED
+        masks = {reason: self.units & ~seen & sighted, HIDDEN: self.units & ~seen & ~sighted}
         return {name: float(self.weight[mask].sum()) for name, mask in masks.items() if mask.any()}
 
     def _share(
@@ -297,27 +339,27 @@ class _Promise:
         return PromisedShare(name, amount(promised), kept, beyond, coverage, required)
 
 
-def _sighted(space: NavigableSpace, solids: ExtrudedFloor, stand: ScannerPose, ceiling: float) -> BoolArray:
-    """Whether a stop has each unit's midpoint in sight, at its own height or the nearest to it (units,)."""
+def _sighted(space: NavigableSpace, solids: ExtrudedFloor, pose: ScannerPose, ceiling: float) -> BoolArray:
+    """True for each unit whose midpoint the stop sees, at the scanner's height or the nearest (units,)."""
     targets, elements = space.targets, space.floor.elements
     spans = np.array([heights_of(item, ceiling) for item in elements]).reshape(-1, 2)
     low, high = spans[targets.element[targets.unit_segment]].T
-    z = np.clip(stand.place[2], low, high)
-    points = np.column_stack([targets.unit_xy - solids.origin, z]) - stand.place
+    z = np.clip(pose.position[2], low, high)
+    points = np.column_stack([targets.unit_xy - solids.origin, z]) - pose.position
     near = np.hypot(points[:, 0], points[:, 1]) <= space.settings.range + REACH_SLACK_M
     along = (targets.b - targets.a)[targets.unit_segment]
     before = along[:, 0] * points[:, 1] - along[:, 1] * points[:, 0] < 0  # the stop is left of a -> b
     wanted = near & (before | ~targets.occluding[targets.unit_segment])
-    wanted &= _in_view(space, stand, points) & _as_asked(space, points, along)
+    wanted &= _in_view(space, pose, points) & _within_limits(space, points, along)
     found = np.zeros(targets.total, dtype=bool)
     if wanted.any():
-        scene = SolidScene(solids, stand.place, see_through=False, open_door=stand.open_door)
-        found[wanted] = scene.in_sight(frozen(points[wanted]))
+        scene = SolidScene(solids, pose.position, see_through=False, open_door=pose.open_door)
+        found[wanted] = scene.unobstructed(frozen(points[wanted]))
     return found
 
 
-def _as_asked(space: NavigableSpace, points: FloatArray, along: FloatArray) -> BoolArray:
-    """Whether midpoints, told from the scanner, are steep, far and dense enough, at the scanner's height."""
+def _within_limits(space: NavigableSpace, points: FloatArray, along: FloatArray) -> BoolArray:
+    """True for midpoints, relative to the scanner, within the plan's limits at the scanner's height."""
     limits = limits_of(space.settings)
     away = np.hypot(points[:, 0], points[:, 1])
     across = np.abs(along[:, 0] * points[:, 1] - along[:, 1] * points[:, 0])
@@ -330,23 +372,23 @@ def _as_asked(space: NavigableSpace, points: FloatArray, along: FloatArray) -> B
     return good
 
 
-def _in_view(space: NavigableSpace, stand: ScannerPose, points: FloatArray) -> BoolArray:
-    """Whether points, told from the scanner, lie within its field of view."""
-    aside = np.arctan2(points[:, 1], points[:, 0]) - stand.heading
+def _in_view(space: NavigableSpace, pose: ScannerPose, points: FloatArray) -> BoolArray:
+    """True for points, relative to the scanner, within its field of view."""
+    aside = np.arctan2(points[:, 1], points[:, 0]) - pose.heading
     turned = np.abs(np.remainder(aside + np.pi, 2 * np.pi) - np.pi)
     found: BoolArray = turned <= math.radians(space.settings.fov) / 2 + 1e-9
     return found
 
 
 def _promised(coverage: Coverage, targets: Targets, floor: FloorPlan) -> BoolArray:
-    """Units that coverage.json says are seen."""
+    """True for each unit that coverage.json reports as seen."""
     promised = np.zeros(targets.total, dtype=bool)
-    told = {item.id: list(item.segments) for item in coverage.elements}
+    rows = {item.id: list(item.segments) for item in coverage.elements}
     for segment, element in enumerate(targets.element.tolist()):
         name = floor.elements[element].id
-        if not told.get(name):
+        if not rows.get(name):
             raise _other_reading(name)
-        row = told[name].pop(0)
+        row = rows[name].pop(0)
         ends = np.array([row.a, row.b]) - np.array([targets.a[segment], targets.b[segment]])
         if np.abs(ends).max() > SAME_PLACE_M:
             raise _other_reading(name)
@@ -357,4 +399,4 @@ def _promised(coverage: Coverage, targets: Targets, floor: FloorPlan) -> BoolArr
 
 
 def _other_reading(element: str) -> InputError:
-    return InputError(f"coverage.json: {element} is not where this floor has it; plan again")
+    return InputError(f"coverage.json: position of {element} differs from this floor; plan again")

@@ -1,8 +1,8 @@
-"""Two scans -> how well they register: from the error of a robot's pose, by a public library.
+"""Two scans -> registration error, starting from the error of a robot's pose, by a public library.
 
-The scanner stands level, at a known height: z, roll and pitch begin true, and the floor and the ceiling that
-both scans show hold them. Only surfaces that both show from the same side are matched, as software for
-surveyors does: else the two sides of a wall would be laid on each other.
+The scanner is level at a known height. So z, roll and pitch start without error, and the floor and ceiling
+in both scans constrain them. Only surfaces that both scans show from the same side are matched, as survey
+software does. Otherwise the two sides of a wall would be matched with each other.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ VOXEL_M = 0.075
 """Clouds are thinned to a point per cube of this size."""
 NEIGHBOURS = 15
 TURNED_M = 0.5
-"""How far apart surfaces count that are one radian apart in direction."""
+"""Distance in metres that counts as much as one radian between two surface normals."""
 SAME_M = 0.1
-"""Points of the same surface lie at most so far apart, where the poses are true."""
+"""Largest distance between points of the same surface under the true poses."""
 STAGES = ((0.35, 0.3), (0.15, 0.1))
-"""Distances in metres: within which surfaces count as shared, and within which points are matched."""
+"""Per stage, distances in metres: for shared surfaces, and for matched points."""
 LEAST_POINTS = 100
-"""Fewer shared points on upright surfaces, about 0.5 m², are no pair."""
+"""Fewest shared points on upright surfaces for a pair, about 0.5 m²."""
 FEW = 10
-"""Of so many points one is looked at first."""
+"""One of so many points is tested in a first check."""
 WEAKEST = 0.02
-"""At least this share of the shared upright surface must face in the direction that is held least."""
+"""Least fraction of the shared upright surface that must face the weakest direction."""
 UPRIGHT = 0.5
-"""Upward part of a normal up to which a surface is upright."""
+"""Largest vertical component of an upright surface's normal."""
 MOST_ITERATIONS = 60
 FINE = 1e-5
-"""Metres and radians of a step after which registration ends."""
+"""Step size in metres and radians at which registration ends."""
 GLOBAL_VOXEL_M = 0.15
-"""Of the matching without poses."""
+"""Voxel size for registration without poses."""
 
 
 @dataclass(frozen=True, eq=False)
 class OrientedCloud:
-    """A thinned cloud with the directions in which its surfaces face, from its scanner."""
+    """A thinned cloud with its surface normals, in its scanner's frame."""
 
     points: FloatArray
     """(n, 3)."""
@@ -61,7 +61,7 @@ class OrientedCloud:
         return frozen(np.abs(self.normals[:, 2]) < UPRIGHT, np.bool_)
 
     def near(self, other: OrientedCloud, there: FloatArray, within: float) -> BoolArray:
-        """Which points of `other`, placed here by `there` (4, 4), lie on surfaces of this one."""
+        """True for points of `other` that lie on surfaces of this cloud, at the pose `there` (4, 4)."""
         distance, _ = self.tree.query(other._both(there), distance_upper_bound=within)
         found: BoolArray = np.isfinite(distance)
         return found
@@ -87,7 +87,7 @@ def surface_of(cloud: FloatArray) -> OrientedCloud:
 
 @dataclass(frozen=True, eq=False)
 class Registered:
-    """A pair, and the pose of its second scan in the first as registration has it."""
+    """A pair, and the registered pose of its second scan in the first."""
 
     pair: ScanPair
     there: FloatArray
@@ -95,21 +95,21 @@ class Registered:
 
 
 def registered(
-    names: Sequence[str], places: FloatArray, surfaces: Sequence[OrientedCloud], simulation: Simulation
+    names: Sequence[str], positions: FloatArray, surfaces: Sequence[OrientedCloud], simulation: Simulation
 ) -> Iterator[Registered]:
-    """Every pair of scans that show some of the same surfaces; `places` (n, 3) are where they were taken."""
+    """Register every pair of scans with shared surfaces; `positions` (n, 3) are the scanner's."""
     for i in range(len(names)):
         for j in range(i + 1, len(names)):
-            if math.dist(places[i], places[j]) < 2 * simulation.joining_m:
-                two = _Two(surfaces[i], surfaces[j], _shift(places[j] - places[i]))
+            if math.dist(positions[i], positions[j]) < 2 * simulation.joining_m:
+                two = _CloudPair(surfaces[i], surfaces[j], _shift(positions[j] - positions[i]))
                 if two.meets and two.shared_points >= LEAST_POINTS:
                     starts = _starts(two, simulation, (i, j))
                     yield _registered((names[i], names[j]), two, starts)
 
 
 @dataclass(frozen=True, eq=False)
-class _Two:
-    """Two surfaces, and the true pose of the second in the first."""
+class _CloudPair:
+    """Two clouds, and the true pose of the second in the first."""
 
     one: OrientedCloud
     other: OrientedCloud
@@ -117,13 +117,13 @@ class _Two:
 
     @cached_property
     def shared(self) -> tuple[BoolArray, BoolArray]:
-        """Which upright points of each lie on surfaces of the other."""
+        """True for upright points of each cloud that lie on surfaces of the other."""
         one, other = _shared(self.one, self.other, self.truth, SAME_M)
         return one & self.one.upright, other & self.other.upright
 
     @property
     def meets(self) -> bool:
-        """Whether it is worth while to look: a few points tell most pairs that share nothing."""
+        """True if a few points lie on shared surfaces; this rules out most pairs quickly."""
         few = OrientedCloud(self.other.points[::FEW], self.other.normals[::FEW])
         return bool((self.one.near(few, self.truth, SAME_M) & few.upright).any())
 
@@ -138,7 +138,7 @@ class _Two:
 
     @property
     def free_deg(self) -> float | None:
-        """The direction in which next to no shared surface faces, degrees from +x."""
+        """The unconstrained direction, which almost no shared surface faces, degrees from +x, or None."""
         facing = self.one.normals[self.shared[0]][:, :2]
         weight, axes = np.linalg.eigh(facing.T @ facing / len(facing))
         if weight[0] >= WEAKEST:
@@ -163,12 +163,12 @@ class _Two:
         return there
 
     def error(self, there: FloatArray) -> tuple[float, float]:
-        """How far a pose is off the truth, metres and degrees."""
+        """Error of a pose, metres and degrees."""
         return off(np.linalg.inv(self.truth) @ there)
 
 
-def _registered(names: tuple[str, str], two: _Two, starts: Sequence[FloatArray]) -> Registered:
-    """From every start; the worst end counts."""
+def _registered(names: tuple[str, str], two: _CloudPair, starts: Sequence[FloatArray]) -> Registered:
+    """The pair registered from every start; the worst result counts."""
     ends = [two.aligned(start) for start in starts]
     errors = [two.error(end) for end in ends]
     worst = int(np.argmax([error[0] for error in errors]))
@@ -182,19 +182,19 @@ def _registered(names: tuple[str, str], two: _Two, starts: Sequence[FloatArray])
     return Registered(pair, ends[worst])
 
 
-def _starts(two: _Two, simulation: Simulation, pair: tuple[int, int]) -> list[FloatArray]:
-    """Poses that are off to one side and to the other; or what is found without any."""
+def _starts(two: _CloudPair, simulation: Simulation, pair: tuple[int, int]) -> list[FloatArray]:
+    """Start poses with an error to either side; or the pose found without a start."""
     random = np.random.default_rng([simulation.seed, *pair])
-    way, turn = random.uniform(0, 2 * math.pi), random.choice((-1.0, 1.0))
+    azimuth, turn = random.uniform(0, 2 * math.pi), random.choice((-1.0, 1.0))
     if not simulation.poses:
-        return [_without_pose(two.one.points, two.other.points, turn=way)]
+        return [_without_pose(two.one.points, two.other.points, turn=azimuth)]
     far, angle = simulation.pose_error_m, turn * math.radians(simulation.pose_error_deg)
-    aside = far * np.array([math.cos(way), math.sin(way), 0.0])
+    aside = far * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     return [_shift(side * aside) @ two.truth @ _turned(side * angle) for side in (1.0, -1.0)]
 
 
 def _without_pose(one: FloatArray, other: FloatArray, *, turn: float) -> FloatArray:
-    """Where KISS-Matcher puts the second, that was turned about the vertical by nobody knows how much."""
+    """The pose by KISS-Matcher after the second cloud was rotated about the vertical by `turn`."""
     import kiss_matcher
 
     away = _turned(turn)
@@ -211,7 +211,7 @@ def _without_pose(one: FloatArray, other: FloatArray, *, turn: float) -> FloatAr
 def _shared(
     one: OrientedCloud, other: OrientedCloud, there: FloatArray, within: float
 ) -> tuple[BoolArray, BoolArray]:
-    """Which points of each lie on surfaces of the other, that is at `there` in the first."""
+    """True for points of each cloud on surfaces of the other, whose pose in the first is `there`."""
     return other.near(one, frozen(np.linalg.inv(there)), within), one.near(other, there, within)
 
 
@@ -225,7 +225,7 @@ def _prepared(points: FloatArray) -> tuple[Any, Any]:
 
 
 def off(pose: FloatArray) -> tuple[float, float]:
-    """How far a pose (4, 4) is from none, metres and degrees."""
+    """Translation and rotation of a pose (4, 4), metres and degrees."""
     sine = np.linalg.norm(pose[[2, 0, 1], [1, 2, 0]] - pose[[1, 2, 0], [2, 0, 1]]) / 2
     angle = math.atan2(float(sine), (float(np.trace(pose[:3, :3])) - 1) / 2)
     return float(np.linalg.norm(pose[:3, 3])), math.degrees(angle)

@@ -1,4 +1,4 @@
-"""Bounds over every place against many places tried; what cells may see against what places in them see."""
+"""Bounds over every position against many positions tried; visibility of cells against positions in them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates, judged
 from stopgo.planner.geometry.shapes import local_origin, to_grid
-from stopgo.planner.selection.continuous_selection.cells import CellVisibility, PlaceCells
+from stopgo.planner.selection.continuous_selection.cells import CellVisibility, PositionCells
 from stopgo.planner.selection.cover import cover_of
 from stopgo.planner.selection.demands import Demands, demands_of
 from stopgo.planner.space.navigable import navigable
@@ -26,7 +26,7 @@ from tests.faults.sizes import size
 from tests.planner.worlds import column, hall, two_rooms
 
 ANYWHERE = Settings(selector="anywhere", grid=2.0, range=4, d_dis=0.2)
-"""Few candidates, so that places between them see more."""
+"""Few candidates, so that positions between them see more."""
 
 
 def small_floor(seed: int) -> FloorPlan:
@@ -40,7 +40,7 @@ def small_floor(seed: int) -> FloorPlan:
 
 
 def places_in(found: Candidates, count: int, seed: int) -> Candidates:
-    """Places drawn at random where a stop may be."""
+    """Allowed positions, drawn at random."""
     space = found.space
     xy = np.random.default_rng(seed).uniform(0, 9, size=(count, 2))
     place = StopFeasibility(space)
@@ -48,15 +48,15 @@ def places_in(found: Candidates, count: int, seed: int) -> Candidates:
     return judged(space, xy, room, part=found.chosen_part)
 
 
-def holding(cells: PlaceCells, seen: Visibility, row: int) -> IntArray:
-    """The cells that the place of this row lies in."""
+def holding(cells: PositionCells, seen: Visibility, row: int) -> IntArray:
+    """The cells that contain the position of this row."""
     candidates = seen.candidates
     at = to_grid(candidates.xy[candidates.kept[row]] - local_origin(candidates.space.floor))
     inside = (cells.corner <= at) & (at <= cells.corner + cells.side[:, None])
     return np.flatnonzero(inside.all(axis=1))
 
 
-def units_of(cells: PlaceCells, cell: int, units: int) -> BoolArray:
+def units_of(cells: PositionCells, cell: int, units: int) -> BoolArray:
     found = np.zeros(units, dtype=bool)
     for run in range(cells.pointer[cell], cells.pointer[cell + 1]):
         found[cells.first[run] : cells.last[run] + 1] = True
@@ -69,15 +69,15 @@ def test_a_cell_sees_all_that_places_in_it_see(seed: int, limits: dict[str, floa
     settings = replace(ANYWHERE, **limits)  # type: ignore[arg-type]
     found = candidates(navigable(small_floor(seed), settings))
     seen = visibility(places_in(found, size(short=80, full=300), seed))
-    overlook = CellVisibility(found)
-    cells = overlook.whole()
+    cell_visibility = CellVisibility(found)
+    cells = cell_visibility.all_cells()
     for _ in range(size(short=2, full=4)):
         for row in range(seen.rows):
             cell = holding(cells, seen, row)
             assert len(cell), "every place where a stop may be lies in a cell"
             for number in cell:
                 assert units_of(cells, int(number), seen.targets.total)[seen.seen_by(row)].all()
-        cells = overlook.cut(cells)
+        cells = cell_visibility.cut(cells)
 
 
 @pytest.mark.parametrize("seed", range(size(short=3, full=30)))
@@ -98,7 +98,7 @@ def test_no_choice_of_many_places_beats_the_bound(seed: int) -> None:
 
 
 def meets(tried: Visibility, rows: tuple[int, ...], demands: Demands, needed: IntArray) -> bool:
-    """True if these positions see the required units."""
+    """True if these positions meet the demands."""
     got = np.zeros(tried.targets.total, dtype=bool)
     for row in rows:
         got[tried.seen_by(row)] = True
@@ -124,7 +124,7 @@ def test_one_stop_is_proved_fewest_of_all_places() -> None:
     [({"overlap": 0.1}, "overlap = 0.1"), ({"views": 2}, "views = 2"), ({"fov": 90.0}, "fov = 90")],
 )
 def test_what_cells_do_not_know_is_refused(other: dict[str, float], told: str) -> None:
-    with pytest.raises(InputError, match=f"selector = anywhere: is not done with {told}"):
+    with pytest.raises(InputError, match=f"selector = anywhere: not possible with {told}"):
         plan(hall(6, 4), replace(ANYWHERE, **other))  # type: ignore[arg-type]
 
 

@@ -1,4 +1,4 @@
-"""Stops shared out among robots and tours, against every way of sharing them out on small floors."""
+"""Stops divided among robots and tours, compared with every division on small floors."""
 
 from __future__ import annotations
 
@@ -225,7 +225,7 @@ def test_what_cannot_be_shared_out_is_refused(changes: dict[str, Any], told: str
 
 
 def test_more_robots_than_stops_are_refused() -> None:
-    with pytest.raises(InputError, match=r"robots = 50: the floor takes \d+ stops"):
+    with pytest.raises(InputError, match=r"robots = 50: more than the plan's \d+ stops"):
         settled("hall", robots=50)
 
 

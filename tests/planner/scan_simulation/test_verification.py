@@ -1,4 +1,4 @@
-"""Proof by simulation: what is counted on small floors, what is caught, and what of it registers."""
+"""Verification by simulation: counts on small floors, false claims, and registration."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.planner import plan
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
-from stopgo.planner.scan_simulation.proving import prove
-from stopgo.planner.scan_simulation.registering import off, registered, surface_of
+from stopgo.planner.scan_simulation.registration import off, registered, surface_of
 from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
 from stopgo.planner.scan_simulation.strips import strips_of
+from stopgo.planner.scan_simulation.verification import verify
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, column, element, hall, two_rooms
 
@@ -32,13 +32,13 @@ COARSE = Simulation(range_m=10.0, step_deg=0.2)
 COARSEST = Simulation(range_m=10.0, step_deg=0.5)
 
 
-def proved(floor: FloorPlan, settings: Settings, simulation: Simulation = COARSE) -> PlanProof:
-    """The proof of a floor's own plan."""
+def verified(floor: FloorPlan, settings: Settings, simulation: Simulation = COARSE) -> PlanProof:
+    """The verification of a floor's own plan."""
     import msgspec
 
     made = plan(floor, settings)
     told = msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
-    return prove(made.mission, made.space, replace(simulation, range_m=settings.range), told)
+    return verify(made.mission, made.space, replace(simulation, range_m=settings.range), told)
 
 
 def test_rays_meet_what_they_must_where_it_is() -> None:
@@ -47,8 +47,8 @@ def test_rays_meet_what_they_must_where_it_is() -> None:
     scene = SolidScene(solids, place, see_through=False, open_door=NONE)
     corners = np.array([(3, 0, 0.2), (-3, 0, 0.2), (0, 2, -0.2), (0, -2, 0.2), (0, 0.5, 1.5), (0.5, 0, -1)])
     inward = corners * (1 - 1e-3)
-    assert scene.in_sight(inward).all()
-    assert not scene.in_sight(corners * 1.05).any(), "nothing beyond walls, floor and ceiling"
+    assert scene.unobstructed(inward).all()
+    assert not scene.unobstructed(corners * 1.05).any(), "nothing beyond walls, floor and ceiling"
 
 
 def test_points_on_a_wall_are_as_many_as_its_angle_has_rays() -> None:
@@ -71,7 +71,7 @@ def test_points_on_a_wall_are_as_many_as_its_angle_has_rays() -> None:
 
 
 def test_every_target_of_a_hall_is_acquired_from_its_middle() -> None:
-    proof = proved(hall(3, 2), Settings(range=10.0))
+    proof = verified(hall(3, 2), Settings(range=10.0))
     assert proof.met
     assert proof.whole.kept == pytest.approx(10.0)
     assert proof.quality.seen_m2 == pytest.approx(10.0 * 2.7)
@@ -81,7 +81,7 @@ def test_every_target_of_a_hall_is_acquired_from_its_middle() -> None:
 def test_what_stops_claim_is_in_sight_one_by_one() -> None:
     """By another program's rays: the plan's own sight has no part in it."""
     floor = two_rooms(0.9, more=[column("c1", 2.2, 1.0), column("c2", 6.1, 2.9)])
-    proof = proved(floor, Settings(range=4.0), COARSEST)
+    proof = verified(floor, Settings(range=4.0), COARSEST)
     for stop in proof.stops:
         assert abs(stop.sighted - stop.claimed) <= 1, "at most one sight line that touches a corner"
 
@@ -90,7 +90,7 @@ def test_a_stop_that_was_moved_is_caught() -> None:
     made = plan(two_rooms(0.9), Settings(range=3.0))
     first, *others = made.mission.stops
     lying = changed(made.mission, stops=(changed(first, x=0.8, y=0.8), *others))
-    proof = prove(lying, made.space, replace(COARSEST, range_m=3.0), None)
+    proof = verify(lying, made.space, replace(COARSEST, range_m=3.0), None)
     assert not proof.met
     assert any(first.id in line for line in proof.unmet)
 
@@ -100,7 +100,7 @@ def test_a_stop_that_was_removed_is_caught() -> None:
     made = plan(floor, Settings(range=4.0))
     told = coverage_of(made)
     lying = changed(made.mission, stops=made.mission.stops[:-1])
-    proof = prove(lying, made.space, replace(COARSEST, range_m=4.0), told)
+    proof = verify(lying, made.space, replace(COARSEST, range_m=4.0), told)
     assert not proof.met
     assert "coverage" in proof.unmet[0]
     assert sum(proof.missed.values()) > 1.0
@@ -109,7 +109,7 @@ def test_a_stop_that_was_removed_is_caught() -> None:
 def test_of_one_mission_of_several_no_share_is_asked_that_is_asked_of_all() -> None:
     made = plan(hall(3, 2), Settings(range=10.0))
     share = changed(made.mission, share=MissionShare(kind="robot", number=1, of=2))
-    alone, one_of_two = (prove(item, made.space, COARSEST, None) for item in (made.mission, share))
+    alone, one_of_two = (verify(item, made.space, COARSEST, None) for item in (made.mission, share))
     assert all(item.required for item in (*alone.rooms[:1], *alone.kinds))
     assert not any(item.required for item in (one_of_two.whole, *one_of_two.rooms, *one_of_two.kinds))
     assert network_words(one_of_two)[0].startswith("of this mission, one of 2, all scans are connected")
@@ -118,13 +118,13 @@ def test_of_one_mission_of_several_no_share_is_asked_that_is_asked_of_all() -> N
 def test_a_mission_without_stops_is_no() -> None:
     made = plan(hall(), Settings())
     with pytest.raises(NegativeResult, match="no stops"):
-        prove(changed(made.mission, stops=()), made.space, COARSE, None)
+        verify(changed(made.mission, stops=()), made.space, COARSE, None)
 
 
 def test_beams_are_seen_from_below_and_windows_seen_through() -> None:
     beam = element("beam", "beams", box(2.0, 0.0, 2.3, 4.0))
     pane = element("pane", "windows", box(4.0, 1.0, 4.05, 3.0))
-    proof = proved(
+    proof = verified(
         hall(6, 4, beam, pane), Settings(range=10.0, targets=("walls", "beams", "windows")), COARSE
     )
     by_kind = {share.name: share for share in proof.kinds}
@@ -135,7 +135,7 @@ def test_beams_are_seen_from_below_and_windows_seen_through() -> None:
 
 def test_closed_doors_stop_rays_except_from_the_doorway() -> None:
     settings = Settings(range=10.0, doors="closed", door_scan=True)
-    proof = proved(two_rooms(0.9), settings, COARSEST)
+    proof = verified(two_rooms(0.9), settings, COARSEST)
     assert not [stop for stop in proof.stops if stop.short]
     shut = {stop.stop: stop for stop in proof.stops}
     doorway = next(stop.id for stop in proof.mission.stops if stop.doorway)
@@ -143,7 +143,7 @@ def test_closed_doors_stop_rays_except_from_the_doorway() -> None:
 
 
 def test_the_same_seed_gives_the_same_proof() -> None:
-    one, other = (proved(hall(6, 4, column("c", 2, 2)), Settings(range=3.0), COARSEST) for _ in range(2))
+    one, other = (verified(hall(6, 4, column("c", 2, 2)), Settings(range=3.0), COARSEST) for _ in range(2))
     assert one.network == other.network
     assert all(np.array_equal(a.xyz, b.xyz) for a, b in zip(one.clouds, other.clouds, strict=True))
 
@@ -233,8 +233,8 @@ def test_limits_are_held_by_what_was_measured() -> None:
     """A scanner half as fine as planned makes points twice as far apart: too far."""
     settings = Settings(range=6.0, angular_step=0.4, density=25.0, max_incidence=60.0)
     simulation = replace(COARSEST, step_deg=0.4)
-    assert proved(hall(4, 3), settings, simulation).met
-    coarser = proved(hall(4, 3), settings, replace(simulation, step_deg=0.8))
+    assert verified(hall(4, 3), settings, simulation).met
+    coarser = verified(hall(4, 3), settings, replace(simulation, step_deg=0.8))
     assert not coarser.met
     assert coarser.whole.missed > 1.0
 
@@ -247,5 +247,5 @@ def test_a_pair_that_is_to_register_and_does_not_is_caught() -> None:
     promised = (Overlap(a=names[0], b=names[-1], common_m=3.0, share=0.2, hold_m=1.0),)
     lying = changed(made.mission, network=promised)
     simulation = replace(COARSEST, range_m=3.0, joining_m=1.0)
-    proof = prove(lying, made.space, simulation, None)
+    proof = verify(lying, made.space, simulation, None)
     assert f"{names[0]} and {names[-1]}: planned to register, but do not" in proof.unmet

@@ -1,4 +1,4 @@
-"""A mission's file and its floor's -> the proof: what is read, taken for granted, and where it is written."""
+"""Mission file + floor file -> verification result, with its assumptions and its output files."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from stopgo.mission.files.coverage_json import Coverage, read_coverage
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.proof.plan_proof import PlanProof, Simulation
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, planned_floor
-from stopgo.planner.scan_simulation.proving import prove
+from stopgo.planner.scan_simulation.verification import verify
 
 NAMES = {"recording": "proof.rrd", "page": "proof.html", "proof": "proof.json"}
-"""A proof's files in the order in which they appear."""
+"""The result's files in the order in which they are written."""
 
 
-def proof_files(folder: Path, mission: Path) -> dict[str, Path]:
-    """Where the proof of a mission is written: of mission-2.json as proof-2.json and so on."""
+def verification_files(folder: Path, mission: Path) -> dict[str, Path]:
+    """Paths of a mission's verification files: proof-2.json for mission-2.json, and so on."""
     part = _part_of(mission)
     paths = {key: folder / name for key, name in NAMES.items()}
     return {key: path.with_name(f"{path.stem}{part}{path.suffix}") for key, path in paths.items()}
 
 
 def _part_of(mission: Path) -> str:
-    """What a mission's file adds to the name; of a file of another name, that name."""
+    """Suffix of a mission's file name; for a file of another name, that whole name."""
     stem = mission.stem
     return stem.removeprefix("mission") if stem.startswith("mission") else f"-{stem}"
 
 
-def prove_file(
+def verify_file(
     path: Path,
     floor: Path,
     coverage: Path | None,
@@ -43,16 +43,16 @@ def prove_file(
     say: Callable[[str], None] = lambda line: None,
     warn: Callable[[str], None] = lambda line: None,
 ) -> tuple[PlanProof, PlannedFloor]:
-    """The proof of a mission's file, and the floor it is about; `assumed` are fields of Simulation.
+    """Verify a mission's file by simulation; `assumed` are fields of Simulation.
 
-    `say` is told how far it is, `warn` what makes it prove less.
+    Returns the result and the floor. `say` receives progress, `warn` each reason for a weaker result.
 
     Raises
     ------
     NegativeResult
-        When the mission makes no sense, or has no stops.
+        If the mission is invalid or has no stops.
     InputError
-        When a file cannot be read, or the floor or coverage.json is another mission's.
+        If a file cannot be read, or the floor or coverage.json belongs to another mission.
     """
     mission = read(path)
     for problem in problems_of(mission)[:1]:
@@ -64,14 +64,14 @@ def prove_file(
         simulation = replace(simulation, ceiling_known=False)
     if simulation.height_m >= simulation.ceiling_m:
         raise InputError(
-            f"--height {simulation.height_m:g}: the scanner must be below the ceiling at "
-            f"{simulation.ceiling_m:g} m; give --ceiling"
+            f"--height {simulation.height_m:g}: not below the ceiling at "
+            f"{simulation.ceiling_m:g} m; lower the scanner or give --ceiling"
         )
-    return prove(mission, planned.space, simulation, _coverage(path, coverage, mission, warn), say), planned
+    return verify(mission, planned.space, simulation, _coverage(path, coverage, mission, warn), say), planned
 
 
 def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
-    """With what the plan's settings tell of the scanner, and the floor's model of the ceiling."""
+    """The simulation with the scanner of the plan's settings and the ceiling of the floor's model."""
     settings, ceiling = planned.settings, planned.floor.ceiling_m
     known: dict[str, Any] = {
         "step_deg": settings.angular_step,
@@ -90,14 +90,14 @@ def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
 def _coverage(
     path: Path, given: Path | None, mission: Mission, warn: Callable[[str], None]
 ) -> Coverage | None:
-    """The coverage.json that is given; else the one beside the mission, if it is the mission's and whole."""
+    """The given coverage.json; else the one next to the mission, if it is valid and belongs to it."""
     if given is not None:
         return read_coverage(given, mission)
-    beside = path.with_name(f"coverage{_part_of(path)}.json")
-    if not beside.is_file():
+    found = path.with_name(f"coverage{_part_of(path)}.json")
+    if not found.is_file():
         return None
     try:
-        return read_coverage(beside, mission)
+        return read_coverage(found, mission)
     except InputError as error:
-        warn(f"{error}; without it only the mission's counts are held against the scans")
+        warn(f"{error}; only the mission's counts are compared with the scans")
         return None

@@ -1,4 +1,4 @@
-"""Selections that hang together: against every subset of small floors, and what parts them."""
+"""Connected selections, compared with every subset of small floors; and their separators."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from stopgo.mission.geometry import IntArray
 from stopgo.mission.settings import Settings
 from stopgo.planner.selection import EXACT_ROUNDS, ROUNDS, Searches
 from stopgo.planner.selection.bound import lower_bound
-from stopgo.planner.selection.connected_selection import JoinedCover, connected
+from stopgo.planner.selection.connected_selection import ConnectedCover, connected
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.separators import meets, pieces_of
+from stopgo.planner.selection.separators import components_of, meets
 from tests.faults.sizes import size
 
 EXACT = Settings(selector="exact")
@@ -22,8 +22,8 @@ EXACT = Settings(selector="exact")
 
 def task_of(
     seed: int, *, rows: int = 8, columns: int = 14, near: float = 0.42, share: float = 0.8
-) -> JoinedCover:
-    """Rows at random places; each sees some columns, and registers with what is near."""
+) -> ConnectedCover:
+    """Rows at random positions; each sees some columns and registers with the rows near it."""
     rng = np.random.default_rng(seed)
     xy, at = rng.random((rows, 2)), rng.random((columns, 2))
     sees = csr_array((np.hypot(*(xy[:, None] - at[None]).transpose(2, 0, 1)) < 0.35).astype(np.int64))
@@ -31,12 +31,12 @@ def task_of(
     links = csr_array(((apart < near) & (apart > 0)).astype(np.int64))
     weight = rng.integers(1, 9, columns)
     visible = int(weight[np.asarray(sees.sum(axis=0)).ravel() > 0].sum())
-    return JoinedCover(Cover.of_whole(sees, weight, int(0.8 * visible)), links, np.arange(rows))
+    return ConnectedCover(Cover.of_whole(sees, weight, int(0.8 * visible)), links, np.arange(rows))
 
 
-def fewest(task: JoinedCover) -> int:
-    """Rows of the smallest of all subsets that see enough and hang together on each ground."""
-    offered = np.sort(np.concatenate([np.empty(0, np.int64), *task.grounds]))
+def fewest(task: ConnectedCover) -> int:
+    """Size of the smallest of all subsets that meet every demand and are connected in each region."""
+    offered = np.sort(np.concatenate([np.empty(0, np.int64), *task.regions]))
     for many in range(len(offered) + 1):
         for chosen in combinations(offered.tolist(), many):
             rows = np.array(chosen, dtype=np.int64)
@@ -63,24 +63,24 @@ def test_two_rooms_take_the_row_between_them() -> None:
     """Rows 0 and 2 see everything; only row 1, which sees nothing new, registers with both."""
     sees = csr_array(np.array([[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1]]))
     links = csr_array(np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]]))
-    task = JoinedCover(Cover.of_whole(sees, np.ones(4, np.int64), 4), links, np.arange(3))
+    task = ConnectedCover(Cover.of_whole(sees, np.ones(4, np.int64), 4), links, np.arange(3))
     rows, _ = connected(task, Searches.default(Settings()), rounds=ROUNDS)
     assert rows.tolist() == [0, 1, 2]
     assert lower_bound(task.problem, found=3) == 3
 
 
-def test_what_nothing_joins_stays_in_as_few_pieces_as_needed() -> None:
-    """Row 2 sees what row 3 does; only row 3 registers with nobody, so it is not taken."""
+def test_rows_without_links_stay_in_as_few_components_as_needed() -> None:
+    """Row 2 sees the same as row 3. Row 3 registers with no row, so it is not chosen."""
     sees = csr_array(np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]]))
     links = np.zeros((4, 4), np.int64)
     links[[0, 1, 1, 2], [1, 0, 2, 1]] = 1
-    task = JoinedCover(Cover.of_whole(sees, np.ones(3, np.int64), 3), csr_array(links), np.arange(4))
+    task = ConnectedCover(Cover.of_whole(sees, np.ones(3, np.int64), 3), csr_array(links), np.arange(4))
     rows, _ = connected(task, Searches.default(Settings()), rounds=ROUNDS)
     assert rows.tolist() == [0, 1, 2]
-    assert len(pieces_of(task.links, rows)) == 1
+    assert len(components_of(task.links, rows)) == 1
 
 
-def test_pieces_are_told_apart_by_links() -> None:
+def test_components_follow_from_links() -> None:
     links = csr_array(np.array([[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]))
     rows: IntArray = np.array([3, 1, 0])
-    assert [piece.tolist() for piece in pieces_of(links, rows)] == [[0, 1], [3]]
+    assert [component.tolist() for component in components_of(links, rows)] == [[0, 1], [3]]

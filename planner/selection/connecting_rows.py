@@ -1,0 +1,53 @@
+"""Separate components -> the fewest rows that connect two or more of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from stopgo.mission.geometry import IntArray
+
+
+def connecting_rows(
+    links: csr_array, region: IntArray, components: list[IntArray], gain: IntArray
+) -> IntArray:
+    """The row of a region that connects most of its components; if none connects two, the shortest path.
+
+    Of rows that connect as many, it is the one with the largest coverage `gain` (rows,).
+    """
+    members = np.concatenate(components)
+    component = np.repeat(np.arange(len(components)), [len(one) for one in components])
+    shape = (links.shape[0], len(components))
+    belongs = csr_array((np.ones(len(members), np.int64), (members, component)), shape=shape)
+    joins = np.diff((links @ belongs).tocsr().indptr)[region]
+    most = int(joins.max())
+    if most < 2:
+        return _shortest_path(links, region, members, component)
+    alike = region[joins == most]
+    return alike[[int(np.argmax(gain[alike]))]]
+
+
+def _shortest_path(links: csr_array, region: IntArray, members: IntArray, component: IntArray) -> IntArray:
+    """The fewest rows of a region that lead from one component to another."""
+    inside = links[region][:, region]
+    start = np.searchsorted(region, members)
+    steps, before, source = dijkstra(
+        inside, directed=False, indices=start, unweighted=True, min_only=True, return_predecessors=True
+    )
+    of = np.full(len(region), -1, dtype=np.int64)
+    of[start] = component
+    a, b = inside.tocoo().coords
+    across = of[source[a]] != of[source[b]]
+    a, b = a[across], b[across]
+    k = int(np.argmin(steps[a] + steps[b]))
+    path = [row for end in (a[k], b[k]) for row in _traced(int(end), before)]
+    return np.setdiff1d(region[path], members)
+
+
+def _traced(row: int, before: IntArray) -> list[int]:
+    """A row and its predecessors, back to a component."""
+    path = [row]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return path
