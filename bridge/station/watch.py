@@ -12,7 +12,7 @@ import msgspec
 
 from stopgo.bridge.station.finished_run import past_reports
 from stopgo.bridge.station.follow import Followed, Silence
-from stopgo.bridge.station.record import Past
+from stopgo.bridge.station.logged_run import LoggedReport
 from stopgo.bridge.station.station import Station
 from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.comparing.spans import stood_s
@@ -43,7 +43,7 @@ LOST_S = 3.0
 LAST_EVENTS = 8
 
 
-class Showing(Protocol):
+class RunDisplay(Protocol):
     """How a person sees the run."""
 
     def mission(self, mission: Mission) -> None: ...
@@ -53,11 +53,11 @@ class Showing(Protocol):
 
 def watch_run(station: Station, record: RunSink | None, *, say: Callable[[str], None]) -> StateReport:
     """Follow the run to its end, told line by line, and return the last state."""
-    return watch_showing(station, record, Lines(say))
+    return watch_with(station, record, EventLines(say))
 
 
-def watch_showing(
-    station: Station, record: RunSink | None, showing: Showing, *, run_id: str | None = None
+def watch_with(
+    station: Station, record: RunSink | None, display: RunDisplay, *, run_id: str | None = None
 ) -> StateReport:
     """Follow the run to its end, or tell one that is over once more, and return the last state.
 
@@ -74,13 +74,13 @@ def watch_showing(
         plan = _plan_of(report)
         if plan is not None and plan != known:
             known = plan
-            mission = _introduced(station, report, record, showing)
+            mission = _introduced(station, report, record, display)
             missions[mission.id, mission.revision] = mission
         if isinstance(report, StateReport):
             state = report
         if record is not None:
             hand_over(record, report)
-        showing.show(report)
+        display.show(report)
     if state is None:
         raise OutcomeUnknown(f"{station.keys.robot}: the run ended and no state was heard")
     return state
@@ -91,15 +91,15 @@ def _plan_of(report: Followed) -> tuple[str | None, int | None] | None:
 
     Events tell of every revision in turn; a state may come when two have passed.
     """
-    if isinstance(report, PoseReport | Silence | PosesMissing | Past) or not report.run_id:
+    if isinstance(report, PoseReport | Silence | PosesMissing | LoggedReport) or not report.run_id:
         return None
     return report.run_id, report.revision
 
 
-def _introduced(station: Station, report: Any, record: RunSink | None, showing: Showing) -> Mission:
+def _introduced(station: Station, report: Any, record: RunSink | None, display: RunDisplay) -> Mission:
     """Fetch the mission that is run, so that it can be drawn and counted down."""
     mission = station.mission(report.mission_id or "", report.revision or 0)
-    showing.mission(mission)
+    display.mission(mission)
     if record is not None:
         record.mission(mission)
     return mission
@@ -113,14 +113,14 @@ def hand_over(record: RunSink, report: Followed) -> None:
         record.pose(report)
     elif isinstance(report, PosesMissing):
         record.missing(report)
-    elif isinstance(report, Past):
+    elif isinstance(report, LoggedReport):
         past = report.report
         record.health(past) if isinstance(past, Health) else record.state(past)
     elif not isinstance(report, Silence):
         record.event(report)
 
 
-class Lines:
+class EventLines:
     """One line for every event, for a log or a pipe; one when the link is lost, and one when it is back."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -146,7 +146,7 @@ class Lines:
             self._greeted = True
         elif isinstance(report, PosesMissing):
             self._say(missing_line(report))
-        elif not isinstance(report, PoseReport | Past):
+        elif not isinstance(report, PoseReport | LoggedReport):
             self._say(event_line(report, self._stops))
             if isinstance(report, Held):
                 self._say(HINT)
@@ -172,7 +172,7 @@ class EventObjects:
     def show(self, report: Followed) -> None:
         if isinstance(report, PosesMissing):
             self._write({"missing": msgspec.to_builtins(report)})
-        elif not isinstance(report, StateReport | PoseReport | Silence | Past):
+        elif not isinstance(report, StateReport | PoseReport | Silence | LoggedReport):
             beside = scanned_beside(report, self._stops.get(getattr(report, "stop", "")))
             self._write(msgspec.to_builtins(report) | ({"beside": beside} if beside else {}))
 
@@ -181,7 +181,7 @@ _WAITED_FOR = [f"stopgo {verb}" for verb, places in STATES.items() if "HELD" in 
 HINT = f"{'':11} held: the robot waits for {', '.join(_WAITED_FOR[:-1])} or {_WAITED_FOR[-1]}"
 
 
-class Table:
+class RunTable:
     """A table that is drawn anew in place, for a terminal."""
 
     def __init__(self, write: Callable[[str], object] = sys.stderr.write) -> None:
@@ -206,7 +206,7 @@ class Table:
             self._pose = report
         elif isinstance(report, PosesMissing):
             self._missing = missing_line(report)
-        elif not isinstance(report, Silence | Past):
+        elif not isinstance(report, Silence | LoggedReport):
             self._events.append(report)
         if time.monotonic() >= self._next or not isinstance(report, PoseReport):
             self._next = time.monotonic() + REDRAW_S
