@@ -198,7 +198,7 @@ def robot_verdicts(bench: RobotBench, *, drive: bool) -> Iterator[ConformVerdict
         ) from None
     gone = False
     for verdict in tried(REQUIREMENTS, bench, drive=drive, undrivable="the robot would drive: --drive"):
-        gone |= verdict.gone
+        gone |= verdict.lost
         yield verdict
     if not gone and held is not None:
         last = Requirement[RobotBench](

@@ -308,7 +308,7 @@ class RobotBench:
 
     # Rest
 
-    def check_in(self, *, may_drive: bool) -> None:
+    def return_to_rest(self, *, may_drive: bool) -> None:
         state = self._state_or_gone()
         if state.state in OVER:
             return

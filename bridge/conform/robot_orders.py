@@ -150,8 +150,8 @@ def taking_over_is_recorded(bench: RobotBench) -> None:
 
 
 ORDERS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement("Orders", text, find_out)
-    for text, find_out in (
+    Requirement("Orders", text, test)
+    for text, test in (
         ("READY: every order but `start` is `wrong_state`", ready_refuses),
         ("the same order again gets the stored answer", an_answer_is_stored),
         ("another order under a used id: `id_reused`", an_id_is_for_one_order),

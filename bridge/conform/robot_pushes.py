@@ -197,8 +197,8 @@ def a_commit_undoes_no_later_one(bench: RobotBench) -> None:
 
 
 PUSHES: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement("Pushing a mission", text, find_out)
-    for text, find_out in (
+    Requirement("Pushing a mission", text, test)
+    for text, test in (
         ("chunks may come in any order", pieces_come_in_any_order),
         ("a chunk may come twice", pieces_may_come_twice),
         ("`begin` tells which chunks are held", begin_tells_what_is_held),

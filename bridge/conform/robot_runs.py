@@ -292,8 +292,8 @@ def poses_tell_run_and_boot(bench: RobotBench) -> None:
 
 
 RUNS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement(section, text, find_out, drives=True)
-    for section, text, find_out in (
+    Requirement(section, text, test, drives=True)
+    for section, text, test in (
         ("Orders", "a start late, fenced or meant otherwise does not drive", a_late_start_does_not_drive),
         ("Orders", "a start away from the mission's: `not_at_start`", a_start_from_elsewhere_is_refused),
         ("States of a run", "a run goes stop by stop to FINISHED", a_run_goes_to_its_end),

@@ -73,8 +73,8 @@ def what_is_published_is_sealed(bench: RobotBench) -> None:
 
 
 SEALS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement("Seals", text, find_out)
-    for text, find_out in (
+    Requirement("Seals", text, test)
+    for text, test in (
         ("a question without a seal: `untrusted`", unsigned_is_untrusted),
         ("a wrong signature: `untrusted`", wrong_signatures_are_untrusted),
         ("a seal counts on its own key only", seals_are_for_one_key),

@@ -181,7 +181,7 @@ class StationBench:
         if not self.robot.controller.run.over:
             self.gives("abort")
 
-    def check_in(self, *, may_drive: bool) -> None:
+    def return_to_rest(self, *, may_drive: bool) -> None:
         self.at_rest()
         self.link.meddle, self.link.withhold = plainly, everything
         self.free_lease()

@@ -345,8 +345,8 @@ def forged_answers_are_not_believed(bench: StationBench) -> None:
 
 
 STATION_REQUIREMENTS: tuple[Requirement[StationBench], ...] = tuple(
-    Requirement(section, text, find_out)
-    for section, text, find_out in (
+    Requirement(section, text, test)
+    for section, text, test in (
         ("Orders", "an order names boot, clock and state as told", an_order_is_for_one_boot_and_state),
         ("Orders", "an answer lost: the same order again, under its id", an_order_is_repeated_under_its_id),
         ("Orders", "no answer: told as unknown, one id", silence_is_unknown),

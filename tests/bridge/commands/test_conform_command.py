@@ -25,7 +25,7 @@ def test_a_robot_with_keys_meets_what_can_be_tried_at_rest(tmp_path: Path) -> No
         told = json.loads(done.stdout)
         assert done.returncode == 0, [one for one in told["requirements"] if one["outcome"] == "failed"]
         assert told["counts"]["failed"] == 0
-        assert done.stderr == "r1 will not drive; what needs that is left out (--drive)\n"
+        assert done.stderr == "r1: will not drive, requirements that need it are not tested; add --drive\n"
         untried = {one["reason"] for one in told["requirements"] if one["outcome"] == "not tried"}
         assert untried == {
             "the robot would drive: --drive",

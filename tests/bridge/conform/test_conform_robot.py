@@ -363,7 +363,7 @@ def test_a_robot_that_stops_answering_is_told_as_gone_and_left_alone() -> None:
         bench = robot.bench()
         robot.board.cut = True
         found = list(tried(REQUIREMENTS[:3], bench))
-    assert [verdict.gone for verdict in found] == [True, False, False]
+    assert [verdict.lost for verdict in found] == [True, False, False]
     assert [verdict.outcome for verdict in found] == ["failed", "not tried", "not tried"]
     assert "answers no more" in found[-1].reason
 
