@@ -58,6 +58,4 @@ def read_events(reply: bytes, *, since: int, robot: str) -> PastEvents:
 
 
 def _unknown(robot: str, what: str, why: str) -> OutcomeUnknown:
-    return OutcomeUnknown(
-        f"{robot}: unknown answer ({what}: {why}); update the older stopgo"
-    )
+    return OutcomeUnknown(f"{robot}: unknown answer ({what}: {why}); update the older stopgo")

@@ -93,7 +93,7 @@ def test_a_bad_file_is_told_in_one_line(content: str, said: str, capsys: pytest.
 def test_an_order_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
     Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
     assert main(["pause", "--timeout", "0.1"]) == 2
-    assert "tcp/127.0.0.1:1: robot r7 did not show itself" in capsys.readouterr().err
+    assert "tcp/127.0.0.1:1: robot r7 not found" in capsys.readouterr().err
 
 
 def test_doctor_tells_of_everything_and_ends_with_1_if_something_is_wrong(

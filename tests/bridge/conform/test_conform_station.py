@@ -47,7 +47,7 @@ def test_our_own_station_with_keys_meets_what_is_said_of_seals(tmp_path: Path) -
 
 
 class NewIdEachTime(Station):
-    def _insist(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
+    def _ask_repeatedly(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
         for _ in range(3):
             if "/cmd/" in key:
                 payload = encode({**json.loads(payload), "cmd_id": uuid.uuid4().hex})
@@ -95,7 +95,7 @@ class NeverLooksBack(Station):
 
 
 class NewNonceEachTime(NewIdEachTime):
-    def _insist(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
+    def _ask_repeatedly(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
         for _ in range(3):
             if key.endswith("/commit"):
                 payload = encode({**json.loads(payload), "nonce": uuid.uuid4().hex})
@@ -114,8 +114,8 @@ class ReadsInfoStrictly(Station):
 
 
 class SeesOneOfTwo(Station):
-    def _one_of(self, replies: list[bytes], what: str) -> Info | None:
-        return super()._one_of(replies[-1:], what)
+    def _only_info(self, replies: list[bytes], what: str) -> Info | None:
+        return super()._only_info(replies[-1:], what)
 
 
 class LeavesGaps(Station):

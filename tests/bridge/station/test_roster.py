@@ -65,7 +65,7 @@ def test_a_robot_that_shows_itself_and_does_not_answer_is_silent(
         1,
         [("r1", False), ("r2", True)],
     )
-    assert "found, but no state of r2 was received" in robots[1]["trouble"]
+    assert "found, but r2: no state received within" in robots[1]["trouble"]
 
 
 def test_a_roster_says_who_is_missed(

@@ -97,7 +97,7 @@ def test_the_table_names_stop_state_battery_link_and_time() -> None:
         "RUNNING  s1 SCANNING",
         "0 done, 0 skipped of 3",
         "100%",
-        "no word for 4 s",
+        "no data for 4 s",
         "left as planned",
     ):
         assert said in lines
@@ -131,9 +131,9 @@ def test_lines_tell_a_lost_link_once_and_its_return_once() -> None:
     lines = EventLines(said.append)
     for seconds in (1.0, 2.0, 3.0, 4.0, 5.0, 29.0):
         lines.show(Silence(seconds=seconds))
-    assert said == ["no word for 3 s; asking until it is heard again"]
+    assert said == ["no data for 3 s; retrying"]
     lines.show(Field().report())
-    assert said[1:] == ["heard again after 29 s", "r1 is IDLE; waiting for a run"]
+    assert said[1:] == ["data again after 29 s", "r1 is IDLE; waiting for a run"]
     lines.show(Silence(seconds=1.0))
     lines.show(Field().report())
     assert len(said) == 3
@@ -252,7 +252,7 @@ def test_an_answer_in_unknown_words_is_unknown() -> None:
     field = Field()
     station = field.station()
     field.board.link().serve(field.keys.info, lambda request: b'{"is": "Info", "protocol": 9}')
-    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+    with pytest.raises(OutcomeUnknown, match="unknown answer"):
         station.status()
 
 
