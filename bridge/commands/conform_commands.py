@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
+    ActionTime,
     As,
     Connect,
-    Drive,
     Insecure,
     Json,
     KeyFolder,
     Listen,
+    MayDrive,
     OtherKeyFolder,
     OwnName,
-    Patience,
     RestartCommand,
     RobotName,
     SiteName,
@@ -60,7 +60,7 @@ def conform_robot(
     keys: KeyFolder = None,
     other_keys: OtherKeyFolder = None,
     who: As = None,
-    drive: Drive = False,
+    drive: MayDrive = False,
     restart: RestartCommand = None,
     take_over: TakeOver = False,
     timeout: Timeout = 5.0,
@@ -122,7 +122,7 @@ def conform_station(
     site: SiteName = None,
     keys: KeyFolder = None,
     command: StationCommand = None,
-    patience: Patience = 120.0,
+    patience: ActionTime = 120.0,
     insecure: Insecure = False,
     json_: Json = False,
 ) -> None:

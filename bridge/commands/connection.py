@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
     AnyRobot,
     As,

@@ -15,17 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from stopgo.bridge.commands.checks import Check
-from stopgo.bridge.commands.connection import (
-    Connection,
-    GivenOptions,
-    connection_of,
-    given_options,
-    reached,
-    refuse_options,
-    with_presets,
-)
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
     AnyOrigin,
     AnyRobot,
@@ -38,6 +28,16 @@ from stopgo.bridge.commands.options import (
     SiteName,
     Timeout,
     VehicleId,
+)
+from stopgo.bridge.commands.checks import Check
+from stopgo.bridge.commands.connection import (
+    Connection,
+    GivenOptions,
+    connection_of,
+    given_options,
+    reached,
+    refuse_options,
+    with_presets,
 )
 from stopgo.bridge.commands.order_commands import state_line
 from stopgo.bridge.console import print_json, print_line

@@ -6,13 +6,13 @@ import json
 
 import typer
 
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     Addresses,
     AnySiteFolder,
     Days,
     HolderName,
-    HolderRole,
     Json,
+    KeyRole,
     NewFolder,
     OnlyReplaced,
     SiteFolder,
@@ -54,7 +54,7 @@ def keys_init(folder: NewFolder) -> None:
 
 
 def keys_issue(
-    role: HolderRole,
+    role: KeyRole,
     name: HolderName,
     *,
     folder: SiteFolder,

@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from stopgo.bridge.commands.connection import Connection, reached, refuse_options, with_connection
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     AnyOrigin,
     AutopilotKind,
     FetchedFile,
@@ -27,6 +26,7 @@ from stopgo.bridge.commands.options import (
     VehicleId,
     WhileRunning,
 )
+from stopgo.bridge.commands.connection import Connection, reached, refuse_options, with_connection
 from stopgo.bridge.console import Bar, print_json, print_line, refusals_printed, reporting_done, say
 
 if TYPE_CHECKING:

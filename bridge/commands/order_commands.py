@@ -8,18 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from stopgo.bridge.commands.connection import (
-    VEHICLES,
-    Connection,
-    GivenOptions,
-    connection_of,
-    given_options,
-    in_time,
-    refuse_options,
-    with_connection,
-    with_presets,
-)
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
     Again,
     AllRobots,
@@ -42,6 +31,17 @@ from stopgo.bridge.commands.options import (
     TakeOver,
     Timeout,
     VehicleId,
+)
+from stopgo.bridge.commands.connection import (
+    VEHICLES,
+    Connection,
+    GivenOptions,
+    connection_of,
+    given_options,
+    in_time,
+    refuse_options,
+    with_connection,
+    with_presets,
 )
 from stopgo.bridge.console import print_json, print_line, refusals_printed, reporting_done
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.bridge.commands.connection import GivenOptions, given_options, refuse_options
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
     ArmInRun,
     AutopilotId,
     ControllerKind,
     Endurance,
+    FaultsOfRobot,
     Insecure,
     JournalFolder,
     KeyFolder,
@@ -22,8 +22,7 @@ from stopgo.bridge.commands.options import (
     LogSize,
     OnRevision,
     OwnName,
-    RobotFaults,
-    Router,
+    RouterEndpoint,
     ScannerTrigger,
     SigningKey,
     SimulatedPose,
@@ -31,6 +30,7 @@ from stopgo.bridge.commands.options import (
     SiteToMap,
     SpeedUp,
 )
+from stopgo.bridge.commands.connection import GivenOptions, given_options, refuse_options
 from stopgo.bridge.console import say
 from stopgo.mission.errors import InputError
 
@@ -56,7 +56,7 @@ def robot(
     name: OwnName,
     state: JournalFolder,
     listen: Listen = DEFAULT_ENDPOINT,
-    connect: Router = None,
+    connect: RouterEndpoint = None,
     site: SiteName = None,
     keys: KeyFolder = None,
     insecure: Insecure = False,
@@ -65,7 +65,7 @@ def robot(
     controller: ControllerKind = "sim",
     at: SimulatedPose = None,
     map_: SiteToMap = None,
-    fault: RobotFaults = None,
+    fault: FaultsOfRobot = None,
     speed_up: SpeedUp = 1.0,
     endurance: Endurance = 6.0,
     vehicle: AutopilotId = None,

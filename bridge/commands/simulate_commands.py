@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import typer
 
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     Exact,
+    FaultsOfVehicle,
     Insecure,
-    Parameters,
+    ParameterValues,
     Seed,
     SigningKey,
     SimulatedAutopilot,
@@ -15,7 +16,6 @@ from stopgo.bridge.commands.options import (
     SimulatedState,
     SimulatedUrl,
     SpeedUp,
-    VehicleFaults,
     VehiclePose,
 )
 from stopgo.bridge.commands.robot_commands import read_pose
@@ -39,10 +39,10 @@ def simulate_vehicle(
     state: SimulatedState = None,
     origin: SimulatedOrigin = None,
     at: VehiclePose = None,
-    fault: VehicleFaults = None,
+    fault: FaultsOfVehicle = None,
     exact: Exact = False,
     seed: Seed = 1,
-    param: Parameters = None,
+    param: ParameterValues = None,
     speed_up: SpeedUp = 1.0,
     signing_key: SigningKey = None,
     insecure: Insecure = False,

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.bridge.commands.connection import given_options, refuse_options
-from stopgo.bridge.commands.options import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
     Connect,
     GroundProgram,
@@ -24,6 +23,7 @@ from stopgo.bridge.commands.options import (
     SiteName,
     TunnelledVehicle,
 )
+from stopgo.bridge.commands.connection import given_options, refuse_options
 from stopgo.bridge.console import say
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import typer
 
+from stopgo.bridge.commands.bridge_options import FinishedRun, Json, PlanRecordingFile, RunRecordingFile, View
 from stopgo.bridge.commands.connection import Connection, reached, with_connection
-from stopgo.bridge.commands.options import FieldRecording, FinishedRun, Json, PlanRecording, View
 from stopgo.bridge.commands.order_commands import status_json
 from stopgo.bridge.console import print_json, print_line, print_text, say
 
@@ -58,8 +58,8 @@ def watch_command(recorder: Recorder) -> Callable[..., None]:
     def watch(
         connection: Connection,
         *,
-        rrd: FieldRecording = None,
-        plan: PlanRecording = None,
+        rrd: RunRecordingFile = None,
+        plan: PlanRecordingFile = None,
         run: FinishedRun = None,
         view: View = False,
         json_: Json = False,

@@ -155,10 +155,10 @@ def _parameters(details: dict[str, Any]) -> dict[str, str]:
         (CallsSilenceDone, "no answer: told as unknown, one id", "exit code 0, not 3"),
         (TriesRefusedOrdersAgain, "a refusal is told, and not tried again", "ordered 2 times"),
         (TakesOverAlways, "another's lease is not taken unasked", "exit code 0, not 1"),
-        (AsksBeforeItStops, "`pause` is sent without asking, and small", "not told as done"),
+        (AsksBeforeItStops, "`pause` is sent without asking, and small", "not reported as done"),
         (SendsEverythingAgain, "a cut: goes on with what is missing", "sent again"),
         (NeverLooksBack, "every chunk, then the commit, then a look", "nothing was read back"),
-        (NeverLooksBack, "done only when the state tells so", "of another mission"),
+        (NeverLooksBack, "done only when the state tells so", "reports another mission"),
         (NewNonceEachTime, "a commit is repeated under its nonce", "under 2 nonces"),
         (ReadsInfoStrictly, "fields that are not known are passed over", "cannot be started"),
         (LeavesGaps, "poses that were missed are asked for", "are not asked for"),
@@ -199,7 +199,7 @@ class Credulous(StationUnderTest):
 @pytest.mark.parametrize(
     ("requirement", "why"),
     [
-        ("an Info whose seal does not hold: no order", "told as done"),
+        ("an Info whose seal does not hold: no order", "reported as done"),
         ("an answer whose seal does not hold: unknown", "exit code 0, not 3"),
     ],
 )

@@ -154,10 +154,10 @@ WhileRunning = Annotated[
 
 # Following a run
 
-FieldRecording = Annotated[
+RunRecordingFile = Annotated[
     Path | None, typer.Option("--rrd", metavar="FIELD.rrd", help="Record the run for Rerun.")
 ]
-PlanRecording = Annotated[
+PlanRecordingFile = Annotated[
     Path | None,
     typer.Option("--plan", metavar="PLAN.rrd", help="The run's plan, with floor and visibility."),
 ]
@@ -171,7 +171,7 @@ View = Annotated[bool, typer.Option("--view", help="Open the viewer on the recor
 
 OwnName = Annotated[str, typer.Option("--name", metavar="NAME", help="Name of this robot.")]
 Listen = Annotated[str, typer.Option("--listen", metavar="ENDPOINT", help="Endpoint to listen on.")]
-Router = Annotated[
+RouterEndpoint = Annotated[
     str | None,
     typer.Option("--connect", metavar="ENDPOINT", help="A router to connect to, instead of listening."),
 ]
@@ -204,7 +204,7 @@ SiteToMap = Annotated[
     str | None,
     typer.Option("--map", metavar="X,Y,HEADING", help="sim: site to map; rotate by HEADING, then shift."),
 ]
-RobotFaults = Annotated[
+FaultsOfRobot = Annotated[
     list[str] | None,
     typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="sim: fault to simulate, as slip@2=0.2."),
 ]
@@ -253,7 +253,7 @@ SimulatedOrigin = Annotated[
 VehiclePose = Annotated[
     str | None, typer.Option("--at", metavar="X,Y,HEADING", help="Its initial pose in the site frame.")
 ]
-VehicleFaults = Annotated[
+FaultsOfVehicle = Annotated[
     list[str] | None,
     typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Fault to simulate, as nack@3."),
 ]
@@ -261,7 +261,7 @@ Exact = Annotated[
     bool, typer.Option("--exact", help="No position error at any stop; real vehicles always have some.")
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of the random numbers.")]
-Parameters = Annotated[
+ParameterValues = Annotated[
     list[str] | None,
     typer.Option("--param", metavar="NAME=VALUE", help="Set one of its parameters, as WP_RADIUS=0.1."),
 ]
@@ -285,7 +285,7 @@ RawOrders = Annotated[
 
 # Conformance
 
-Drive = Annotated[
+MayDrive = Annotated[
     bool,
     typer.Option("--drive", help="Let the robot drive: half a metre ahead of its position, and back."),
 ]
@@ -301,7 +301,7 @@ StationCommand = Annotated[
         help="Makes the station act; {what} becomes `push FILE`, `start`, … Else you are asked.",
     ),
 ]
-Patience = Annotated[
+ActionTime = Annotated[
     float,
     typer.Option(
         "--patience", metavar="S", min=1, help="Time that you have for each action, without --command."
@@ -325,6 +325,6 @@ Addresses = Annotated[
         help="IP address or name of a robot or router, besides this machine; repeatable.",
     ),
 ]
-HolderRole = Annotated[str, typer.Argument(help="station, viewer, robot or router.")]
+KeyRole = Annotated[str, typer.Argument(help="station, viewer, robot or router.")]
 HolderName = Annotated[str, typer.Argument(help="Name of the holder; for a robot, its --name.")]
 OnlyReplaced = Annotated[bool, typer.Option("--old", help="Only keys that were replaced.")]
