@@ -112,7 +112,7 @@ def connection_of(
         if robot is None:
             raise InputError(
                 "no robot given; add --robot NAME, or --mavlink URL for a vehicle "
-                "(or preset it in stopgo.toml or as STOPGO_ROBOT)"
+                "(or preset it in stopgo.toml or STOPGO_ROBOT)"
             )
         return Connection(robot, connect, site, who, timeout, insecure, keys, given=given)
     refuse_options(given, "--mavlink", "--robot", "--site", "--keys", "--connect")

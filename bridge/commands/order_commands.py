@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,22 +149,16 @@ def status(
     Example: stopgo status --mavlink udpout:127.0.0.1:14550
     """
     given = given_options(context)
-    named: dict[str, Any] = {
-        "robot": robot,
-        "mavlink": mavlink,
-        "connect": connect,
-        "site": site,
-        "keys": keys,
-    }
-    named = with_robots(given, named, all_=all_)
+    named: dict[str, Any] = {"robot": robot, "mavlink": mavlink, "connect": connect, "site": site}
+    named = with_robots(given, named | {"keys": keys}, all_=all_)
     if named["robot"] is None and named["mavlink"] is None:
         refuse_options(given, "all robots of a site", *VEHICLES)
-        reaching: dict[str, Any] = {"timeout_s": timeout, "insecure": insecure, "keys": named["keys"]}
-        forgotten = tuple(forget or ())
-        return fleet_status(named["connect"], named["site"], roster, forgotten, as_json=json_, **reaching)
+        return fleet_status(named, roster, forget or [], timeout, insecure=insecure, as_json=json_)
     refuse_options(given, "one robot", "--roster", "--forget")
-    reaching = {"vehicle": vehicle, "signing_key": signing_key, "state": state}
-    connection = connection_of(given, timeout=timeout, insecure=insecure, **reaching, **named)
+    connection = connection_of(
+        given, vehicle=vehicle, signing_key=signing_key, state=state, timeout=timeout, insecure=insecure,
+        **named,
+    )  # fmt: skip
     print_status(connection, as_json=json_)
 
 
@@ -188,33 +182,28 @@ def print_status(connection: Connection, *, as_json: bool) -> None:
 
 
 def fleet_status(
-    endpoint: str,
-    site: str | None,
+    named: dict[str, Any],
     roster: Path | None,
-    forgotten: tuple[str, ...],
+    forgotten: Sequence[str],
+    timeout_s: float,
     *,
+    insecure: bool,
     as_json: bool,
-    **reaching: Any,
 ) -> None:
     """Print the state of all robots of a site, also of the expected ones; exit code 1 if one is silent."""
     from stopgo.bridge.link.keys import now_utc
     from stopgo.bridge.station.fleet import fleet
-    from stopgo.bridge.station.roster import (
-        LastSeen,
-        default_sightings_file,
-        forget,
-        read_roster,
-        read_sightings,
-        remember,
-    )
+    from stopgo.bridge.station.roster import LastSeen, forget, read_roster, read_sightings, remember
 
-    path = default_sightings_file(endpoint, site)
+    path = sightings_file(named)
     if forgotten:
         forget(path, forgotten)
     before = read_sightings(path)
+    known = tuple(before) if roster is None else read_roster(roster)
     members = fleet(
-        endpoint, site=site, known=tuple(before) if roster is None else read_roster(roster), **reaching
-    )
+        named["connect"], site=named["site"], known=known, timeout_s=timeout_s, insecure=insecure,
+        keys=named["keys"],
+    )  # fmt: skip
     seen = {
         member.robot: LastSeen(at=now_utc(), state=member.state.state) for member in members if member.state
     }
@@ -227,6 +216,13 @@ def fleet_status(
             print_line(member_line(member, before.get(member.robot)))
     if len(seen) < len(members):
         raise typer.Exit(1)
+
+
+def sightings_file(named: dict[str, Any]) -> Path:
+    """Return the file of the robots that were seen at an endpoint and a site."""
+    from stopgo.bridge.station.roster import default_sightings_file
+
+    return default_sightings_file(named["connect"], named["site"])
 
 
 def member_json(member: FleetMember, before: LastSeen | None) -> dict[str, Any]:

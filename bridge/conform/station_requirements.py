@@ -173,7 +173,7 @@ def a_commit_is_repeated_as_it_is(bench: StationBench) -> None:
         must_exit(
             bench.does("push", mission),
             DONE,
-            "a push with a late answer to its commit is not reported as done",
+            "a push whose commit is answered late is not reported as done",
         )
     nonces = {commit.nonce for commit in bench.commits()}
     must(len(nonces) == 1, f"one commit was sent under {len(nonces)} nonces")

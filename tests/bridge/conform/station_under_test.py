@@ -70,7 +70,7 @@ class StationUnderTest:
 
 
 def verdicts(station: StationUnderTest, *only: str) -> dict[str, ConformVerdict]:
-    """What the kit finds of a station, by requirement."""
+    """Verdicts of the kit on a station, by requirement."""
     wanted = [one for one in STATION_REQUIREMENTS if not only or one.text in only or one.section in only]
     assert wanted
     with station.bench() as bench:

@@ -35,7 +35,7 @@ class Robot:
         self.keys = KeyExpressions("r1")
         self.asked = 0
         self.lost: set[int] = set()
-        """Which of the questions find no answer."""
+        """Numbers of the queries without an answer."""
         self.short = ""
         self.boot()
         idle(self.recorder)

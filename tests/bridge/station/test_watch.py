@@ -1,4 +1,4 @@
-"""What a person sees of a run, and what a recording is handed."""
+"""Display of a run, and the data that a recording receives."""
 
 from __future__ import annotations
 
