@@ -1,4 +1,4 @@
-"""What a command says to the person: lines and a progress bar on stderr, one JSON object on stdout."""
+"""Output of a command: messages and a progress bar on stderr, its report or one JSON object on stdout."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     import rich.progress
 
 Progress = Callable[[int, int], None]
-"""Called with what is done and what there is to do, as a bar's `show`."""
+"""Callback with the amount done and the total amount, such as `Bar.show`."""
 
 KILOBYTES = ("kB", 1000)
+"""Unit of a progress bar: its name, and the amount that it stands for."""
 
 
 class Bar:
-    """A progress bar on stderr, if that is a terminal."""
+    """Progress bar on stderr, if stderr is a terminal."""
 
     def __init__(self, label: str, unit: tuple[str, int] = KILOBYTES) -> None:
         self._label = label
@@ -45,7 +46,7 @@ class Bar:
             self._drawn.stop()
 
     def show(self, done: int, total: int) -> None:
-        """Show how much is done, in the unit's parts."""
+        """Draw the amount done and the total amount, in the bar's unit."""
         if self._drawn is not None:
             amount = f"{done / self._per:.0f}/{total / self._per:.0f} {self._unit}"
             (task,) = self._drawn.task_ids
@@ -53,23 +54,23 @@ class Bar:
 
 
 def say(line: str) -> None:
-    """One line for the person, on stderr; in one piece, for several threads may say something."""
+    """Print one line on stderr, in a single write because several threads may print."""
     print(f"{printable(line)}\n", end="", file=sys.stderr, flush=True)  # noqa: T201
 
 
-def tell(line: str, *, at_once: bool = False) -> None:
-    """A line of what a command was asked for, on stdout; it may hold what a robot or a file says."""
-    print(printable(line), flush=at_once)  # noqa: T201
+def print_line(line: str, *, flush: bool = False) -> None:
+    """Print one line of a command's report on stdout; text from a robot or a file is made harmless."""
+    print(printable(line), flush=flush)  # noqa: T201
 
 
-def tell_lines(text: str) -> None:
-    """Several such lines: a table or a document, whose cells can hold no line breaks of their own."""
+def print_text(text: str) -> None:
+    """Print a table or a document on stdout; its cells must not hold line breaks."""
     print(printable_lines(text))  # noqa: T201
 
 
 @contextmanager
-def refusals_in(as_json: bool) -> Iterator[None]:
-    """A refusal in the block is also printed as JSON, if that is what is printed."""
+def refusals_printed(*, as_json: bool) -> Iterator[None]:
+    """Print a refusal that is raised in the block as JSON too, if the command prints JSON."""
     try:
         yield
     except NegativeResult as no:
@@ -79,13 +80,13 @@ def refusals_in(as_json: bool) -> Iterator[None]:
 
 
 @contextmanager
-def carried_out(what: str) -> Iterator[None]:
-    """Tells of what a robot has done; where that cannot be told, nobody may believe that nothing was sent.
+def reporting_done(what: str) -> Iterator[None]:
+    """Print a report of what a robot has done; a failed output must not look as if nothing was sent.
 
     Raises
     ------
     OutcomeUnknown
-        If the output takes no more.
+        If the report cannot be written, as on a full disk.
     """
     try:
         yield
@@ -93,8 +94,9 @@ def carried_out(what: str) -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise OutcomeUnknown(f"{what}, and could not be told: output: {error.strerror}") from None
+        raise OutcomeUnknown(f"{what}, but the report could not be printed: {error.strerror}") from None
 
 
 def print_json(document: dict[str, Any]) -> None:
+    """Print a document as one line of JSON on stdout."""
     print(json.dumps(document), flush=True)  # noqa: T201

@@ -1,7 +1,7 @@
-"""What need not be typed with every order: which robot, where it listens, the keys, the site.
+"""Presets of options: the robot, its endpoint, the keys and the site need not be typed each time.
 
-An option counts most, then the environment (STOPGO_ROBOT, STOPGO_CONNECT, …), then `stopgo.toml` in the
-working folder, then the one in the user's own folder for settings.
+An option takes precedence over the environment (STOPGO_ROBOT, STOPGO_CONNECT, …). The environment takes
+precedence over `stopgo.toml` in the working folder, and that over the one in the user's configuration folder.
 """
 
 from __future__ import annotations
@@ -16,60 +16,67 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.settings.toml_file import read_toml
 
 NAMES = ("robot", "mavlink", "connect", "site", "keys", "as")
-"""As in stopgo.toml; options have two hyphens before them, the environment STOPGO_."""
+"""Names of presets in stopgo.toml; an option is `--NAME`, an environment variable `STOPGO_NAME`."""
 FILE = "stopgo.toml"
 
 
 @dataclass(frozen=True)
 class Preset:
-    """A value that need not be typed."""
+    """Value of an option that is not typed."""
 
     value: str
     source: str
-    """Where it comes from, for a person."""
+    """Origin of the value, as a message names it."""
     rank: int
-    """Of its source; 0 counts most."""
+    """Rank of its source; 0 takes precedence."""
 
 
 Profile = Mapping[str, Preset]
-"""What is preset, by name."""
+"""Presets by name."""
 
 
 def read_profile(environment: Mapping[str, str] = os.environ, *, folder: Path | None = None) -> Profile:
-    """What is preset here; of each name the value that counts.
+    """Read the presets; of each name the value of the source that takes precedence.
 
     Raises
     ------
     InputError
-        Naming the file, and the key that it cannot have or its value.
+        Names the file, and the unknown key or the wrong value.
     """
     found: dict[str, Preset] = {}
-    sources = (_of_environment(environment), *map(_of_file, files(environment, folder)))
+    sources = (_of_environment(environment), *map(_of_file, profile_files(environment, folder)))
     for rank, source in enumerate(sources):
         for name, value, where in source:
             found.setdefault(name, Preset(value, where, rank))
     return found
 
 
-def counting(profile: Profile, typed: Set[str]) -> Profile:
-    """What counts beside the options that were typed, by their names.
+def effective(profile: Profile, typed: Set[str]) -> Profile:
+    """Return the presets that apply, given the names of the options that were typed.
 
-    A robot takes the place of a vehicle whose preset counts less, and the other way round.
+    Only one of `robot` and `mavlink` applies: the one whose source takes precedence.
+
+    Raises
+    ------
+    InputError
+        If one source presets both.
     """
-    left = {name: preset for name, preset in profile.items() if name not in typed}
+    applying = {name: preset for name, preset in profile.items() if name not in typed}
     if typed & {"robot", "mavlink"}:
-        return {name: preset for name, preset in left.items() if name not in ("robot", "mavlink")}
-    robot, mavlink = left.get("robot"), left.get("mavlink")
+        return {name: preset for name, preset in applying.items() if name not in ("robot", "mavlink")}
+    robot, mavlink = applying.get("robot"), applying.get("mavlink")
     if robot is None or mavlink is None:
-        return left
+        return applying
     if robot.rank == mavlink.rank:
         raise InputError(f"{robot.source}: robot and mavlink are both preset; name one with an option")
-    left.pop("mavlink" if robot.rank < mavlink.rank else "robot")
-    return left
+    applying.pop("mavlink" if robot.rank < mavlink.rank else "robot")
+    return applying
 
 
-def files(environment: Mapping[str, str] = os.environ, folder: Path | None = None) -> tuple[Path, ...]:
-    """Where a stopgo.toml is looked for, the one that counts more first."""
+def profile_files(
+    environment: Mapping[str, str] = os.environ, folder: Path | None = None
+) -> tuple[Path, ...]:
+    """Return the paths of the stopgo.toml files that are read; the first takes precedence."""
     here = (folder or Path()) / FILE
     try:
         return here, _user_folder(environment) / "stopgo" / FILE

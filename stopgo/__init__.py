@@ -155,7 +155,7 @@ def connect(endpoint: str, *, robot: str, **options: Any) -> AbstractContextMana
     Raises
     ------
     RobotUnreachable
-        If the robot did not show itself in time; nothing was sent.
+        If the robot was not found in time; nothing was sent.
     """
     from stopgo.bridge.station.station import connect as connected
 

@@ -1,27 +1,34 @@
-"""`stopgo conform`: puts somebody else's robot or station through its paces by the protocol."""
+"""`stopgo conform`: tests a third-party robot or station against the protocol."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.bridge.commands.connection import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
+    ActionTime,
     As,
     Connect,
     Insecure,
+    Json,
     KeyFolder,
+    Listen,
+    MayDrive,
+    OtherKeyFolder,
+    OwnName,
+    RestartCommand,
     RobotName,
     SiteName,
+    StationCommand,
+    TakeOver,
     Timeout,
 )
-from stopgo.bridge.commands.order_commands import Json, TakeOver
-from stopgo.bridge.console import Bar, print_json, say, tell, tell_lines
+from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,13 +36,14 @@ if TYPE_CHECKING:
     from stopgo.bridge.conform.robot_bench import RobotBench
     from stopgo.mission.run.events import Pose
 
-TRIED = ("requirements", 1)
+REQUIREMENTS_UNIT = ("requirements", 1)
+"""Unit of the progress bars."""
 
 
 def conform_commands() -> typer.Typer:
-    """`stopgo conform` with its two kinds of peers."""
+    """Return `stopgo conform` with its two kinds of peers."""
     commands = typer.Typer(
-        help="Put a robot or a station of another make through its paces, and tell which requirement of"
+        help="Test a third-party robot or station, and print which requirements of"
         " docs/reference/protocol.md it does not meet."
         f"\n\nExample: stopgo conform robot --robot r1 --connect {DEFAULT_ENDPOINT} --drive",
     )
@@ -50,27 +58,21 @@ def conform_robot(
     connect: Connect = DEFAULT_ENDPOINT,
     site: SiteName = None,
     keys: KeyFolder = None,
-    other_keys: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="A second station's keys, to see who may order what.")
-    ] = None,
+    other_keys: OtherKeyFolder = None,
     who: As = None,
-    drive: Annotated[
-        bool, typer.Option("--drive", help="Let it drive, half a metre ahead of where it stands and back.")
-    ] = False,
-    restart: Annotated[
-        str | None, typer.Option(metavar="COMMAND", help="Starts the robot's program anew, and returns.")
-    ] = None,
+    drive: MayDrive = False,
+    restart: RestartCommand = None,
     take_over: TakeOver = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     json_: Json = False,
 ) -> None:
-    """Be a station that tries every requirement on a robot, and print what it meets and what it does not.
+    """Test every requirement on a robot, as a station, and print which it meets and which it does not.
 
-    The robot is given small missions of its own around the place where it stands; the one that lay there
-    lies ready again at the end. It does not move without --drive. A robot on a run is not touched.
+    The robot receives small missions around its present position; its own mission is stored again at the
+    end. It does not move without --drive. A robot on a run is not tested.
 
-    Ends with 0 if nothing failed, 1 if something did, 2 if nothing was tried, and 3 if the robot stopped
+    Ends with 0 if nothing failed, 1 if something did, 2 if nothing was tested, and 3 if the robot stopped
     answering.
 
     Example: stopgo conform robot --robot r1 --connect tcp/127.0.0.1:7447
@@ -82,64 +84,55 @@ def conform_robot(
     options = ConformOptions(
         connect, robot, site, who, timeout, insecure, keys, other_keys, take_over, restart
     )
-    with robot_bench(options) as bench, Bar("conform", TRIED) as bar:
-        _say_what_it_will_do(bench, drive=drive)
-        found: list[ConformVerdict] = []
+    with robot_bench(options) as bench, Bar("conform", REQUIREMENTS_UNIT) as bar:
+        _announce(bench, drive=drive)
+        verdicts: list[ConformVerdict] = []
         for verdict in robot_verdicts(bench, drive=drive):
-            found.append(verdict)
-            bar.show(len(found), len(REQUIREMENTS) + 1)
-    report(robot, "robot", found, as_json=json_)
+            verdicts.append(verdict)
+            bar.show(len(verdicts), len(REQUIREMENTS) + 1)
+    report(robot, "robot", verdicts, as_json=json_)
 
 
-def _say_what_it_will_do(bench: RobotBench, *, drive: bool) -> None:
+def _announce(bench: RobotBench, *, drive: bool) -> None:
+    """Warn people near the robot if it will drive."""
     robot = bench.keys.robot
     if not drive:
-        say(f"{robot} will not drive; what needs that is left out (--drive)")
+        say(f"{robot}: will not drive, requirements that need it are not tested; add --drive")
         return
-    pose = _where_it_stands(bench)
+    pose = _present_pose(bench)
     say(
         f"{robot} WILL DRIVE, up to half a metre ahead of {pose.x:.2f}, {pose.y:.2f} m heading"
         f" {math.degrees(pose.heading):.0f} degrees and back, several times; keep clear. Ctrl-C aborts"
     )
 
 
-def _where_it_stands(bench: RobotBench) -> Pose:
+def _present_pose(bench: RobotBench) -> Pose:
     from stopgo.bridge.conform.requirements import NotTried
 
     try:
         return bench.pose()
     except NotTried as why:
-        raise InputError(f"{bench.keys.robot} cannot be let drive: {why}; leave --drive out") from None
+        raise InputError(f"{bench.keys.robot}: must not drive: {why}; leave --drive out") from None
 
 
 def conform_station(
     *,
-    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the fake robot listens.")] = (
-        DEFAULT_ENDPOINT
-    ),
-    name: Annotated[str, typer.Option("--name", help="Name of the fake robot.")] = "r1",
+    listen: Listen = DEFAULT_ENDPOINT,
+    name: OwnName = "r1",
     site: SiteName = None,
     keys: KeyFolder = None,
-    command: Annotated[
-        str | None,
-        typer.Option(
-            metavar="COMMAND",
-            help="Lets the station act; {what} stands for `push FILE`, `start`, … Else you are asked.",
-        ),
-    ] = None,
-    patience: Annotated[
-        float, typer.Option(metavar="S", min=1, help="How long you may take for each, without --command.")
-    ] = 120.0,
+    command: StationCommand = None,
+    patience: ActionTime = 120.0,
     insecure: Insecure = False,
     json_: Json = False,
 ) -> None:
-    """Be a robot that tries every requirement on a station, and print what it meets and what it does not.
+    """Test every requirement on a station, as a robot, and print which it meets and which it does not.
 
     The robot is simulated, and drives nothing. Its answers are lost, late, forged, of a newer version, and of
-    two robots at once. The command ends with 0 where the station says done, 1 where it says that the robot
-    refused, and 3 where it says that the outcome is unknown.
+    two robots at once. COMMAND must end with 0 where the station reports success, 1 where it reports that the
+    robot refused, and 3 where it reports an unknown outcome.
 
-    Ends with 0 if nothing failed, 1 if something did, and 2 if nothing was tried.
+    Ends with 0 if nothing failed, 1 if something did, and 2 if nothing was tested.
 
     Example: stopgo conform station --listen tcp/127.0.0.1:7447 --command "my-station {what} --robot r1"
     """
@@ -147,34 +140,34 @@ def conform_station(
     from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
 
     options = StationOptions(listen, name, site, keys, insecure, command, patience, say)
-    found: list[ConformVerdict] = []
+    verdicts: list[ConformVerdict] = []
     ready = partial(say, f"ready {name} listens on {listen}")
-    with station_bench(options, ready) as bench, Bar("conform", TRIED) as bar:
+    with station_bench(options, ready) as bench, Bar("conform", REQUIREMENTS_UNIT) as bar:
         for verdict in station_verdicts(bench):
-            found.append(verdict)
-            bar.show(len(found), len(STATION_REQUIREMENTS))
-    report(f"the station of {name}", "station", found, as_json=json_)
+            verdicts.append(verdict)
+            bar.show(len(verdicts), len(STATION_REQUIREMENTS))
+    report(f"the station of {name}", "station", verdicts, as_json=json_)
 
 
-def report(peer: str, kind: str, found: Iterable[ConformVerdict], *, as_json: bool) -> None:
-    """Tell every verdict, and end with the exit code that they come to."""
-    from stopgo.bridge.conform.requirements import counted
+def report(peer: str, kind: str, verdicts: Iterable[ConformVerdict], *, as_json: bool) -> None:
+    """Print every verdict, and exit with the code that follows from them."""
+    from stopgo.bridge.conform.requirements import count_outcomes
     from stopgo.mission.console.table import table
 
-    found = list(found)
-    counts = counted(found)
+    verdicts = list(verdicts)
+    counts = count_outcomes(verdicts)
     if as_json:
-        told = [
+        requirements = [
             {"section": one.section, "requirement": one.text, "outcome": one.outcome, "reason": one.reason}
-            for one in found
+            for one in verdicts
         ]
-        print_json({kind: peer, "counts": counts, "requirements": told})
+        print_json({kind: peer, "counts": counts, "requirements": requirements})
     else:
-        rows = [(one.section, one.text, one.outcome, one.reason) for one in found]
-        tell_lines(table(("protocol.md", "requirement", "outcome", "why"), rows))
-        told_counts = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
-        tell(f"{peer}: {told_counts}")
-    if any(one.gone for one in found):
+        rows = [(one.section, one.text, one.outcome, one.reason) for one in verdicts]
+        print_text(table(("protocol.md", "requirement", "outcome", "why"), rows))
+        summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+        print_line(f"{peer}: {summary}")
+    if any(one.lost for one in verdicts):
         raise typer.Exit(3)
     if counts["failed"]:
         raise typer.Exit(1)

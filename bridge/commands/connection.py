@@ -1,4 +1,4 @@
-"""How a command reaches a robot, over zenoh by its name or over MAVLink by a URL, and the options for it."""
+"""Connection of a command to a robot (zenoh, by name) or to a vehicle (MAVLink, by URL), from its options."""
 
 from __future__ import annotations
 
@@ -9,89 +9,62 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from stopgo.bridge.profile import counting, read_profile
+from stopgo.bridge.commands.bridge_options import (
+    DEFAULT_ENDPOINT,
+    AnyRobot,
+    As,
+    Connect,
+    Insecure,
+    KeyFolder,
+    MavlinkUrl,
+    SigningKey,
+    SiteName,
+    StateFolder,
+    Timeout,
+    VehicleId,
+)
+from stopgo.bridge.profile import effective, read_profile
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.station import Station
 
-RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
-AnyRobot = Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
-Connect = Annotated[
-    str,
-    typer.Option(
-        "--connect", metavar="ENDPOINT", help="Where it listens, as tcp/127.0.0.1:7447; several: A,B."
-    ),
-]
-SiteName = Annotated[str | None, typer.Option("--site", metavar="NAME", help="Prefix of the site's keys.")]
-As = Annotated[
-    str | None, typer.Option("--as", metavar="WHO", help="Who gives the order; user@host if not given.")
-]
-Timeout = Annotated[
-    float, typer.Option("--timeout", min=0.1, metavar="S", help="How long to wait, in seconds.")
-]
-Insecure = Annotated[
-    bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys.")
-]
-KeyFolder = Annotated[
-    Path | None, typer.Option("--keys", metavar="DIR", help="Folder of the keys that stopgo keys issued.")
-]
-MavlinkUrl = Annotated[
-    str | None,
-    typer.Option("--mavlink", metavar="URL", help="A vehicle instead, such as udpout:127.0.0.1:14550."),
-]
-VehicleId = Annotated[
-    int | None,
-    typer.Option("--vehicle", metavar="ID", min=1, max=255, help="Its system id, if several are heard."),
-]
-SigningKey = Annotated[
-    Path | None,
-    typer.Option(
-        "--signing-key",
-        metavar="FILE",
-        help="Sign what is said over MAVLink; FILE: 64 hex digits or a passphrase of at least 8 characters.",
-    ),
-]
-StateFolder = Annotated[
-    Path | None,
-    typer.Option("--state", metavar="DIR", help="What is remembered of the vehicle; one folder for each."),
-]
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 VEHICLES = ("--vehicle", "--signing-key", "--state")
-"""Options that reach a vehicle."""
+"""Options that only concern a vehicle."""
 GivenOptions = frozenset[str]
-"""The options on a command line, such as "--site"."""
+"""Options on a command line, such as "--site"."""
 LEAST_S = 0.5
-"""Left for a question or an order, however long it took to find the robot."""
+"""Shortest time for a query or a command, even if finding the robot took nearly all of the timeout."""
 
 
 @dataclass(frozen=True)
 class Mavlink:
-    """How a vehicle is to be reached."""
+    """Connection to a vehicle, and what the command may do to it."""
 
     url: str
     vehicle: int | None = None
     signing_key: Path | None = None
     state: Path | None = None
     arm: bool = False
-    """It may be armed."""
+    """True if the vehicle may be armed."""
     disarm: bool = False
     any_origin: bool = False
-    """It finds its place by satellites."""
-    looks_only: bool = False
+    """True if the vehicle has satellite positions; its origin is not checked."""
+    read_only: bool = False
     compares: bool = False
+    """True if the run is compared with its mission."""
 
 
 @dataclass(frozen=True)
 class Connection:
-    """How a robot is to be reached, and by whom."""
+    """Connection to a robot, and the operator who uses it."""
 
     robot: str
-    """Its name; empty for a vehicle, which has a number."""
+    """Name of the robot; empty for a vehicle, which has a system id."""
     endpoint: str
     site: str | None
     who: str | None
@@ -99,23 +72,23 @@ class Connection:
     insecure: bool
     keys: Path | None
     patience_s: float = 20.0
-    """For each piece of a mission that is pushed."""
+    """Longest wait for the answer to each chunk of a mission."""
     mavlink: Mavlink | None = field(default=None)
     given: GivenOptions = frozenset()
 
-    def to_drive(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Connection:
-        """The same connection, for an order and what it may do to a vehicle, or overlook."""
+    def for_driving(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Connection:
+        """Return this connection for a command that drives, with what the command may do to a vehicle."""
         if self.mavlink is None:
-            alone(self.given, "--robot", "--arm", "--disarm", "--any-origin")
+            refuse_options(self.given, "--robot", "--arm", "--disarm", "--any-origin")
             return self
-        given = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
-        return replace(self, mavlink=given)
+        consenting = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
+        return replace(self, mavlink=consenting)
 
-    def to_look(self, *, compares: bool = False) -> Connection:
-        """The same connection, to look at a vehicle, or to follow one whose mission is compared."""
+    def for_reading(self, *, compares: bool = False) -> Connection:
+        """Return this connection for reading a state, or for following a run that is compared."""
         if self.mavlink is None:
             return self
-        return replace(self, mavlink=replace(self.mavlink, looks_only=not compares, compares=compares))
+        return replace(self, mavlink=replace(self.mavlink, read_only=not compares, compares=compares))
 
 
 def connection_of(
@@ -133,24 +106,24 @@ def connection_of(
     insecure: Insecure = False,
     keys: KeyFolder = None,
 ) -> Connection:
-    """What the options mean; those after `given` are the options of every command that reaches a robot."""
+    """Return the connection that the options name; every command that reaches a robot has them."""
     if mavlink is None:
-        alone(given, "--robot", *VEHICLES)
+        refuse_options(given, "--robot", *VEHICLES)
         if robot is None:
             raise InputError(
-                "say which robot: --robot NAME, or --mavlink URL for a vehicle "
-                "(or preset it in stopgo.toml or as STOPGO_ROBOT)"
+                "no robot given; add --robot NAME, or --mavlink URL for a vehicle "
+                "(or preset it in stopgo.toml or STOPGO_ROBOT)"
             )
         return Connection(robot, connect, site, who, timeout, insecure, keys, given=given)
-    alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
+    refuse_options(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
     return Connection(
         "", connect, None, who, timeout, insecure, None,
         mavlink=Mavlink(mavlink, vehicle=vehicle, signing_key=signing_key, state=state), given=given,
     )  # fmt: skip
 
 
-def given_in(context: typer.Context) -> GivenOptions:
-    """The options on the command line, whatever their values."""
+def given_options(context: typer.Context) -> GivenOptions:
+    """Return the options on the command line, also those with their default values."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
     typed = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
     return frozenset(
@@ -159,20 +132,20 @@ def given_in(context: typer.Context) -> GivenOptions:
 
 
 def with_presets(given: GivenOptions, values: dict[str, Any]) -> dict[str, Any]:
-    """The values of options, with what is preset in place of those that were not given."""
-    presets = counting(read_profile(), {option.removeprefix("--") for option in given})
-    told: dict[str, Any] = {PARAMETERS.get(name, name): preset.value for name, preset in presets.items()}
-    if "keys" in told:
-        told["keys"] = Path(told["keys"])
-    return {name: told.get(name, value) for name, value in values.items()}
+    """Return the options' values; a preset replaces each that was not given."""
+    presets = effective(read_profile(), {option.removeprefix("--") for option in given})
+    preset: dict[str, Any] = {PARAMETERS.get(name, name): one.value for name, one in presets.items()}
+    if "keys" in preset:
+        preset["keys"] = Path(preset["keys"])
+    return {name: preset.get(name, value) for name, value in values.items()}
 
 
 PARAMETERS = {"as": "who"}
-"""What options are called inside, where it is otherwise."""
+"""Parameters whose names differ from their options."""
 
 
-def alone(given: GivenOptions, what: str, *options: str) -> None:
-    """Refuse options that were given and have no meaning with `what`."""
+def refuse_options(given: GivenOptions, what: str, *options: str) -> None:
+    """Raise `InputError` if one of `options` was given; they have no meaning with `what`."""
     for option in options:
         if option in given:
             raise InputError(f"{option} has no meaning with {what}; leave it out")
@@ -182,7 +155,7 @@ CommandBody = Callable[..., Any]
 
 
 def with_connection(*, without: tuple[str, ...] = ()) -> Callable[[CommandBody], CommandBody]:
-    """Gives a command its `connection` by the options of `connection_of`, but those `without`."""
+    """Decorate a command: the options of `connection_of`, except `without`, become its `connection`."""
     return partial(_with_connection, without)
 
 
@@ -197,7 +170,7 @@ def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandB
     )
 
     def called(context: typer.Context, **values: Any) -> Any:
-        given = given_in(context)
+        given = given_options(context)
         chosen = with_presets(given, {option.name: values.pop(option.name) for option in options})
         return command(connection_of(given, **chosen), **values)
 
@@ -210,7 +183,7 @@ def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandB
 
 
 def reached(connection: Connection) -> AbstractContextManager[Station]:
-    """The robot or vehicle at the other end; raises as both `connect` do."""
+    """Connect to the robot or the vehicle; raises the errors of `connect` of either."""
     if connection.mavlink is not None:
         return _vehicle(connection, connection.mavlink)
     from stopgo.bridge.station.station import connect
@@ -231,14 +204,14 @@ def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager
     options = Options(
         vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=connection.timeout_s,
         commander=connection.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),
-        looks_only=mavlink.looks_only, compares=mavlink.compares,
+        looks_only=mavlink.read_only, compares=mavlink.compares,
     )  # fmt: skip
     return connect(url, options)
 
 
 @contextmanager
 def in_time(connection: Connection) -> Iterator[Station]:
-    """A robot that has been reached, with what is left of the time for one question or order."""
+    """Connect to the robot; the time left of the timeout is for one query or command."""
     began = time.monotonic()
     with reached(connection) as station:
         station.timeout_s = max(LEAST_S, connection.timeout_s - (time.monotonic() - began))

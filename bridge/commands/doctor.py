@@ -1,4 +1,4 @@
-"""`stopgo doctor`: looks at what orders and recordings need, and says what to do about what is wrong."""
+"""`stopgo doctor`: checks the prerequisites of commands and recordings, and names a remedy for each fault."""
 
 from __future__ import annotations
 
@@ -9,53 +9,54 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from stopgo.bridge.commands.checks import Check
-from stopgo.bridge.commands.connection import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
+    AnyOrigin,
     AnyRobot,
     Connect,
-    Connection,
     Insecure,
+    Json,
     KeyFolder,
     MavlinkUrl,
     SigningKey,
     SiteName,
     Timeout,
     VehicleId,
-    alone,
+)
+from stopgo.bridge.commands.checks import Check
+from stopgo.bridge.commands.connection import (
+    Connection,
+    GivenOptions,
     connection_of,
-    given_in,
+    given_options,
     reached,
+    refuse_options,
     with_presets,
 )
-from stopgo.bridge.commands.order_commands import Json, state_line
-from stopgo.bridge.console import print_json, tell
+from stopgo.bridge.commands.order_commands import state_line
+from stopgo.bridge.console import print_json, print_line
 from stopgo.bridge.link.capabilities import told_of_capabilities
-from stopgo.bridge.profile import counting, files, read_profile
+from stopgo.bridge.profile import effective, profile_files, read_profile
 from stopgo.mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
     from stopgo.bridge.link.protocol import Info
     from stopgo.bridge.mavlink.line.url import Url
 
-Satellites = Annotated[
-    bool, typer.Option("--any-origin", help="With --mavlink: it finds its place by satellites, not indoors.")
-]
 LEAST_FREE = 500_000_000
-"""Bytes: a long run recorded with its poses, and room for the robot's journal."""
+"""Free bytes that a long run's recording and the robot's journal need."""
 CLOCKS_APART_S = 2.0
-"""Orders are valid for some seconds on the robot's clock."""
+"""Largest difference of clocks; commands are valid for some seconds on the robot's clock."""
 EXTRAS = {
     "plan": "shapely", "bim": "ifcopenshell", "record": "rerun", "clouds": "laspy", "prove": "embreex",
 }  # fmt: skip
-"""A library of each extra."""
+"""One library of each extra; the extra is installed if the library is."""
 
 
 def doctor(
@@ -68,46 +69,74 @@ def doctor(
     mavlink: MavlinkUrl = None,
     vehicle: VehicleId = None,
     signing_key: SigningKey = None,
-    any_origin: Satellites = False,
+    any_origin: AnyOrigin = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     json_: Json = False,
 ) -> int:
-    """Tell what is preset and where, and whether keys, robot, clock, disk and libraries are as they must be.
+    """Print the presets and their sources, and check keys, robot, clock, disk and libraries.
 
-    Of a vehicle (--mavlink): what stands between it and a mission, each with the value to set. It is only
-    asked, nothing of it is changed.
+    Of a vehicle (--mavlink): check its state, position and parameters, with the value to set for each. The
+    vehicle is only queried, nothing of it is changed.
 
-    Exit code 1: something is wrong, and its line says what to do. An extra that is missing is not.
+    Exit code 1: something is wrong, and its line names the remedy. A missing extra is not an error.
 
     Example: stopgo doctor --robot r1 --connect tcp/127.0.0.1:7447
     """
-    given = given_in(context)
-    told: dict[str, Any] = {"robot": robot, "connect": connect, "site": site, "keys": keys}
-    told["mavlink"] = mavlink
-    checks = [_system(), *_extras(), _viewer(), _disk(Path()), *_checked("profile", lambda: _profile(given))]
-    with contextlib.suppress(InputError):  # which the profile's line tells
-        told = with_presets(given, told)
-    if told["keys"] is not None:
-        checks += _checked("keys", lambda: _keys(told["keys"]))
+    given = given_options(context)
+    named = {"robot": robot, "connect": connect, "site": site, "keys": keys, "mavlink": mavlink}
+    checks = [*_machine_checks(), *_checked("profile", lambda: _profile(given))]
+    with contextlib.suppress(InputError):  # the profile's line reports it
+        named = with_presets(given, named)
+    if named["keys"] is not None:
+        checks += _checked("keys", lambda: _keys(Path(str(named["keys"]))))
     if mavlink is not None:
-        from stopgo.bridge.mavlink.line.wire import read_line
-
-        alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
-        url, key = read_line(mavlink, signing_key, insecure=insecure)
-        checks += _checked(
-            "vehicle", lambda: _vehicle(url, vehicle, key, timeout_s=timeout, any_origin=any_origin)
+        checks += _vehicle_checks(
+            given, mavlink, vehicle, signing_key, timeout, insecure=insecure, any_origin=any_origin
         )
-    elif told["robot"] is not None:
-        connection = connection_of(given, **told, timeout=timeout, insecure=insecure)
-        checks += [*_ports(connection.endpoint), *_checked("robot", lambda: _asked(connection))]
     else:
-        checks += _checked("port", lambda: _unasked(told, insecure=insecure))
-    say_checks(checks, as_json=json_)
+        checks += _robot_checks(given, named, timeout, insecure=insecure)
+    print_checks(checks, as_json=json_)
     return 0 if all(check.ok for check in checks) else 1
 
 
-def _asked(connection: Connection) -> Iterator[Check]:
+def _machine_checks() -> Iterator[Check]:
+    yield _system()
+    yield from _extras()
+    yield _viewer()
+    yield _disk(Path())
+
+
+def _vehicle_checks(
+    given: GivenOptions,
+    mavlink: str,
+    vehicle: int | None,
+    signing_key: Path | None,
+    timeout_s: float,
+    *,
+    insecure: bool,
+    any_origin: bool,
+) -> list[Check]:
+    from stopgo.bridge.mavlink.line.wire import read_line
+
+    refuse_options(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
+    url, key = read_line(mavlink, signing_key, insecure=insecure)
+    return _checked(
+        "vehicle", lambda: _vehicle(url, vehicle, key, timeout_s=timeout_s, any_origin=any_origin)
+    )
+
+
+def _robot_checks(
+    given: GivenOptions, named: dict[str, Any], timeout_s: float, *, insecure: bool
+) -> list[Check]:
+    """Check the robot, or the endpoint alone if no robot is named."""
+    if named["robot"] is None:
+        return _checked("port", lambda: _endpoint_only(named, insecure=insecure))
+    connection = connection_of(given, **named, timeout=timeout_s, insecure=insecure)
+    return [*_ports(connection.endpoint), *_checked("robot", lambda: _robot(connection))]
+
+
+def _robot(connection: Connection) -> Iterator[Check]:
     with reached(connection) as station:
         yield from robot_checks(station.info(), time.time_ns())
 
@@ -122,41 +151,45 @@ def _vehicle(
         yield from vehicle_checks(peer, any_origin=any_origin)
 
 
-def _unasked(told: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
-    """What can be told of where to connect while nobody says to which robot."""
-    if told["mavlink"] is not None:
+def _endpoint_only(named: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
+    """Check the preset endpoint or URL, without a robot's name."""
+    if named["mavlink"] is not None:
         from stopgo.bridge.mavlink.line.url import read_url
 
-        yield Check("port", True, f"{read_url(told['mavlink'])} is a MAVLink URL; nobody was asked there")
-    elif told["connect"] != DEFAULT_ENDPOINT:
+        yield Check(
+            "port", True, f"{read_url(named['mavlink'])} is a MAVLink URL; the vehicle was not queried"
+        )
+    elif named["connect"] != DEFAULT_ENDPOINT:
         from stopgo.bridge.link.keys import now_utc, read_keys
         from stopgo.bridge.link.link import endpoints_in
         from stopgo.bridge.link.zenoh_link import Guard, check_endpoint
 
-        held = None if told["keys"] is None else read_keys(told["keys"], now=now_utc())
-        for endpoint in endpoints_in(told["connect"]):
+        held = None if named["keys"] is None else read_keys(named["keys"], now=now_utc())
+        for endpoint in endpoints_in(named["connect"]):
             check_endpoint(endpoint, Guard(held, insecure), option="--connect")
-        yield from _ports(told["connect"])
+        yield from _ports(named["connect"])
 
 
-def say_checks(checks: list[Check], *, as_json: bool) -> None:
-    """Each check as a line, or all of them as one object."""
+def print_checks(checks: list[Check], *, as_json: bool) -> None:
+    """Print each check as a line, or all of them as one object."""
     if as_json:
-        print_json({"ok": all(check.ok for check in checks), "checks": [asdict(check) for check in checks]})
+        print_json(
+            {"ok": all(check.ok for check in checks), "checks": [check.for_json() for check in checks]}
+        )
         return
     for check in checks:
-        todo = f"; {check.do}" if check.do else ""
-        tell(f"{'ok   ' if check.ok else 'WRONG'}  {check.name:8} {check.told}{todo}")
+        action = f"; {check.action}" if check.action else ""
+        print_line(f"{'ok   ' if check.ok else 'WRONG'}  {check.name:8} {check.result}{action}")
 
 
 def _checked(name: str, look: Callable[[], Iterator[Check]]) -> list[Check]:
-    """What was found; an error on the way is what is wrong."""
-    found: list[Check] = []
+    """Return the results of `look`; an error that it raises becomes a check that failed."""
+    results: list[Check] = []
     try:
-        found.extend(look())
+        results.extend(look())
     except StopgoError as error:
-        found.append(Check(name, False, str(error)))
-    return found
+        results.append(Check(name, False, str(error)))
+    return results
 
 
 def _system() -> Check:
@@ -175,33 +208,33 @@ def _extras() -> Iterator[Check]:
 
 
 def _viewer() -> Check:
-    beside = Path(sys.executable).with_name("rerun")
-    found = shutil.which("rerun") or (str(beside) if beside.exists() else None)
-    if found is None:
+    installed = Path(sys.executable).with_name("rerun")
+    path = shutil.which("rerun") or (str(installed) if installed.exists() else None)
+    if path is None:
         return Check("viewer", True, "not found", 'to look at recordings: pip install "stopgo[record]"')
-    return Check("viewer", True, found)
+    return Check("viewer", True, path)
 
 
 def _disk(folder: Path) -> Check:
     free = shutil.disk_usage(folder).free
     return Check(
         "disk", free >= LEAST_FREE, f"{free / 1e9:.1f} GB free in {folder.resolve()}",
-        "" if free >= LEAST_FREE else "make room: a recording or a journal would stop in the middle",
+        "" if free >= LEAST_FREE else "free some space; a recording or a journal would stop in the middle",
     )  # fmt: skip
 
 
 def _profile(given: frozenset[str]) -> Iterator[Check]:
     presets = read_profile()
     for name, preset in presets.items():
-        over = " (an option counts more here)" if f"--{name}" in given else ""
-        yield Check("profile", True, f"{name} = {preset.value}, from {preset.source}{over}")
+        overridden = " (overridden by the option)" if f"--{name}" in given else ""
+        yield Check("profile", True, f"{name} = {preset.value}, from {preset.source}{overridden}")
     if not presets:
         yield Check(
             "profile",
             True,
-            f"nothing is preset, neither by STOPGO_… nor in {' nor '.join(map(str, files()))}",
+            f"nothing is preset, neither by STOPGO_… nor in {' nor '.join(map(str, profile_files()))}",
         )
-    counting(presets, {option.removeprefix("--") for option in given})
+    effective(presets, {option.removeprefix("--") for option in given})
 
 
 def _keys(folder: Path) -> Iterator[Check]:
@@ -210,8 +243,8 @@ def _keys(folder: Path) -> Iterator[Check]:
     now = now_utc()
     holder = read_keys(folder, now=now).holder
     days = (holder.not_after - now).days
-    told = f"{folder}: of {holder.role} {holder.name}, valid for {days} more days"
-    yield Check("keys", True, told, "issue new ones soon" if days < 14 else "")
+    result = f"{folder}: of {holder.role} {holder.name}, valid for {days} more days"
+    yield Check("keys", True, result, "issue new ones soon" if days < 14 else "")
 
 
 def _ports(endpoints: str) -> Iterator[Check]:
@@ -222,27 +255,27 @@ def _ports(endpoints: str) -> Iterator[Check]:
 
 
 def _port(endpoint: str) -> Iterator[Check]:
-    """Whether anything listens at a TCP endpoint; what is no endpoint, the robot's line tells."""
-    kind, _, place = endpoint.partition("/")
-    host, _, port = place.rpartition(":")
+    """Check that a TCP endpoint accepts connections; the robot's line reports a wrong endpoint."""
+    kind, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
     if kind not in ("tcp", "tls") or not port.isdecimal() or int(port) > 65535:
         return
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=2.0).close()
         yield Check("port", True, f"something listens at {endpoint}")
     except OSError as error:
-        told = f"nothing answers at {endpoint} ({error.strerror or error})"
-        yield Check("port", False, told, "is the robot's program running there?")
+        result = f"nothing answers at {endpoint} ({error.strerror or error})"
+        yield Check("port", False, result, "is the robot's program running there?")
 
 
 def robot_checks(info: Info, now_ns: int) -> Iterator[Check]:
-    """What a robot tells of itself, and its clock beside this one."""
+    """Check the state, capabilities, clock and map that a robot reports."""
     yield Check("robot", True, f"{state_line(info.state)}; stopgo {info.stopgo}")
     yield Check("can", True, told_of_capabilities(info.capabilities))
-    apart = (info.clock_ns - now_ns) / 1e9
-    ok = abs(apart) <= CLOCKS_APART_S
-    todo = "" if ok else "set both clocks by NTP: orders are refused as too old or too early"
-    yield Check("clock", ok, f"the robot's clock is {apart:+.1f} s from this one", todo)
+    difference_s = (info.clock_ns - now_ns) / 1e9
+    ok = abs(difference_s) <= CLOCKS_APART_S
+    action = "" if ok else "set both clocks by NTP; commands are refused as too old or too early"
+    yield Check("clock", ok, f"the robot's clock is {difference_s:+.1f} s from this one", action)
     if info.to_map is None:
         yield Check("origin", True, "on the robot's map as each mission says (frame.to_map)")
     else:

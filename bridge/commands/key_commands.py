@@ -1,32 +1,33 @@
-"""`stopgo keys`: makes a site's keys, issues, renews and revokes them, and lists who holds some."""
+"""`stopgo keys`: creates a site's authority; issues, renews, revokes and lists keys."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from stopgo.bridge.commands.connection import SiteName
-from stopgo.bridge.console import print_json, tell, tell_lines
+from stopgo.bridge.commands.bridge_options import (
+    Addresses,
+    AnySiteFolder,
+    Days,
+    HolderName,
+    Json,
+    KeyRole,
+    NewFolder,
+    OnlyReplaced,
+    SiteFolder,
+    SiteFolderArgument,
+    SiteName,
+)
+from stopgo.bridge.console import print_json, print_line, print_text
 from stopgo.mission.console.table import table
 from stopgo.mission.errors import InputError
 
-SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site's folder of keys.")]
-Days = Annotated[int, typer.Option(min=1, max=825, help="How long they are valid.")]
-Addresses = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--address", metavar="ADDRESS",
-        help="Where a robot or router is reached, besides this machine: an IP address or a name; repeatable.",
-    ),
-]  # fmt: skip
-OUT_OF_DATE = "copy revoked.json from it to every machine's folder of keys: there it counts at once"
+COPY_REVOKED = "copy revoked.json from it to every machine's folder of keys, where it takes effect at once"
 
 
 def key_commands() -> typer.Typer:
-    """`stopgo keys` with its verbs."""
+    """Return `stopgo keys` with its subcommands."""
     commands = typer.Typer(
         help="Make a site's keys: an authority, and a certificate for each station, viewer, robot and router."
         "\n\nExample: stopgo keys init site-keys && stopgo keys issue robot r1 --in site-keys",
@@ -40,8 +41,8 @@ def key_commands() -> typer.Typer:
     return commands
 
 
-def keys_init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")]) -> None:
-    """Make a site's authority; whoever has its folder can issue keys, so keep it off the robots.
+def keys_init(folder: NewFolder) -> None:
+    """Create a site's authority; its folder can issue keys, so keep it off the robots.
 
     Example: stopgo keys init site-keys
     """
@@ -49,12 +50,12 @@ def keys_init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new 
     from stopgo.bridge.link.keys import now_utc
 
     init_site(folder, now=now_utc())
-    tell(f"{folder / AUTHORITY}: the site's authority; keep it away from robots and stations")
+    print_line(f"{folder / AUTHORITY}: the site's authority; keep it away from robots and stations")
 
 
 def keys_issue(
-    role: Annotated[str, typer.Argument(help="station, viewer, robot or router.")],
-    name: Annotated[str, typer.Argument(help="Who it is for; for a robot, its --name.")],
+    role: KeyRole,
+    name: HolderName,
     *,
     folder: SiteFolder,
     days: Days = 90,
@@ -71,17 +72,17 @@ def keys_issue(
     if known is None:
         raise InputError(f"role {role!r}: one of {', '.join(ROLES)}")
     files = issue(folder, known, name, now=now_utc(), days=days, addresses=tuple(address or ()))
-    tell(f"{files.folder}: keys of {role} {name} for {days} days; give it the folder as --keys")
+    print_line(f"{files.folder}: keys of {role} {name} for {days} days; give it the folder as --keys")
 
 
 def keys_rotate(
-    name: Annotated[str, typer.Argument(help="Who gets new keys.")],
+    name: HolderName,
     *,
     folder: SiteFolder,
     days: Days = 90,
     address: Addresses = None,
 ) -> None:
-    """Issue new keys to one who has some; the old ones count until they end, or are revoked.
+    """Issue new keys to a holder; the old ones stay valid until they expire or are revoked.
 
     Example: stopgo keys rotate r1 --in site-keys
     """
@@ -89,19 +90,19 @@ def keys_rotate(
     from stopgo.bridge.link.keys import now_utc
 
     files = rotate(folder, name, now=now_utc(), days=days, addresses=tuple(address or ()))
-    tell(
-        f"{files.folder}: new keys of {name} for {days} days; give it the folder, then let the old ones go:"
+    print_line(
+        f"{files.folder}: new keys of {name} for {days} days; give it the folder, then revoke the old ones:"
         f" stopgo keys revoke {name} --old --in {folder}"
     )
 
 
 def keys_revoke(
-    name: Annotated[str, typer.Argument(help="Whose keys count no more.")],
+    name: HolderName,
     *,
     folder: SiteFolder,
-    old: Annotated[bool, typer.Option("--old", help="Only those that were replaced.")] = False,
+    old: OnlyReplaced = False,
 ) -> None:
-    """Let keys count no more: the list of them goes into every folder, to be copied to the machines.
+    """Revoke keys: they are listed in every folder of keys, to be copied to the machines.
 
     Example: stopgo keys revoke alice --in site-keys
     """
@@ -109,20 +110,20 @@ def keys_revoke(
 
     serials = revoke(folder, name, old=old)
     if serials:
-        tell(f"{name}: {len(serials)} revoked ({', '.join(serial[:8] for serial in serials)}); {OUT_OF_DATE}")
+        print_line(
+            f"{name}: {len(serials)} revoked ({', '.join(serial[:8] for serial in serials)}); {COPY_REVOKED}"
+        )
     else:
-        tell(f"{name}: nothing to revoke that was not revoked before")
+        print_line(f"{name}: nothing to revoke; all its keys were revoked before")
 
 
 def keys_list(
-    site: Annotated[
-        Path | None, typer.Argument(metavar="DIR", help="The site's folder of keys.", show_default=False)
-    ] = None,
+    site: SiteFolderArgument = None,
     *,
-    folder: Annotated[Path | None, typer.Option("--in", metavar="DIR", help="The same.")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
+    folder: AnySiteFolder = None,
+    json_: Json = False,
 ) -> None:
-    """List every key that was issued: to whom, until when, and whether it counts.
+    """List every key that was issued: its holder, its expiry, and its state.
 
     Example: stopgo keys list site-keys
     """
@@ -131,7 +132,9 @@ def keys_list(
 
     given = [path for path in (site, folder) if path is not None]
     if len(given) != 1:
-        raise InputError("keys list: name the site's folder of keys once, as in: stopgo keys list site-keys")
+        raise InputError(
+            "keys list: needs one folder of keys; write it once, as in stopgo keys list site-keys"
+        )
     found = listed(given[0], now=now_utc())
     if json_:
         print_json({"keys": [
@@ -145,7 +148,7 @@ def keys_list(
          one.state if one.current else f"{one.state}, replaced")
         for one in found
     ]  # fmt: skip
-    tell_lines(table(("role", "name", "serial", "until", "state"), rows))
+    print_text(table(("role", "name", "serial", "until", "state"), rows))
 
 
 def router_rules(
@@ -153,9 +156,9 @@ def router_rules(
     folder: SiteFolder,
     site: SiteName = None,
 ) -> None:
-    """Print a zenoh router's access control: each robot on its own keys only, each holder by its role.
+    """Print a zenoh router's access control: robots by their key expressions, other holders by their roles.
 
-    Only those whose keys count are in it; print it anew when keys were issued or revoked.
+    It contains holders of valid keys only; print it again after keys were issued or revoked.
 
     Example: stopgo keys router-rules --in site-keys --site north > access_control.json
     """
@@ -164,4 +167,4 @@ def router_rules(
     from stopgo.bridge.link.keys import now_utc
 
     valid = [one.holder for one in listed(folder, now=now_utc()) if one.state == "valid"]
-    tell_lines(json.dumps({"access_control": router_access_control(valid, site)}, indent=2))
+    print_text(json.dumps({"access_control": router_access_control(valid, site)}, indent=2))

@@ -1,34 +1,49 @@
-"""The commands that give one order (`start`, `pause`, ... `home`) or ask one question (`status`)."""
+"""The commands that control a run (`start`, `pause`, ... `home`), and `status`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from stopgo.bridge.commands.connection import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
-    VEHICLES,
+    Again,
+    AllRobots,
+    AnyOrigin,
+    Arm,
     Connect,
-    Connection,
+    Disarm,
+    Forget,
+    FromHere,
     Insecure,
+    Json,
     KeyFolder,
     MavlinkUrl,
+    RobotOrAll,
+    Roster,
     SigningKey,
     SiteName,
     StateFolder,
+    StopId,
+    TakeOver,
     Timeout,
     VehicleId,
-    alone,
+)
+from stopgo.bridge.commands.connection import (
+    VEHICLES,
+    Connection,
+    GivenOptions,
     connection_of,
-    given_in,
+    given_options,
     in_time,
+    refuse_options,
     with_connection,
     with_presets,
 )
-from stopgo.bridge.console import carried_out, print_json, refusals_in, tell
+from stopgo.bridge.console import print_json, print_line, refusals_printed, reporting_done
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.fleet import FleetMember
@@ -36,13 +51,6 @@ if TYPE_CHECKING:
     from stopgo.mission.run.events import StateReport
     from stopgo.mission.run.orders import Answer, Verb
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
-TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
-StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
-Arm = Annotated[bool, typer.Option("--arm", help="Arm a vehicle that is disarmed.")]
-OtherOrigin = Annotated[
-    bool, typer.Option("--any-origin", help="Do not compare origins: it has satellite positions.")
-]
 STATUS_KEYS = (
     "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "outside",
     "battery",
@@ -50,7 +58,7 @@ STATUS_KEYS = (
 
 
 def add_orders(app: typer.Typer) -> None:
-    """Add the verbs of this module to the front door."""
+    """Add the commands of this module to the front door."""
     app.command()(start)
     for verb in ABOUT:
         app.command(name=verb)(order_of(verb))
@@ -62,38 +70,37 @@ def start(
     connection: Connection,
     *,
     take_over: TakeOver = False,
-    again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
-    from_here: Annotated[
-        bool, typer.Option("--from-here", help="Start at the nearest point of the route.")
-    ] = False,
+    again: Again = False,
+    from_here: FromHere = False,
     arm: Arm = False,
-    any_origin: OtherOrigin = False,
+    any_origin: AnyOrigin = False,
     json_: Json = False,
 ) -> None:
-    """Start the mission that the robot holds.
+    """Start the mission that is stored on the robot.
 
     Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
 
     Example: stopgo start --mavlink udpout:127.0.0.1:14550 --arm
     """
-    driving = connection.to_drive(arm=arm, any_origin=any_origin)
-    with refusals_in(json_), in_time(driving) as station:
+    driving = connection.for_driving(arm=arm, any_origin=any_origin)
+    with refusals_printed(as_json=json_), in_time(driving) as station:
         answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
     report_answer(answer, station.keys.robot, json_)
 
 
 ABOUT: dict[Verb, str] = {
-    "pause": "Let the robot stand still; a scan under way is finished. Any station may.",
-    "resume": "Let a paused robot go on, from where it stands.",
-    "skip": "Leave out the stop that the robot works on; its way is still driven.",
+    "pause": "Pause the robot at standstill; a scan in progress is finished. Any station may.",
+    "resume": "Resume a paused robot, from its present position.",
+    "skip": "Skip the current stop; the robot still drives its path.",
     "retry": "Let a robot that is held try again.",
-    "abort": "End the run where the robot stands. Any station may.",
+    "abort": "End the run at the robot's present position. Any station may.",
     "home": "End the run and drive back along the legs that were driven.",
 }
+"""Help of each command."""
 
 
 def order_of(verb: Verb) -> Callable[..., None]:
-    """The command that gives the order `verb`."""
+    """Return the command of the CLI that sends `verb` to a robot."""
 
     def command(
         connection: Connection,
@@ -101,12 +108,12 @@ def order_of(verb: Verb) -> Callable[..., None]:
         stop: StopId = None,
         take_over: TakeOver = False,
         arm: Arm = False,
-        any_origin: OtherOrigin = False,
-        disarm: Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle that stands.")] = False,
+        any_origin: AnyOrigin = False,
+        disarm: Disarm = False,
         json_: Json = False,
     ) -> None:
-        driving = connection.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)
-        with refusals_in(json_), in_time(driving) as station:
+        driving = connection.for_driving(arm=arm, disarm=disarm, any_origin=any_origin)
+        with refusals_printed(as_json=json_), in_time(driving) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, station.keys.robot, json_)
 
@@ -118,9 +125,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
 def status(
     context: typer.Context,
     *,
-    robot: Annotated[
-        str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot; all if not given.")
-    ] = None,
+    robot: RobotOrAll = None,
     connect: Connect = DEFAULT_ENDPOINT,
     site: SiteName = None,
     mavlink: MavlinkUrl = None,
@@ -130,17 +135,12 @@ def status(
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     keys: KeyFolder = None,
-    all_: Annotated[bool, typer.Option("--all", help="All robots, though one is preset.")] = False,
-    roster: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.toml", help="Who is missed: robots = [...]; else all ever seen."),
-    ] = None,
-    forget: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Miss a robot no more that was seen; repeatable.")
-    ] = None,
+    all_: AllRobots = False,
+    roster: Roster = None,
+    forget: Forget = None,
     json_: Json = False,
 ) -> None:
-    """Tell what the robot is doing, or what all robots of the site are; 1 if one of those is silent.
+    """Print the state of the robot, or of all robots of the site; 1 if one of those does not answer.
 
     Example: stopgo status --robot r1 --json
 
@@ -148,53 +148,62 @@ def status(
 
     Example: stopgo status --mavlink udpout:127.0.0.1:14550
     """
-    given = given_in(context)
-    told = with_presets(given, {
-        "robot": robot, "mavlink": mavlink, "connect": connect, "site": site, "keys": keys,
-    })  # fmt: skip
-    if all_:
-        alone(given, "--all", "--robot", "--mavlink")
-        told |= {"robot": None, "mavlink": None}
-    if told["robot"] is None and told["mavlink"] is None:
-        alone(given, "all robots of a site", *VEHICLES)
-        return fleet_status(
-            told["connect"], told["site"], timeout_s=timeout, insecure=insecure, keys=told["keys"],
-            roster=roster, leave_out=tuple(forget or ()), as_json=json_,
-        )  # fmt: skip
-    alone(given, "one robot", "--roster", "--forget")
+    given = given_options(context)
+    named: dict[str, Any] = {"robot": robot, "mavlink": mavlink, "connect": connect, "site": site}
+    named = with_robots(given, named | {"keys": keys}, all_=all_)
+    if named["robot"] is None and named["mavlink"] is None:
+        refuse_options(given, "all robots of a site", *VEHICLES)
+        return fleet_status(named, roster, forget or [], timeout, insecure=insecure, as_json=json_)
+    refuse_options(given, "one robot", "--roster", "--forget")
     connection = connection_of(
         given, vehicle=vehicle, signing_key=signing_key, state=state, timeout=timeout, insecure=insecure,
-        **told,
+        **named,
     )  # fmt: skip
-    with in_time(connection.to_look()) as station:
+    print_status(connection, as_json=json_)
+
+
+def with_robots(given: GivenOptions, named: dict[str, Any], *, all_: bool) -> dict[str, Any]:
+    """Return the options with their presets; with `--all` a preset robot or vehicle does not apply."""
+    named = with_presets(given, named)
+    if not all_:
+        return named
+    refuse_options(given, "--all", "--robot", "--mavlink")
+    return named | {"robot": None, "mavlink": None}
+
+
+def print_status(connection: Connection, *, as_json: bool) -> None:
+    """Request the state of one robot, and print it."""
+    with in_time(connection.for_reading()) as station:
         report = station.status()
-    if json_:
+    if as_json:
         print_json(status_json(report))
     else:
-        tell(state_line(report))
+        print_line(state_line(report))
 
 
 def fleet_status(
-    endpoint: str,
-    site: str | None,
-    *,
+    named: dict[str, Any],
     roster: Path | None,
-    leave_out: tuple[str, ...],
+    forgotten: Sequence[str],
+    timeout_s: float,
+    *,
+    insecure: bool,
     as_json: bool,
-    **reaching: Any,
 ) -> None:
-    """Tell of all robots of a site, those too that ought to be there; a silent one is an answer of no."""
+    """Print the state of all robots of a site, also of the expected ones; exit code 1 if one is silent."""
     from stopgo.bridge.link.keys import now_utc
     from stopgo.bridge.station.fleet import fleet
-    from stopgo.bridge.station.roster import LastSeen, forget, read_roster, remember, remembered, usual_roster
+    from stopgo.bridge.station.roster import LastSeen, forget, read_roster, read_sightings, remember
 
-    path = usual_roster(endpoint, site)
-    if leave_out:
-        forget(path, leave_out)
-    before = remembered(path)
+    path = sightings_file(named)
+    if forgotten:
+        forget(path, forgotten)
+    before = read_sightings(path)
+    known = tuple(before) if roster is None else read_roster(roster)
     members = fleet(
-        endpoint, site=site, known=tuple(before) if roster is None else read_roster(roster), **reaching
-    )
+        named["connect"], site=named["site"], known=known, timeout_s=timeout_s, insecure=insecure,
+        keys=named["keys"],
+    )  # fmt: skip
     seen = {
         member.robot: LastSeen(at=now_utc(), state=member.state.state) for member in members if member.state
     }
@@ -204,16 +213,23 @@ def fleet_status(
         print_json({"robots": [member_json(member, before.get(member.robot)) for member in members]})
     else:
         for member in members:
-            tell(member_line(member, before.get(member.robot)))
+            print_line(member_line(member, before.get(member.robot)))
     if len(seen) < len(members):
         raise typer.Exit(1)
 
 
+def sightings_file(named: dict[str, Any]) -> Path:
+    """Return the file of the robots that were seen at an endpoint and a site."""
+    from stopgo.bridge.station.roster import default_sightings_file
+
+    return default_sightings_file(named["connect"], named["site"])
+
+
 def member_json(member: FleetMember, before: LastSeen | None) -> dict[str, Any]:
-    """The same keys for every robot; a silent one has no values but its name and when it was last seen."""
-    told = dict.fromkeys(STATUS_KEYS) if member.state is None else status_json(member.state)
+    """Return a robot's state for JSON; the keys are the same for a robot that does not answer."""
+    state = dict.fromkeys(STATUS_KEYS) if member.state is None else status_json(member.state)
     last = None if before is None or member.state else before.at.isoformat(timespec="seconds")
-    return told | {
+    return state | {
         "robot": member.robot,
         "silent": member.state is None,
         "trouble": member.trouble,
@@ -222,7 +238,7 @@ def member_json(member: FleetMember, before: LastSeen | None) -> dict[str, Any]:
 
 
 def member_line(member: FleetMember, before: LastSeen | None) -> str:
-    """One line of a fleet."""
+    """Return the line of one robot of a fleet."""
     if member.state is not None:
         return state_line(member.state)
     last = (
@@ -230,24 +246,26 @@ def member_line(member: FleetMember, before: LastSeen | None) -> str:
         if before is None
         else f"{before.state} when last seen, {before.at:%Y-%m-%d %H:%M} UTC"
     )
-    return f"{member.robot}: SILENT; {last}; {member.trouble}"
+    return f"{member.robot}: NO DATA; {last}; {member.trouble}"
 
 
 def status_json(report: StateReport) -> dict[str, Any]:
+    """Return a state for JSON."""
     return {key: getattr(report, key) for key in STATUS_KEYS}
 
 
 def report_answer(answer: Answer, robot: str, json_: bool) -> None:
-    with carried_out(f"{robot}: {answer.verb} was carried out"):
+    """Print the robot's answer to a command."""
+    with reporting_done(f"{robot}: {answer.verb} was carried out"):
         if json_:
             print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
                         "run_id": answer.run_id, "state": answer.state})  # fmt: skip
         else:
-            tell(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
 
 
 def state_line(report: StateReport) -> str:
-    """The state as one line a person reads."""
+    """Return the state as one line of text."""
     from stopgo.mission.run.tolerance import stops_outside_text
 
     mission = (

@@ -1,26 +1,44 @@
-"""`stopgo robot`: the robot's end, with a base and scanner that are simulated or an autopilot's."""
+"""`stopgo robot`: the robot agent, with a simulated base and scanner, an autopilot's, or your own."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.bridge.commands.connection import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
+    ArmInRun,
+    AutopilotId,
+    ControllerKind,
+    Endurance,
+    FaultsOfRobot,
     Insecure,
+    JournalFolder,
     KeyFolder,
+    Listen,
+    LogSize,
+    OnRevision,
+    OwnName,
+    RouterEndpoint,
+    ScannerTrigger,
     SigningKey,
+    SimulatedPose,
     SiteName,
-    alone,
-    given_in,
+    SiteToMap,
+    SpeedUp,
 )
+from stopgo.bridge.commands.connection import GivenOptions, given_options, refuse_options
 from stopgo.bridge.console import say
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
     from stopgo.bridge.mavlink.driving.mavlink_scanner import ScanTrigger
+    from stopgo.bridge.robot.program import RobotOptions
+    from stopgo.bridge.robot.robot_hardware import OpenBody
+    from stopgo.bridge.robot.simulator import Faults
     from stopgo.mission.frames.transform import Transform
     from stopgo.mission.run.events import Pose
     from stopgo.mission.run.revision import RevisionPolicy
@@ -35,100 +53,111 @@ ONLY_DRIVEN = ("--arm", "--trigger", "--vehicle", "--signing-key")
 def robot(
     context: typer.Context,
     *,
-    name: Annotated[str, typer.Option("--name", help="Name of this robot.")],
-    state: Annotated[Path, typer.Option("--state", metavar="DIR", help="Its journal; one per robot.")],
-    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
-    connect: Annotated[
-        str | None, typer.Option(metavar="ENDPOINT", help="A router to connect to, instead of listening.")
-    ] = None,
+    name: OwnName,
+    state: JournalFolder,
+    listen: Listen = DEFAULT_ENDPOINT,
+    connect: RouterEndpoint = None,
     site: SiteName = None,
     keys: KeyFolder = None,
     insecure: Insecure = False,
-    revision: Annotated[
-        str, typer.Option(metavar="next-stop|refuse", help="What becomes of a revision pushed during a run.")
-    ] = "next-stop",
-    record: Annotated[
-        float, typer.Option(metavar="MB", min=1, help="How much of its disk the record of its runs may take.")
-    ] = 512,
-    controller: Annotated[
-        str,
-        typer.Option(
-            metavar="sim|mavlink:URL|MODULE:FUNCTION",
-            help="What carries the scanner: numbers, an autopilot, or a base and scanner of your own.",
-        ),
-    ] = "sim",
-    at: Annotated[
-        str | None,
-        typer.Option("--at", metavar="X,Y,HEADING", help="sim: where it stands; else at the start."),
-    ] = None,
-    map_: Annotated[
-        str | None,
-        typer.Option("--map", metavar="X,Y,HEADING", help="sim: site to map; turn by HEADING, then shift."),
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="sim: what is to go wrong, as slip@2=0.2."),
-    ] = None,
-    speed_up: Annotated[
-        float, typer.Option("--speed-up", min=0.01, max=1000, help="sim: how much faster its time runs.")
-    ] = 1.0,
-    endurance: Annotated[
-        float,
-        typer.Option(
-            metavar="HOURS", min=0, help="sim: how long a full battery lasts; 0: it does not run down."
-        ),
-    ] = 6.0,
-    vehicle: Annotated[
-        int | None, typer.Option(metavar="ID", help="mavlink: the system id, if several are heard.")
-    ] = None,
-    arm: Annotated[bool, typer.Option("--arm", help="mavlink: arm it when a run needs that.")] = False,
-    trigger: Annotated[
-        str, typer.Option(metavar="camera|script", help="mavlink: what makes the scanner scan.")
-    ] = "camera",
+    revision: OnRevision = "next-stop",
+    record: LogSize = 512,
+    controller: ControllerKind = "sim",
+    at: SimulatedPose = None,
+    map_: SiteToMap = None,
+    fault: FaultsOfRobot = None,
+    speed_up: SpeedUp = 1.0,
+    endurance: Endurance = 6.0,
+    vehicle: AutopilotId = None,
+    arm: ArmInRun = False,
+    trigger: ScannerTrigger = "camera",
     signing_key: SigningKey = None,
 ) -> None:
-    """Be a robot, with a simulated base and scanner or those of an autopilot, until SIGTERM.
+    """Run the robot agent with a simulated base and scanner, or those of an autopilot, until SIGTERM.
 
     Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
 
     Example: stopgo robot --name r1 --state r1.state --controller mavlink:serial:/dev/ttyAMA0:921600
     """
-    from stopgo.bridge.robot.program import RobotOptions, run_robot
-    from stopgo.bridge.robot.robot_hardware import OpenBody, SimulatedBody
-    from stopgo.bridge.robot.simulator import Faults, read_fault
+    from stopgo.bridge.robot.program import RobotOptions
 
-    given = given_in(context)
-    if connect is not None:
-        alone(given, "--connect", "--listen")
-    faults, to_map = Faults(tuple(read_fault(text) for text in fault or ())), read_map(map_)
+    given = given_options(context)
+    simulated = SimulatedOptions(at, read_map(map_), 3600 * endurance, read_faults(fault))
+    driven = AutopilotOptions(arm, trigger, signing_key, vehicle, insecure)
+    body = body_of(controller, state, given, simulated, driven)
+    run(RobotOptions(
+        name, listen, state, body, connect=connect, site=site, speed_up=speed_up, to_map=simulated.to_map,
+        insecure=insecure, keys=keys, revisions=read_revisions(revision), faults=simulated.faults, say=say,
+        record_bytes=round(record * 1e6),
+    ), given)  # fmt: skip
+
+
+def run(options: RobotOptions, given: GivenOptions) -> None:
+    """Run the robot agent until SIGTERM."""
+    from stopgo.bridge.robot.program import run_robot
+
+    if options.connect is not None:
+        refuse_options(given, "--connect", "--listen")
+    where = f"listens on {options.listen}" if options.connect is None else f"connects to {options.connect}"
+    run_robot(options, ready=lambda: say(f"ready {options.name} {where}"))
+
+
+@dataclass(frozen=True)
+class SimulatedOptions:
+    """Options of a simulated base and scanner; a controller of one's own takes `to_map` too."""
+
+    at: str | None
+    to_map: Transform | None
+    runtime_s: float
+    """Runtime per battery charge."""
+    faults: Faults
+
+
+@dataclass(frozen=True)
+class AutopilotOptions:
+    """Options of an autopilot as the controller."""
+
+    arm: bool
+    trigger: str
+    signing_key: Path | None
+    vehicle: int | None
+    insecure: bool
+
+
+def body_of(
+    controller: str, state: Path, given: GivenOptions, simulated: SimulatedOptions, driven: AutopilotOptions
+) -> OpenBody:
+    """Return the base and scanner of a kind of controller; raise `InputError` for options of another kind."""
     if controller == "sim":
-        alone(given, "a simulated robot", *ONLY_DRIVEN)
-        body: OpenBody = SimulatedBody(
-            state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
-        )
-    elif controller.startswith(MAVLINK):
+        from stopgo.bridge.robot.robot_hardware import SimulatedBody
+
+        refuse_options(given, "a simulated robot", *ONLY_DRIVEN)
+        at = None if simulated.at is None else read_pose("--at", simulated.at)
+        return SimulatedBody(state, at, simulated.to_map, simulated.runtime_s, simulated.faults)
+    if controller.startswith(MAVLINK):
         from stopgo.bridge.mavlink.driving.autopilot_body import AutopilotBody
 
-        alone(given, "an autopilot", *ONLY_SIMULATED)
-        url = controller.removeprefix(MAVLINK)
-        body = AutopilotBody(url, arm, read_trigger(trigger), signing_key, vehicle, insecure)
-    else:
-        from stopgo.bridge.robot.plugin_body import plugin_body
+        refuse_options(given, "an autopilot", *ONLY_SIMULATED)
+        return AutopilotBody(
+            controller.removeprefix(MAVLINK), driven.arm, read_trigger(driven.trigger), driven.signing_key,
+            driven.vehicle, driven.insecure,
+        )  # fmt: skip
+    from stopgo.bridge.robot.plugin_body import plugin_body
 
-        others = tuple(option for option in ONLY_SIMULATED if option != "--map")
-        alone(given, "a controller of your own", *others, *ONLY_DRIVEN)
-        body = plugin_body(controller, state, to_map)
-    options = RobotOptions(
-        name=name, listen=listen, connect=connect, state=state, body=body, site=site, speed_up=speed_up,
-        to_map=to_map, insecure=insecure, revisions=read_revisions(revision), keys=keys, faults=faults,
-        say=say, record_bytes=round(record * 1e6),
-    )  # fmt: skip
-    where = f"listens on {listen}" if connect is None else f"connects to {connect}"
-    run_robot(options, ready=lambda: say(f"ready {name} {where}"))
+    others = tuple(option for option in ONLY_SIMULATED if option != "--map")
+    refuse_options(given, "a controller of your own", *others, *ONLY_DRIVEN)
+    return plugin_body(controller, state, simulated.to_map)
+
+
+def read_faults(texts: list[str] | None) -> Faults:
+    """Read the faults to simulate, each as KIND@N[=AMOUNT]."""
+    from stopgo.bridge.robot.simulator import Faults, read_fault
+
+    return Faults(tuple(read_fault(text) for text in texts or ()))
 
 
 def read_revisions(text: str) -> RevisionPolicy:
-    """What a robot does with a revision that is pushed during a run."""
+    """Read the handling of a revision that is pushed during a run."""
     from stopgo.mission.run.revision import POLICIES
 
     if text not in POLICIES:
@@ -137,7 +166,7 @@ def read_revisions(text: str) -> RevisionPolicy:
 
 
 def read_trigger(text: str) -> ScanTrigger:
-    """What makes an autopilot's scanner scan."""
+    """Read the trigger of an autopilot's scanner."""
     from stopgo.bridge.mavlink.driving.mavlink_scanner import TRIGGERS
 
     known = next((trigger for trigger in TRIGGERS if trigger == text), None)
@@ -147,12 +176,12 @@ def read_trigger(text: str) -> ScanTrigger:
 
 
 def read_map(text: str | None) -> Transform | None:
-    """Site to map, if it was told."""
+    """Read the transform from the site frame to the map, if one was given."""
     return None if text is None else read_transform("--map", text)
 
 
 def read_transform(option: str, text: str) -> Transform:
-    """A transform from X,Y,HEADING in metres and degrees."""
+    """Read a transform from X,Y,HEADING in metres and degrees."""
     from stopgo.mission.frames.transform import Transform
 
     pose = read_pose(option, text)
@@ -160,7 +189,7 @@ def read_transform(option: str, text: str) -> Transform:
 
 
 def read_pose(option: str, text: str) -> Pose:
-    """A pose from X,Y,HEADING in metres and degrees."""
+    """Read a pose from X,Y,HEADING in metres and degrees."""
     import math
 
     from stopgo.mission.run.events import Pose

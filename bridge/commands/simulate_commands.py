@@ -1,19 +1,29 @@
-"""`stopgo simulate`: what exists only as numbers, to try a mission or a ground station against."""
+"""`stopgo simulate`: simulated vehicles, to try a mission or a ground station against."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
 
-from stopgo.bridge.commands.connection import Insecure, SigningKey
+from stopgo.bridge.commands.bridge_options import (
+    Exact,
+    FaultsOfVehicle,
+    Insecure,
+    ParameterValues,
+    Seed,
+    SigningKey,
+    SimulatedAutopilot,
+    SimulatedOrigin,
+    SimulatedState,
+    SimulatedUrl,
+    SpeedUp,
+    VehiclePose,
+)
 from stopgo.bridge.commands.robot_commands import read_pose
 from stopgo.bridge.console import say
 
 
 def simulate_commands() -> typer.Typer:
-    """`stopgo simulate` with its verbs."""
+    """Return `stopgo simulate` with its subcommands."""
     commands = typer.Typer(
         help="Simulate a MAVLink vehicle (a robot of stopgo simulates itself, see stopgo robot)."
         "\n\nExample: stopgo simulate vehicle --profile ardupilot --origin 47.4,8.5,400",
@@ -24,42 +34,20 @@ def simulate_commands() -> typer.Typer:
 
 def simulate_vehicle(
     *,
-    mavlink: Annotated[
-        str, typer.Option("--mavlink", metavar="URL", help="Where it listens, or the station it speaks to.")
-    ] = "udpin:127.0.0.1:14550",
-    profile: Annotated[
-        str, typer.Option(metavar="strict|ardupilot|px4", help="The autopilot whose habits it has.")
-    ] = "strict",
-    state: Annotated[
-        Path | None, typer.Option("--state", metavar="DIR", help="Where it keeps its items and its place.")
-    ] = None,
-    origin: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON,ALT[,HEADING]", help="Its global origin from the start."),
-    ] = None,
-    at: Annotated[
-        str | None,
-        typer.Option("--at", metavar="X,Y,HEADING", help="Where it stands in the site's frame."),
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as nack@3."),
-    ] = None,
-    exact: Annotated[
-        bool, typer.Option("--exact", help="It stands at every place to the last digit, as no real one does.")
-    ] = False,
-    seed: Annotated[int, typer.Option(help="Of all that is left to chance.")] = 1,
-    param: Annotated[
-        list[str] | None,
-        typer.Option("--param", metavar="NAME=VALUE", help="Set one of its parameters, as WP_RADIUS=0.1."),
-    ] = None,
-    speed_up: Annotated[
-        float, typer.Option("--speed-up", min=0.01, max=1000, help="How much faster its own time runs.")
-    ] = 1.0,
+    mavlink: SimulatedUrl = "udpin:127.0.0.1:14550",
+    profile: SimulatedAutopilot = "strict",
+    state: SimulatedState = None,
+    origin: SimulatedOrigin = None,
+    at: VehiclePose = None,
+    fault: FaultsOfVehicle = None,
+    exact: Exact = False,
+    seed: Seed = 1,
+    param: ParameterValues = None,
+    speed_up: SpeedUp = 1.0,
     signing_key: SigningKey = None,
     insecure: Insecure = False,
 ) -> None:
-    """Be a rover that speaks MAVLink as an autopilot does, until SIGTERM.
+    """Simulate a rover with an autopilot that speaks MAVLink, until SIGTERM.
 
     Example: stopgo simulate vehicle --mavlink udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
     """

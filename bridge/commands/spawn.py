@@ -1,4 +1,4 @@
-"""Starts a robot as a process of its own, for demonstrations and tests, and ends it again."""
+"""Robot agents as child processes, for demonstrations and tests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stopgo.mission.errors import RobotUnreachable
 READY_S = 60.0
 END_S = 30.0
 READY = "ready "
-"""How the line begins that a robot says once it can be reached."""
+"""Prefix of the line that a robot prints once it can be reached."""
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def robot_process(
     speed_up: float = 1.0,
     extra: Sequence[str] = (),
 ) -> Iterator[str]:
-    """A robot in another process; gives the endpoint it listens on (a free port of 127.0.0.1 by default)."""
+    """Run a robot in a child process; yield its endpoint (by default a free port of 127.0.0.1)."""
     endpoint = listen or f"tcp/127.0.0.1:{free_port()}"
     process = start_robot(name, state, listen=endpoint, speed_up=speed_up, extra=extra)
     try:
@@ -40,12 +40,12 @@ def robot_process(
 def start_robot(
     name: str, state: Path, *, listen: str | None, speed_up: float = 1.0, extra: Sequence[str] = ()
 ) -> subprocess.Popen[str]:
-    """The process of a robot that is ready; one that connects to a router (`extra`) listens nowhere.
+    """Start a robot, and return its process once it is ready; with a router (`extra`) it does not listen.
 
     Raises
     ------
     RobotUnreachable
-        With the last line the robot said, if it ended or did not get ready.
+        If the robot ended or did not get ready; the message has its last line.
     """
     own = ["--name", name, "--state", str(state)]
     own += [] if listen is None else ["--listen", listen]
@@ -54,7 +54,7 @@ def start_robot(
 
 
 def start(*arguments: str, called: str) -> subprocess.Popen[str]:
-    """The process of a stopgo command that says when it is ready; raises as `start_robot` does."""
+    """Start a stopgo command that prints when it is ready; raises the errors of `start_robot`."""
     command = [sys.executable, "-m", "stopgo", *arguments]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     lines: list[str] = []
@@ -63,12 +63,12 @@ def start(*arguments: str, called: str) -> subprocess.Popen[str]:
     ready.wait(READY_S)
     if not any(line.startswith(READY) for line in lines):
         end_robot(process)
-        raise RobotUnreachable(f"{called} did not start: {lines[-1].strip() if lines else 'it said nothing'}")
+        raise RobotUnreachable(f"{called} did not start: {lines[-1].strip() if lines else 'no output'}")
     return process
 
 
 def end_robot(process: subprocess.Popen[str]) -> None:
-    """Ask the robot to end, and make sure that it does."""
+    """End the robot's process; kill it if it does not end in time."""
     if process.poll() is None:
         process.send_signal(signal.SIGTERM)
     try:
@@ -79,7 +79,7 @@ def end_robot(process: subprocess.Popen[str]) -> None:
 
 
 def _read(process: subprocess.Popen[str], lines: list[str], ready: threading.Event) -> None:
-    """Keep reading what the robot says, so that it is never held up by a full pipe."""
+    """Read the robot's output, so that a full pipe never blocks it."""
     assert process.stderr is not None
     for line in process.stderr:
         lines.append(line)

@@ -1,40 +1,52 @@
-"""`stopgo tunnel`: raw MAVLink frames over zenoh, so that a ground program on a station reaches a vehicle."""
+"""`stopgo tunnel`: raw MAVLink frames over zenoh, from a vehicle to ground programs on stations."""
 
 from __future__ import annotations
 
 import signal
 import time
-from typing import TYPE_CHECKING, Annotated
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.bridge.commands.connection import (
+from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
     Connect,
+    GroundProgram,
     Insecure,
+    JoinedRobot,
     KeyFolder,
+    Listen,
+    OwnName,
+    RawOrders,
     RobotName,
     SiteName,
-    alone,
-    given_in,
+    TunnelledVehicle,
 )
+from stopgo.bridge.commands.connection import given_options, refuse_options
 from stopgo.bridge.console import say
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from stopgo.bridge.link.link import Link
+    from stopgo.bridge.link.protocol import KeyExpressions
+    from stopgo.bridge.link.zenoh_link import Guard
     from stopgo.bridge.mavlink.line.transport import Transport
     from stopgo.bridge.mavlink.tunnel.tunnel import Tunnel
     from stopgo.mission.mavlink.telemetry import Message
 
 MOST_KINDS = 100
-"""More are the sign of nonsense, which is not worth a line each."""
+"""Kinds of messages that are reported; more kinds come from damaged or hostile data."""
 REFUSED = "tunnel refused "
-"""So begins the STATUSTEXT that tells of it."""
+"""Prefix of the STATUSTEXT that reports a refusal."""
+ONLY_STOPS = "blocked, only telemetry and stop commands are allowed; use --raw-orders to allow all"
 SAY_EVERY_S = 1.0
-"""A ground program that asks again and again need not be told each time."""
+"""Shortest time between two reports of the same kind; a ground program may repeat its request."""
 
 
 def tunnel_commands() -> typer.Typer:
-    """`stopgo tunnel` with its two ends."""
+    """Return `stopgo tunnel` with its two endpoints."""
     commands = typer.Typer(
         help="Carry raw MAVLink frames over zenoh, between a vehicle and ground programs on stations."
         "\n\nExample: stopgo tunnel robot --name r1 --mavlink serial:/dev/ttyAMA1:57600 &&"
@@ -48,69 +60,77 @@ def tunnel_commands() -> typer.Typer:
 def tunnel_robot(
     context: typer.Context,
     *,
-    name: Annotated[str, typer.Option("--name", help="Name of this robot.")],
-    mavlink: Annotated[str, typer.Option("--mavlink", metavar="URL", help="Where the vehicle is.")],
-    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
-    connect: Annotated[
-        str | None,
-        typer.Option(metavar="ENDPOINT", help="The robot's own endpoint to join, instead of listening."),
-    ] = None,
-    raw_orders: Annotated[
-        bool, typer.Option("--raw-orders", help="Let stations order anything, not only look and stop.")
-    ] = False,
+    name: OwnName,
+    mavlink: TunnelledVehicle,
+    listen: Listen = DEFAULT_ENDPOINT,
+    connect: JoinedRobot = None,
+    raw_orders: RawOrders = False,
     site: SiteName = None,
     insecure: Insecure = False,
     keys: KeyFolder = None,
 ) -> None:
-    """Be the tunnel's end at the robot, until SIGTERM.
+    """Run the tunnel's endpoint at the robot, until SIGTERM.
 
-    Without --raw-orders stations can look at the vehicle and stop it, and nothing else: the commander's
-    lease does not count here.
+    Without --raw-orders stations receive the vehicle's telemetry and can stop it, and nothing else. The
+    commander's lease does not count here.
 
     Example: stopgo tunnel robot --name r1 --mavlink serial:/dev/ttyAMA1:57600 --connect tcp/127.0.0.1:7447
     """
-    from stopgo.bridge.link.access import access_control
     from stopgo.bridge.link.protocol import KeyExpressions
-    from stopgo.bridge.link.zenoh_link import Guard, joining, listening
-    from stopgo.bridge.mavlink.line.url import read_url
-    from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
-    from stopgo.bridge.mavlink.tunnel.tunnel import answer_greetings, open_tunnel
-    from stopgo.bridge.robot.controller import new_boot_id
-    from stopgo.bridge.robot.program import robots_keys
+    from stopgo.bridge.link.zenoh_link import joining, listening
+    from stopgo.bridge.mavlink.tunnel.tunnel import answer_greetings
 
     if connect is not None:
-        alone(given_in(context), "--connect", "--listen")
+        refuse_options(given_options(context), "--connect", "--listen")
     _leave_on_sigterm()
-    own, held = KeyExpressions(name, site), None if keys is None else robots_keys(keys, name)
-    judge, refusals = MessageFilter(), Refusals()
-    # One that joins is reached by nobody but the robot's own end, which decides who may what.
-    access = None if held is None or connect else access_control(own)
-    guard = Guard(held, insecure, access, new_boot_id())
+    own = KeyExpressions(name, site)
+    guard = _guard(own, keys, insecure=insecure, joins=connect is not None)
     transport = _transport(mavlink, insecure)
     opened = joining(connect, guard) if connect else listening(listen, guard)
-    with opened as link, open_tunnel(
-        link, transport, tells=own.mavlink("down"), hears=own.mavlink("up"), bulk=True, sees=judge.sees,
-        passes=(lambda message: True) if raw_orders else judge.lets_through, refused=refusals.told,
-        knocks=read_url(mavlink).kind == "udpout",
-    ) as tunnel:  # fmt: skip
+    with opened as link, _robot_end(link, transport, own, mavlink, raw_orders=raw_orders) as tunnel:
         answer_greetings(link, own.mavlink("hello"))
         link.announce(own.mavlink("alive"))
         say(f"ready {name} {'joins ' + connect if connect else 'listens on ' + listen}, vehicle at {mavlink}")
-        _work(tunnel)
+        _run(tunnel)
+
+
+def _guard(own: KeyExpressions, keys: Path | None, *, insecure: bool, joins: bool) -> Guard:
+    """Return the guard of the robot's link; the robot agent controls the access to one that joins it."""
+    from stopgo.bridge.link.access import access_control
+    from stopgo.bridge.link.zenoh_link import Guard
+    from stopgo.bridge.robot.controller import new_boot_id
+    from stopgo.bridge.robot.program import robots_keys
+
+    held = None if keys is None else robots_keys(keys, own.robot)
+    access = None if held is None or joins else access_control(own)
+    return Guard(held, insecure, access, new_boot_id())
+
+
+def _robot_end(
+    link: Link, transport: Transport, own: KeyExpressions, mavlink: str, *, raw_orders: bool
+) -> AbstractContextManager[Tunnel]:
+    from stopgo.bridge.mavlink.line.url import read_url
+    from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
+    from stopgo.bridge.mavlink.tunnel.tunnel import open_tunnel
+
+    messages = MessageFilter()
+    return open_tunnel(
+        link, transport, tells=own.mavlink("down"), hears=own.mavlink("up"), bulk=True, sees=messages.sees,
+        passes=(lambda message: True) if raw_orders else messages.lets_through,
+        refused=RefusalSender().text_of, knocks=read_url(mavlink).kind == "udpout",
+    )  # fmt: skip
 
 
 def tunnel_station(
     *,
     robot: RobotName,
-    mavlink: Annotated[
-        str, typer.Option("--mavlink", metavar="URL", help="Where the ground program is.")
-    ] = "udpout:127.0.0.1:14550",
+    mavlink: GroundProgram = "udpout:127.0.0.1:14550",
     connect: Connect = DEFAULT_ENDPOINT,
     site: SiteName = None,
     insecure: Insecure = False,
     keys: KeyFolder = None,
 ) -> None:
-    """Be the tunnel's end at a station, until Ctrl-C; with a viewer's keys it only listens.
+    """Run the tunnel's endpoint at a station, until Ctrl-C; with a viewer's keys it only receives.
 
     Example: stopgo tunnel station --robot r1 --connect tcp/10.0.0.5:7447 --mavlink udpout:127.0.0.1:14550
     """
@@ -121,62 +141,59 @@ def tunnel_station(
 
     _leave_on_sigterm()
     own, held = KeyExpressions(robot, site), None if keys is None else read_keys(keys, now=now_utc())
-    speaks = held is None or held.holder.role == "station"
+    sends = held is None or held.holder.role == "station"
     transport = _transport(mavlink, insecure)
-    end = f"the tunnel's end at {robot}"
+    end = f"the tunnel's endpoint at {robot}"
     with connecting(connect, Guard(held, insecure)) as link, open_tunnel(
-        link, transport, tells=own.mavlink("up") if speaks else None, hears=own.mavlink("down"),
-        wrote=RefusalsHeard(robot).hears,
+        link, transport, tells=own.mavlink("up") if sends else None, hears=own.mavlink("down"),
+        wrote=RefusalListener(robot).take,
     ) as tunnel, greeting(
         link, own.mavlink("hello"), own.mavlink("alive"),
-        lambda key, alive: say(f"{end} is {'there' if alive else 'gone'}"),
+        lambda key, alive: say(f"{end} is {'connected' if alive else 'disconnected'}"),
     ):  # fmt: skip
         say(f"ready {robot} at {connect}, ground program at {mavlink}")
-        _work(tunnel)
+        _run(tunnel)
 
 
-class Refusals:
-    """Says what was refused, to the person at the robot and to whoever sent it."""
+class RefusalSender:
+    """Reports blocked messages: on stderr at the robot, and to the sender as a STATUSTEXT."""
 
     def __init__(self) -> None:
-        self._said: dict[str, float] = {}
+        self._reported_s: dict[str, float] = {}
 
-    def told(self, message: Message) -> bytes:
-        """A STATUSTEXT that tells of it, or nothing if that was told a moment ago."""
+    def text_of(self, message: Message) -> bytes:
+        """Return the STATUSTEXT for a blocked message; empty if one was sent less than a second ago."""
         from stopgo.bridge.mavlink.line.messages import warning
         from stopgo.bridge.mavlink.tunnel.message_filter import described
 
         what, now = described(message), time.monotonic()
-        if now - self._said.get(what, -SAY_EVERY_S) < SAY_EVERY_S:
+        if now - self._reported_s.get(what, -SAY_EVERY_S) < SAY_EVERY_S:
             return b""
-        if what not in self._said:
-            say(f"refused {what}: only looking and stopping pass without --raw-orders")
-        self._said[what] = now
+        if what not in self._reported_s:
+            say(f"refused {what}: {ONLY_STOPS}")
+        self._reported_s[what] = now
         return warning(f"{REFUSED}{what}", system=getattr(message, "target_system", 0) or 1)
 
 
-class RefusalsHeard:
-    """Says at the station, once for each kind of message, what the tunnel's end at the robot refused."""
+class RefusalListener:
+    """Reports at the station, once for each kind, messages that the robot's endpoint blocked."""
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
-        self._said: set[str] = set()
+        self._reported: set[str] = set()
 
-    def hears(self, message: Message) -> None:
-        """Look at a message that came from the robot's end."""
+    def take(self, message: Message) -> None:
+        """Read a message from the robot's endpoint, and report it if it is a refusal."""
         if message.get_type() != "STATUSTEXT" or not message.text.startswith(REFUSED):
             return
         what = message.text.removeprefix(REFUSED)
-        if what not in self._said and len(self._said) < MOST_KINDS:
-            self._said.add(what)
-            say(
-                f"the tunnel's end at {self._robot} refused {what}: "
-                "only looking and stopping pass without --raw-orders there"
-            )
+        if what not in self._reported and len(self._reported) < MOST_KINDS:
+            self._reported.add(what)
+            say(f"the tunnel's endpoint at {self._robot} refused {what}: {ONLY_STOPS} there")
 
 
 def _transport(mavlink: str, insecure: bool) -> Transport:
-    """The MAVLink side: on this machine, or elsewhere if that is wanted, for nothing is signed here."""
+    """Open the MAVLink side; beyond this machine it needs --insecure, because nothing is signed here."""
     from stopgo.bridge.mavlink.line.transport import open_transport
     from stopgo.bridge.mavlink.line.url import check_guarded, read_url
 
@@ -185,8 +202,8 @@ def _transport(mavlink: str, insecure: bool) -> Transport:
     return open_transport(url)
 
 
-def _work(tunnel: Tunnel) -> None:
-    """Until it is told to end; then say what was done."""
+def _run(tunnel: Tunnel) -> None:
+    """Run the tunnel until a signal ends it, then print its statistics."""
     from stopgo.bridge.mavlink.tunnel.tunnel import told
 
     try:

@@ -1,4 +1,4 @@
-"""What `push`, `fetch-mission` and `clear` do with an autopilot, and what they print."""
+"""The commands `push`, `fetch-mission` and `clear` for a vehicle with an autopilot."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
-from stopgo.bridge.console import Bar, print_json, say, tell, tell_lines
+from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
 from stopgo.bridge.mavlink.auto.logbook import forget, logbook, remember
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
 from stopgo.bridge.mavlink.line.origin import check_origin
@@ -44,26 +44,40 @@ from stopgo.mission.mavlink.read_back import home_item
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.mavlink.translation_options import ScanWait, Settle, Trigger
 
+if TYPE_CHECKING:
+    from stopgo.bridge.commands.connection import Connection
+
 ITEMS = ("items", 1)
+"""Unit of the progress bars."""
 T = TypeVar("T", bound=str)
 
 
 @dataclass(frozen=True)
-class Line:
-    """Which vehicle, and how it is spoken to."""
+class VehicleLink:
+    """Address of a vehicle, and parameters of the link to it."""
 
     url: str
     vehicle: int | None = None
     signing_key: Path | None = None
     insecure: bool = False
     autopilot: str | None = None
-    """Its kind, if its heartbeat is not to be believed."""
+    """Kind of the autopilot, if its heartbeat names another."""
     timeout_s: float = 5.0
+
+    @staticmethod
+    def of(connection: Connection, autopilot: str | None, patience_s: float | None) -> VehicleLink:
+        """Return the link of a command's connection; a given patience replaces its timeout."""
+        vehicle = connection.mavlink
+        assert vehicle is not None
+        timeout_s = patience_s or connection.timeout_s
+        return VehicleLink(
+            vehicle.url, vehicle.vehicle, vehicle.signing_key, connection.insecure, autopilot, timeout_s
+        )
 
 
 @dataclass(frozen=True)
-class Writing:
-    """How a mission becomes items; `translate` says what each means."""
+class ItemOptions:
+    """Translation of a mission to items; `translate` explains each value."""
 
     trigger: str = "auto"
     scan_wait: str = "delay"
@@ -71,8 +85,8 @@ class Writing:
 
 
 @dataclass(frozen=True)
-class Leave:
-    """What is not done unless it is asked for."""
+class PushConsent:
+    """Actions that a push takes only if the user asks for them."""
 
     set_origin: bool = False
     any_origin: bool = False
@@ -80,38 +94,44 @@ class Leave:
 
 
 def push_mission(
-    mission: Mission, line: Line, *, writing: Writing, leave: Leave, state: Path | None, as_json: bool
+    mission: Mission,
+    link: VehicleLink,
+    *,
+    items: ItemOptions,
+    consent: PushConsent,
+    state: Path | None,
+    as_json: bool,
 ) -> None:
-    """Put a mission on an autopilot, see it there, and note down that it is there."""
-    made = None if line.autopilot is None else _translated(mission, line.autopilot, writing)
+    """Upload a mission to an autopilot, verify it there, and store in the logbook that it was sent."""
+    made = None if link.autopilot is None else _translated(mission, link.autopilot, items)
     with ExitStack() as opened:
         with if_stopped(say, lambda: NOTHING_SENT):
-            url, peer = opened.enter_context(_peer(line))
-        sent = made or _translated(mission, peer.autopilot.name, writing)
-        if not leave.while_running:
+            url, peer = opened.enter_context(_peer(link))
+        sent = made or _translated(mission, peer.autopilot.name, items)
+        if not consent.while_running:
             with logbook(url, peer.who.system, state) as book:
                 check_run_over(peer, url, book, "a push")
-        check_standing(peer, leave.while_running)
+        check_standing(peer, consent.while_running)
         site = sent.origin
         with if_stopped(say, lambda: NOTHING_SENT):
-            origin = None if leave.any_origin else check_origin(peer, site, set_it=leave.set_origin)
-        beside = _why_beside(peer, mission)
-        if beside:
-            say(beside)
+            origin = None if consent.any_origin else check_origin(peer, site, set_it=consent.set_origin)
+        deviation = _path_deviation_note(peer, mission)
+        if deviation:
+            say(deviation)
         with Bar("pushing", ITEMS) as bar:
-            done = upload(peer, sent, while_running=leave.while_running, progress=bar.show, tell=say)
-        _note_down(url, peer, mission, sent, state, done)
+            done = upload(peer, sent, while_running=consent.while_running, progress=bar.show, tell=say)
+        _store_sent(url, peer, mission, sent, state, done)
         for note in sent.notes:
             say(f"note: {note}")
-        notes = (beside, *sent.notes) if beside else sent.notes
+        notes = (deviation, *sent.notes) if deviation else sent.notes
         _report_push(peer, mission, replace(sent, notes=notes), done, origin, as_json)
 
 
-def fetch_mission(line: Line, *, out: Path | None, as_json: bool) -> None:
-    """Read what an autopilot holds, and show it or write it to a file."""
+def fetch_mission(link: VehicleLink, *, out: Path | None, as_json: bool) -> None:
+    """Read the mission on an autopilot, and show it or write it to a file."""
     if out is not None:
         _check_suffix(out)
-    with _peer(line) as (_, peer), Bar("fetching", ITEMS) as bar:
+    with _peer(link) as (_, peer), Bar("fetching", ITEMS) as bar:
         read = download(peer, progress=bar.show)
         origin = None if out is None else peer.origin()
     own = own_items(peer, read)
@@ -121,14 +141,14 @@ def fetch_mission(line: Line, *, out: Path | None, as_json: bool) -> None:
         shown = {"file": str(out)} if out is not None else {"items": [_item_json(item) for item in own]}
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot.name, "count": len(own), **shown})
     elif out is not None:
-        tell(f"{out}: the {len(own)} items that {peer} holds")
+        print_line(f"{out}: the {len(own)} items that {peer} holds")
     else:
-        tell_lines(_page(peer, own))
+        print_text(_items_table(peer, own))
 
 
-def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_json: bool) -> None:
-    """Take the mission off an autopilot, see that it is gone, and note down that it is."""
-    with _peer(line) as (url, peer), logbook(url, peer.who.system, state) as book:
+def clear_mission(link: VehicleLink, *, state: Path | None, while_running: bool, as_json: bool) -> None:
+    """Clear the mission on an autopilot, verify that it holds none, and store that in the logbook."""
+    with _peer(link) as (url, peer), logbook(url, peer.who.system, state) as book:
         if not while_running:
             check_run_over(peer, url, book, "to clear it")
         had = clear(peer, while_running=while_running, tell=say)
@@ -136,16 +156,16 @@ def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_jso
     if as_json:
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot.name, "had": had})
     else:
-        tell(f"{peer} holds no mission (it had {had} items)")
+        print_line(f"{peer} holds no mission (it had {had} items)")
 
 
-def _translated(mission: Mission, autopilot: str, writing: Writing) -> ItemList:
+def _translated(mission: Mission, autopilot: str, items: ItemOptions) -> ItemList:
     return translate(
         mission,
         autopilot,
-        trigger=_choice("--trigger", writing.trigger, get_args(Trigger)),
-        scan_wait=_choice("--scan-wait", writing.scan_wait, get_args(ScanWait)),
-        settle=_choice("--settle", writing.settle, get_args(Settle)),
+        trigger=_choice("--trigger", items.trigger, get_args(Trigger)),
+        scan_wait=_choice("--scan-wait", items.scan_wait, get_args(ScanWait)),
+        settle=_choice("--settle", items.settle, get_args(Settle)),
     )
 
 
@@ -157,28 +177,28 @@ def _choice(option: str, text: str, known: tuple[T, ...]) -> T:
 
 
 @contextmanager
-def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
-    """The vehicle that is meant."""
-    if line.autopilot is not None:
-        _choice("--autopilot", line.autopilot, tuple(AUTOPILOTS))
-    url, key = read_line(line.url, line.signing_key, insecure=line.insecure)
-    with reached(url, vehicle=line.vehicle, signing_key=key, timeout_s=line.timeout_s) as peer:
-        peer.autopilot = autopilot_named(line.autopilot) if line.autopilot else peer.autopilot
+def _peer(link: VehicleLink) -> Iterator[tuple[Url, Peer]]:
+    """Connect to the vehicle."""
+    if link.autopilot is not None:
+        _choice("--autopilot", link.autopilot, tuple(AUTOPILOTS))
+    url, key = read_line(link.url, link.signing_key, insecure=link.insecure)
+    with reached(url, vehicle=link.vehicle, signing_key=key, timeout_s=link.timeout_s) as peer:
+        peer.autopilot = autopilot_named(link.autopilot) if link.autopilot else peer.autopilot
         yield url, peer
 
 
-def _why_beside(peer: Peer, mission: Mission) -> str:
-    """What its own parameters make of the mission's legs and tolerances, as far as it tells them."""
+def _path_deviation_note(peer: Peer, mission: Mission) -> str:
+    """Note if the vehicle's parameters, as far as it reports them, let it leave the legs or tolerances."""
     kind = peer.autopilot
     return accuracy_warning(
         mission, kind, read_parameters(peer, [kind.radius_parameter, *kind.steering.parameters])
     )
 
 
-def _note_down(
+def _store_sent(
     url: Url, peer: Peer, mission: Mission, sent: ItemList, state: Path | None, done: Uploaded
 ) -> None:
-    """Whoever follows the run must know what was sent; a run of the same mission is left as it is."""
+    """Store the items that were sent, for following the run; a repeated push leaves the run as it is."""
     with logbook(url, peer.who.system, state) as book:
         if not (done.already and book.listed is not None and book.listed.sent == sent):
             remember(book, mission, sent)
@@ -195,8 +215,8 @@ def _report_push(
             "origin": _origin_json(origin),
         })  # fmt: skip
         return
-    how = "held it already" if done.already else "read back and compared"
-    tell(
+    how = "already held" if done.already else "read back and compared"
+    print_line(
         f"{peer} holds {mission.name} ({mission.id[:12]} revision {mission.revision}): "
         f"{done.items} items for {len(mission.stops)} stops, {how}"
     )
@@ -204,7 +224,7 @@ def _report_push(
 
 def _check_suffix(out: Path) -> None:
     if out.suffix not in FILES:
-        raise InputError(f"{out}: what a vehicle holds is written to one of *{', *'.join(FILES)}")
+        raise InputError(f"{out}: unknown file format; write the mission to one of *{', *'.join(FILES)}")
 
 
 def _json_file(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> bytes:
@@ -228,16 +248,16 @@ def _waypoints_file(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | 
 def _plan_file(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> bytes:
     home, own = _home(peer, read, origin), own_items(peer, read)
     speeds = [item.params[1] for item in own if item.command == Command.DO_CHANGE_SPEED]
-    place = (home.x / STEPS_PER_DEGREE, home.y / STEPS_PER_DEGREE, home.z)
-    return qgc_plan.listed(own, peer.autopilot.name, home=place, speed=(*speeds, 1.0)[0])
+    position = (home.x / STEPS_PER_DEGREE, home.y / STEPS_PER_DEGREE, home.z)
+    return qgc_plan.listed(own, peer.autopilot.name, home=position, speed=(*speeds, 1.0)[0])
 
 
 FILES = {".json": _json_file, ".waypoints": _waypoints_file, ".plan": _plan_file}
-"""What a vehicle holds, as a file of each suffix."""
+"""File formats of a fetched mission, by suffix."""
 
 
 def _home(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> Item:
-    """The vehicle's home where it is among its items, else its origin, else the first place."""
+    """Return the home item of the vehicle, else its origin, else the position of the first item."""
     if peer.autopilot.home_first and read:
         return read[0]
     if origin is not None:
@@ -253,7 +273,7 @@ def _origin_json(origin: VehicleOrigin | None) -> dict[str, float] | None:
 
 
 def _item_json(item: Item) -> dict[str, Any]:
-    """An item; null stands for NaN, which means that nothing is said."""
+    """Return an item for JSON; null stands for NaN, which means "not given"."""
     return {
         "command": item.command,
         "name": item.name,
@@ -266,7 +286,7 @@ def _item_json(item: Item) -> dict[str, Any]:
     }
 
 
-def _page(peer: Peer, own: tuple[Item, ...]) -> str:
+def _items_table(peer: Peer, own: tuple[Item, ...]) -> str:
     sequence = peer.autopilot.sequence
     rows = [
         (str(sequence(index)), item.name, *(f"{param:g}" for param in item.params), str(item.x), str(item.y))

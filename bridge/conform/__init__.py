@@ -1,1 +1,1 @@
-"""Puts somebody else's robot or station through its paces, and says which requirement it does not meet."""
+"""Conformance tests of third-party robots and stations against docs/reference/protocol.md."""

@@ -1,4 +1,4 @@
-"""`stopgo conform robot`: a fake station tries every requirement on somebody's robot."""
+"""`stopgo conform robot`: a station that tests every requirement on a third-party robot."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ REQUIREMENTS: tuple[Requirement[RobotBench], ...] = (
     *QUESTIONS, *SEALS, *IDLE, *PUSHES, *ORDERS, *RUNS, *RESTARTS,
 )  # fmt: skip
 RESTART_S = 120.0
-"""How long the command that starts a robot anew may take."""
+"""Timeout of the command that restarts a robot."""
 
 
 @dataclass(frozen=True)
 class ConformOptions:
-    """How a robot under test is reached, and what may be done to it."""
+    """Connection to a robot under test, and the actions that are allowed."""
 
     endpoint: str
     robot: str
@@ -59,7 +59,7 @@ class ConformOptions:
 
 @dataclass(frozen=True)
 class FalsifiedGuard(Guard):
-    """A link's guard whose seals are wrong on purpose."""
+    """Guard of a link with intentionally wrong message signatures."""
 
     falsified: Any = None
 
@@ -70,14 +70,14 @@ class FalsifiedGuard(Guard):
 
 @contextmanager
 def robot_bench(options: ConformOptions) -> Iterator[RobotBench]:
-    """A robot that stands still and that nobody else commands, ready to be tried.
+    """Connect to a robot that is at rest and that nobody else commands, and yield its bench.
 
     Raises
     ------
     InputError
-        If it is on a run, or another commands it; nothing was done.
+        If it is on a run, or another operator commands it; nothing was done.
     RobotUnreachable
-        If it did not show itself.
+        If it was not found.
     """
     with ExitStack() as stack:
         reach = _reach(options)
@@ -97,7 +97,7 @@ def robot_bench(options: ConformOptions) -> Iterator[RobotBench]:
         )  # fmt: skip
         try:
             yield bench
-        finally:  # also where somebody stops this: no run goes on that nobody wants
+        finally:  # also after Ctrl-C: no run may continue
             _leave(bench)
 
 
@@ -119,20 +119,20 @@ def _first_info(station: Station) -> Info:
     try:
         return station.info()
     except NegativeResult as no:
-        raise InputError(f"{no}; no case was tried") from None
+        raise InputError(f"{no}; nothing was tested") from None
 
 
 def check_at_rest(info: Info, commander: str, *, take_over: bool) -> None:
-    """Refuse a robot that is at work, or in another's hands.
+    """Check that no run is in progress, and that nobody else commands the robot.
 
     Raises
     ------
     InputError
-        Saying what to do.
+        Names the remedy.
     """
     if info.state.state not in OVER:
         raise InputError(
-            f"{info.robot} is {info.state.state}: a robot on a run is not tried; end the run first"
+            f"{info.robot} is {info.state.state}: a robot on a run is not tested; end the run first"
             f" (stopgo abort --robot {info.robot})"
         )
     lease = info.lease
@@ -154,15 +154,15 @@ def _forger(station: Station, options: ConformOptions, stack: ExitStack) -> Forg
 
 
 def await_robot(link: Link, keys: KeyExpressions, timeout_s: float) -> None:
-    """Wait until a link reaches the robot."""
+    """Wait until a second link finds the robot."""
     seen = threading.Event()
     link.watch_presence(keys.alive, lambda key, alive: seen.set() if alive else None)
     if not seen.wait(timeout_s):
-        raise OutcomeUnknown(f"{keys.robot} did not show itself on a second link within {timeout_s:g} s")
+        raise OutcomeUnknown(f"{keys.robot} was not found on a second link within {timeout_s:g} s")
 
 
 def restarting(command: str) -> Any:
-    """What runs the command that starts the robot's program anew, and waits for its end."""
+    """Return a function that runs the user's command for a restart of the robot, and waits for its end."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -182,26 +182,28 @@ def restarting(command: str) -> Any:
 
 
 def robot_verdicts(bench: RobotBench, *, drive: bool) -> Iterator[ConformVerdict]:
-    """Every requirement's verdict; what the robot held before lies ready again at the end.
+    """Test all requirements, and yield their verdicts; the robot's own mission is restored at the end.
 
     Raises
     ------
     InputError
-        If that cannot be read, and so would be lost; nothing was done.
+        If the robot's own mission cannot be read, and so would be lost; nothing was done.
     """
     try:
-        held = bench.held_mission()
+        held = bench.missions.stored_mission()
     except Nonconforming as wrong:
         raise InputError(
-            f"the mission on {bench.keys.robot} cannot be read, and would be lost: {wrong}; take it off the"
-            " robot first; no case was tried"
+            f"the mission on {bench.keys.robot} cannot be read, and would be lost: {wrong}; clear it on the"
+            " robot first; nothing was tested"
         ) from None
-    gone = False
+    lost = False
     for verdict in tried(REQUIREMENTS, bench, drive=drive, undrivable="the robot would drive: --drive"):
-        gone |= verdict.gone
+        lost |= verdict.lost
         yield verdict
-    if not gone and held is not None:
+    if not lost and held is not None:
         last = Requirement[RobotBench](
-            "Pushing a mission", "what lay there before lies ready again", lambda bench: bench.put_back(held)
+            "Pushing a mission",
+            "what lay there before lies ready again",
+            lambda bench: bench.missions.restore(held),
         )
         yield from tried((last,), bench)

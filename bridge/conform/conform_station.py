@@ -1,4 +1,4 @@
-"""`stopgo conform station`: a fake robot sees what somebody's station does when answers go wrong."""
+"""`stopgo conform station`: a simulated robot with faulty answers tests a third-party station."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 
 from stopgo.bridge.conform.fake_robot import FakeRobot, FaultyLink, ForgedAnswers, at_work
 from stopgo.bridge.conform.requirements import ConformVerdict, NotTried, tried
-from stopgo.bridge.conform.station_bench import Doing, StationBench
+from stopgo.bridge.conform.station_bench import StationAction, StationBench
 from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
 from stopgo.bridge.link.access import access_control
 from stopgo.bridge.link.protocol import KeyExpressions
@@ -27,16 +27,16 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import write
 
 COMMAND_S = 180.0
-"""How long a station's command may take."""
+"""Timeout of a station's command."""
 QUIET_S = 8.0
-"""After this long without a question the station has done what it was to do."""
-LOOK_S = 0.1
+"""Time without a query after which the station's action is complete."""
+POLL_S = 0.1
 SPEED_UP = 10.0
 
 
 @dataclass(frozen=True)
 class StationOptions:
-    """How the fake robot is reached, and how the station under test is told what to do."""
+    """Endpoint of the fake robot, and the user's command that makes the station act."""
 
     listen: str
     robot: str
@@ -44,15 +44,15 @@ class StationOptions:
     keys: Path | None = None
     insecure: bool = False
     command: str | None = None
-    """Run for each thing to do; `None` asks a person."""
+    """Command that is run for each action; `None` asks a person."""
     patience_s: float = 120.0
-    """How long a person may take to begin."""
+    """Time that a person has to begin an action."""
     say: Callable[[str], None] = lambda line: None
 
 
 @dataclass(frozen=True)
 class ForgingGuard(Guard):
-    """A robot's guard whose answers are sealed wrongly where that is wanted."""
+    """Guard of a robot whose answers get wrong message signatures on request."""
 
     forged: Any = None
 
@@ -63,7 +63,7 @@ class ForgingGuard(Guard):
 
 @contextmanager
 def station_bench(options: StationOptions, ready: Callable[[], None]) -> Iterator[StationBench]:
-    """A fake robot that listens; `ready` is called once it can be reached."""
+    """Run a fake robot, and yield the bench of the station; `ready` is called once it listens."""
     keys = KeyExpressions(options.robot, options.site)
     held = None if options.keys is None else robots_keys(options.keys, options.robot)
     boot_id = new_boot_id()
@@ -76,32 +76,32 @@ def station_bench(options: StationOptions, ready: Callable[[], None]) -> Iterato
         tempfile.TemporaryDirectory(prefix="stopgo-conform-") as folder,
         listening(options.listen, guard) as link,
     ):
-        meddled = FaultyLink(link, keys)
-        with at_work(FakeRobot(meddled, keys, boot_id, speed_up=SPEED_UP)) as robot:
+        faulty = FaultyLink(link, keys)
+        with at_work(FakeRobot(faulty, keys, boot_id, speed_up=SPEED_UP)) as robot:
             ready()
             path = Path(folder) / "mission.json"
-            do = by_command(options, path) if options.command else by_hand(options, meddled, path)
+            do = by_command(options, path) if options.command else by_hand(options, faulty, path)
             yield StationBench(robot, do, forged=forged)
 
 
 def station_verdicts(bench: StationBench) -> Iterator[ConformVerdict]:
-    """Every requirement's verdict."""
+    """Test all requirements, and yield their verdicts."""
     yield from tried(STATION_REQUIREMENTS, bench)
 
 
-def by_command(options: StationOptions, path: Path) -> Doing:
-    """Lets the station act by a command, which ends with 0 done, 1 the robot said no, 3 unknown.
+def by_command(options: StationOptions, path: Path) -> StationAction:
+    """Return a function that makes the station act by the user's command.
+
+    The command ends with 0 for success, 1 for a refusal by the robot, 3 for an unknown outcome.
 
     Raises
     ------
     InputError
-        If the command cannot be one.
+        If the command has no {what}, or cannot be run.
     """
     command = options.command or ""
     if "{what}" not in command:
-        raise InputError(
-            f"--command {command}: must hold {{what}}, in whose place push FILE, start, … is put"
-        )
+        raise InputError(f"--command {command}: must hold {{what}}, which is replaced by push FILE, start, …")
 
     def do(what: str, mission: Mission | None) -> int | None:
         if mission is not None:
@@ -122,8 +122,8 @@ def by_command(options: StationOptions, path: Path) -> Doing:
     return do
 
 
-def by_hand(options: StationOptions, link: FaultyLink, path: Path) -> Doing:
-    """Asks a person to let the station act, and waits until it has been quiet for a while."""
+def by_hand(options: StationOptions, link: FaultyLink, path: Path) -> StationAction:
+    """Return a function that asks a person to make the station act, and waits until its queries end."""
 
     def do(what: str, mission: Mission | None) -> int | None:
         if mission is not None:
@@ -133,10 +133,10 @@ def by_hand(options: StationOptions, link: FaultyLink, path: Path) -> Doing:
         while not _has_acted(link, what):
             if time.monotonic() > deadline:
                 raise NotTried(f"nobody let the station {what} within {options.patience_s:g} s")
-            time.sleep(LOOK_S)
+            time.sleep(POLL_S)
         seen, since = len(link.asked), time.monotonic()
         while time.monotonic() - since < QUIET_S:
-            time.sleep(LOOK_S)
+            time.sleep(POLL_S)
             if len(link.asked) != seen:
                 seen, since = len(link.asked), time.monotonic()
         return None
@@ -145,11 +145,11 @@ def by_hand(options: StationOptions, link: FaultyLink, path: Path) -> Doing:
 
 
 KEYS_OF = {"push": "mission/", "watch": "keep", "status": "info"}
-"""What a station asks first of all that is no order."""
+"""First query of a station for each action that is not a command."""
 
 
 def _has_acted(link: FaultyLink, what: str) -> bool:
-    """Whether the station has asked something: where it is fooled, the order itself may never come."""
+    """Return True if the station has sent a query; with faulty answers the command itself may never come."""
     return (
         bool(link.asked)
         if what not in KEYS_OF

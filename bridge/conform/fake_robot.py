@@ -1,4 +1,4 @@
-"""A whole simulated robot whose answers and publications go wrong as they are told to."""
+"""Simulated robot whose answers and publications have faults on request."""
 
 from __future__ import annotations
 
@@ -21,41 +21,43 @@ from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.mission.document import Mission
 
-Meddling = Callable[[Request, Answering], bytes]
-"""Gives the answer to a question in the robot's place; may raise `Unanswered`."""
-Withholding = Callable[[str, bytes], bytes | None]
-"""What is published instead of a payload on a key; nothing if `None`."""
+AnswerFault = Callable[[Request, Answering], bytes]
+"""Returns the answer to a query in place of the robot; may raise `Unanswered`."""
+PublishFault = Callable[[str, bytes], bytes | None]
+"""Returns the payload to publish instead of a payload on a key expression; `None` publishes nothing."""
 
 
 def plainly(request: Request, answer: Answering) -> bytes:
+    """Answer without a fault."""
     return answer(request)
 
 
 def everything(key: str, payload: bytes) -> bytes | None:
+    """Publish without a fault."""
     return payload
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A question as it came, with the part of its key behind the robot's name."""
+class ReceivedQuery:
+    """Query as it was received, with the part of its key expression after the robot's name."""
 
     tail: str
     request: Request
 
 
 class FaultyLink:
-    """A robot's link that notes what is asked, and answers and publishes as it is told to."""
+    """Link of a robot that records queries, and puts faults into answers and publications."""
 
     def __init__(self, link: Link, keys: KeyExpressions) -> None:
         self._link = link
         self._keys = keys
         self._lock = threading.Lock()
-        self.meddle: Meddling = plainly
-        self.withhold: Withholding = everything
-        self.asked: list[Asked] = []
+        self.answer_fault: AnswerFault = plainly
+        self.publish_fault: PublishFault = everything
+        self.asked: list[ReceivedQuery] = []
         self.watchers: set[str] = set()
         self.served: dict[str, Answering] = {}
-        """What answers on each key, without what is made of it."""
+        """Answers without faults, by key expression."""
 
     @property
     def distrusted(self) -> str:
@@ -64,23 +66,23 @@ class FaultyLink:
     def serve(self, key: str, answer: Answering) -> None:
         def answered(request: Request) -> bytes:
             with self._lock:
-                self.asked.append(Asked(request.key.removeprefix(f"{self._keys.root}/"), request))
-            return self.meddle(request, answer)
+                self.asked.append(ReceivedQuery(request.key.removeprefix(f"{self._keys.root}/"), request))
+            return self.answer_fault(request, answer)
 
         self.served[key] = answer
         self._link.serve(key, answered)
 
     def serve_beside(self, key: str, answer: Answering) -> None:
-        """Answer as another robot of the same name would."""
+        """Serve a key expression as a second robot of the same name."""
         self._link.serve(key, answer)
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
         publish = self._link.publisher(key, bulk=bulk)
 
         def published(payload: bytes) -> None:
-            told = self.withhold(key, payload)
-            if told is not None:
-                publish(told)
+            changed = self.publish_fault(key, payload)
+            if changed is not None:
+                publish(changed)
 
         return published
 
@@ -117,7 +119,7 @@ class FaultyLink:
 
 
 class ForgedAnswers:
-    """A robot's seals; while `forges` says so of a key, those of its answers do not hold."""
+    """Message signatures of a robot; those of answers on keys for which `forges` is true are wrong."""
 
     def __init__(self, seals: Seals) -> None:
         self._seals = seals
@@ -135,7 +137,7 @@ class ForgedAnswers:
 
         def answered(request: Request) -> tuple[bytes, bytes]:
             reply, seal = sealed(request)
-            return (reply, _spoilt(seal)) if self.forges(request.key) else (reply, seal)
+            return (reply, _falsified(seal)) if self.forges(request.key) else (reply, seal)
 
         return answered
 
@@ -146,14 +148,14 @@ class ForgedAnswers:
         return self._seals.hearing(heard)
 
 
-def _spoilt(seal: bytes) -> bytes:
-    told = msgspec.json.decode(seal, type=Seal)
-    signature = bytes([told.signature[0] ^ 1]) + told.signature[1:]
-    return msgspec.json.encode(msgspec.structs.replace(told, signature=signature))
+def _falsified(seal: bytes) -> bytes:
+    valid = msgspec.json.decode(seal, type=Seal)
+    signature = bytes([valid.signature[0] ^ 1]) + valid.signature[1:]
+    return msgspec.json.encode(msgspec.structs.replace(valid, signature=signature))
 
 
 class FakeRobot:
-    """A robot in this process, which simulates what it is sent and drives nothing."""
+    """Simulated robot in this process; it drives nothing."""
 
     def __init__(self, link: FaultyLink, keys: KeyExpressions, boot_id: str, *, speed_up: float) -> None:
         self.link = link
@@ -174,22 +176,24 @@ class FakeRobot:
         )  # fmt: skip
 
     def holds(self, mission: Mission | None) -> bool:
-        """Whether this is what lies on it."""
+        """Return True if this mission is stored on the robot."""
         run = self.controller.run
         return mission is not None and (run.mission_id, run.revision) == (mission.id, mission.revision)
 
 
 @contextmanager
 def at_work(robot: FakeRobot) -> Iterator[FakeRobot]:
+    """Run the robot's agent within the block."""
     with on_link(robot.agent):
         yield robot
 
 
 def no_answer(request: Request, answer: Answering) -> bytes:
+    """Lose the query: the robot does not receive it."""
     raise Unanswered
 
 
 def lost(request: Request, answer: Answering) -> bytes:
-    """The robot hears and does it, and its answer does not arrive."""
+    """Lose the answer: the robot executes the request, and its answer does not arrive."""
     answer(request)
     raise Unanswered

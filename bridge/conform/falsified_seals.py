@@ -1,4 +1,4 @@
-"""Seals that are wrong on purpose, to see whether the other end notices."""
+"""Intentionally wrong message signatures, to test that the peer refuses them."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import msgspec
 from stopgo.bridge.link.link import Answering, Hearing
 from stopgo.bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
 
-Spoiling = Callable[[Question, Seals], Question]
-"""Makes a question whose seal does not hold of one whose seal does."""
+Falsifying = Callable[[Question, Seals], Question]
+"""Returns a query with an invalid signature, made from a valid one."""
 
 
 class FalsifiedSeals:
-    """A holder's seals; the questions' are spoilt as was said before, and every answer is let through."""
+    """Signatures of a holder: those of queries are falsified by `falsify`, and every answer is accepted."""
 
     def __init__(self, seals: Seals) -> None:
         self._seals = seals
-        self.spoil: Spoiling = lambda question, seals: question
+        self.falsify: Falsifying = lambda question, seals: question
         self.distrusted = ""
 
     def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
-        return self.spoil(self._seals.question(key, payload, parameters), self._seals)
+        return self.falsify(self._seals.question(key, payload, parameters), self._seals)
 
     def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
         self._seals.opened(question, payload, seal)
@@ -41,31 +41,36 @@ class FalsifiedSeals:
 
 
 def unsigned(question: Question, seals: Seals) -> Question:
+    """Remove the signature."""
     return replace(question, seal=b"")
 
 
 def flipped(question: Question, seals: Seals) -> Question:
-    """One bit of the signature."""
+    """Change one bit of the signature."""
     seal = msgspec.json.decode(question.seal, type=Seal)
     signature = bytes([seal.signature[0] ^ 1]) + seal.signature[1:]
     return replace(question, seal=msgspec.json.encode(msgspec.structs.replace(seal, signature=signature)))
 
 
 def of_another_key(question: Question, seals: Seals) -> Question:
+    """Sign for another key expression."""
     other = seals.question(f"{question.key}x", question.payload, question.parameters)
     return replace(question, seal=other.seal)
 
 
 def of_another_payload(question: Question, seals: Seals) -> Question:
+    """Sign another payload."""
     other = seals.question(question.key, question.payload + b" ", question.parameters)
     return replace(question, seal=other.seal)
 
 
 def of_other_parameters(question: Question, seals: Seals) -> Question:
+    """Sign other parameters."""
     other = seals.question(question.key, question.payload, {**question.parameters, "since": "7"})
     return replace(question, seal=other.seal)
 
 
 def without_certificate(question: Question, seals: Seals) -> Question:
+    """Remove the certificate."""
     seal = msgspec.json.decode(question.seal, type=Seal)
     return replace(question, seal=msgspec.json.encode(msgspec.structs.replace(seal, certificate=None)))

@@ -1,4 +1,9 @@
-"""A requirement of the protocol, how it is tried, and what came of it."""
+"""Requirements of the protocol, and the verdict that a test of each gives.
+
+A `Requirement` has a function that tests it on a `Bench`, which is a robot or a station under test. `tried`
+tests requirements in order and gives one `ConformVerdict` each. After every test the bench returns the peer
+to rest. Once the peer stops responding, the remaining requirements are not tested.
+"""
 
 from __future__ import annotations
 
@@ -11,29 +16,29 @@ TriedOutcome = Literal["passed", "failed", "not tried"]
 
 
 class Nonconforming(Exception):
-    """The peer did something else than the protocol says; the message tells what."""
+    """The peer violated the protocol; the message says how."""
 
 
 class NotTried(Exception):
-    """A requirement could not be tried; the message says why."""
+    """A requirement could not be tested; the message gives the reason."""
 
 
 class PeerNotResponding(Exception):
-    """The peer answers nothing any more."""
+    """The peer stopped responding, or does not execute an abort."""
 
 
 class Bench(Protocol):
-    """What requirements are tried on."""
+    """Peer under test, on which requirements are tested."""
 
-    def check_in(self, *, may_drive: bool) -> None:
-        """After each: leave the peer at rest.
+    def return_to_rest(self, *, may_drive: bool) -> None:
+        """End a run after a test.
 
         Raises
         ------
         Nonconforming
-            If it drives and nothing told it to.
-        PeerGone
-            If it is there no more, or does not obey.
+            If the robot drives without a command.
+        PeerNotResponding
+            If the peer does not respond, or does not execute an abort.
         """
 
 
@@ -42,27 +47,27 @@ B = TypeVar("B", bound=Bench)
 
 @dataclass(frozen=True)
 class Requirement(Generic[B]):
-    """One thing that the protocol wants, and the function that finds out."""
+    """Requirement of the protocol, and the function that tests it."""
 
     section: str
-    """The heading of docs/reference/protocol.md under which it stands."""
+    """Heading of docs/reference/protocol.md that contains the requirement."""
     text: str
-    find_out: Callable[[B], None]
-    """Returns if it is met; raises `Nonconforming` or `NotTried`."""
+    test: Callable[[B], None]
+    """Returns if the requirement is met; raises `Nonconforming` or `NotTried`."""
     drives: bool = False
-    """Whether the robot moves for it."""
+    """True if the robot moves in the test."""
 
 
 @dataclass(frozen=True)
 class ConformVerdict:
-    """What came of one requirement."""
+    """Outcome of the test of one requirement."""
 
     section: str
     text: str
     outcome: TriedOutcome
     reason: str = ""
-    gone: bool = False
-    """Whether the peer answered nothing any more after it."""
+    lost: bool = False
+    """True if the peer did not respond after the test."""
 
 
 def tried(
@@ -72,29 +77,32 @@ def tried(
     drive: bool = False,
     undrivable: str = "",
 ) -> Iterator[ConformVerdict]:
-    """Each requirement's verdict, in order; once the peer is gone, the rest are not tried."""
-    gone = ""
+    """Test requirements in order, and yield their verdicts.
+
+    `undrivable` is the reason for requirements that drive, where `drive` is false.
+    """
+    lost = ""
     for requirement in requirements:
-        told = (requirement.section, requirement.text)
-        if gone:
-            yield ConformVerdict(*told, "not tried", gone)
+        name = (requirement.section, requirement.text)
+        if lost:
+            yield ConformVerdict(*name, "not tried", lost)
         elif requirement.drives and not drive:
-            yield ConformVerdict(*told, "not tried", undrivable)
+            yield ConformVerdict(*name, "not tried", undrivable)
         else:
-            outcome, reason = _found_out(requirement, bench)
+            outcome, reason = _outcome(requirement, bench)
             try:
-                bench.check_in(may_drive=requirement.drives)
+                bench.return_to_rest(may_drive=requirement.drives)
             except Nonconforming as wrong:
                 outcome, reason = "failed", reason or str(wrong)
             except PeerNotResponding as error:
-                gone = str(error)
-                outcome, reason = "failed", reason or gone
-            yield ConformVerdict(*told, outcome, reason, gone=bool(gone))
+                lost = str(error)
+                outcome, reason = "failed", reason or lost
+            yield ConformVerdict(*name, outcome, reason, lost=bool(lost))
 
 
-def _found_out(requirement: Requirement[B], bench: B) -> tuple[TriedOutcome, str]:
+def _outcome(requirement: Requirement[B], bench: B) -> tuple[TriedOutcome, str]:
     try:
-        requirement.find_out(bench)
+        requirement.test(bench)
     except Nonconforming as wrong:
         return "failed", str(wrong)
     except NotTried as why:
@@ -102,19 +110,19 @@ def _found_out(requirement: Requirement[B], bench: B) -> tuple[TriedOutcome, str
     return "passed", ""
 
 
-def counted(verdicts: Iterable[ConformVerdict]) -> dict[str, int]:
-    """How many there are of each outcome."""
-    found = Counter(verdict.outcome for verdict in verdicts)
-    return {outcome: found[outcome] for outcome in ("passed", "failed", "not tried")}
+def count_outcomes(verdicts: Iterable[ConformVerdict]) -> dict[str, int]:
+    """Return the number of verdicts of each outcome."""
+    counts = Counter(verdict.outcome for verdict in verdicts)
+    return {outcome: counts[outcome] for outcome in ("passed", "failed", "not tried")}
 
 
 def must(holds: object, otherwise: str) -> None:
-    """Raise `Nonconforming` unless something holds."""
+    """Raise `Nonconforming` with the message `otherwise`, unless `holds` is true."""
     if not holds:
         raise Nonconforming(otherwise)
 
 
 def short(value: Any, most: int = 120) -> str:
-    """What was said, cut to a length that stands in a table."""
+    """Return a value as text, cut to a length that fits a table."""
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
     return text if len(text) <= most else f"{text[:most]}…"

@@ -1,4 +1,4 @@
-"""How a robot must judge orders, on a mission that lies ready: every one of these is to be refused."""
+"""Requirements on the judgement of commands, with a mission in READY: each of these must be refused."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from typing import get_args
 
 from stopgo.bridge.conform.requirements import NotTried, Requirement, must
-from stopgo.bridge.conform.robot_bench import RobotBench, rejects, told_of
+from stopgo.bridge.conform.robot_bench import RobotBench
+from stopgo.bridge.conform.robot_queries import describe, must_reject
 from stopgo.bridge.link.protocol import Accepted, encode
 from stopgo.mission.document import Mission
 from stopgo.mission.run.decision import STATES
@@ -18,23 +19,23 @@ from stopgo.mission.run.states import DetailedState
 VERBS: tuple[Verb, ...] = get_args(Verb)
 
 
-def refuses_what_means_nothing(bench: RobotBench, place: DetailedState) -> None:
-    """Give every order that means nothing in this place; each must be refused."""
+def refuses_what_means_nothing(bench: RobotBench, state: DetailedState) -> None:
+    """Send every command that has no meaning in this state; each must be refused."""
     for verb in VERBS:
-        if place not in STATES[verb]:
-            bench.refused(bench.order(verb), "wrong_state")
+        if state not in STATES[verb]:
+            bench.commands.must_refuse(bench.commands.order(verb), "wrong_state")
 
 
 def ready(bench: RobotBench) -> Mission:
-    """A mission that lies ready, and is commanded from here."""
-    mission = bench.has(bench.mission())
+    """Push a mission, wait for READY, and return the mission; this station is the commander."""
+    mission = bench.missions.store(bench.missions.mission())
     bench.wait_for_state("READY")
     return mission
 
 
 @contextmanager
 def as_another(bench: RobotBench) -> Iterator[None]:
-    """Another station in this one's place."""
+    """Act as the second station within the block."""
     if bench.other is None:
         raise NotTried("needs a second station: --other-keys DIR")
     own = bench.commander, bench.link
@@ -50,7 +51,7 @@ def idle_has_no_mission(bench: RobotBench) -> None:
         raise NotTried("the robot holds a mission already")
     for verb in VERBS:
         if verb != "start":
-            bench.refused(bench.order(verb), "no_mission")
+            bench.commands.must_refuse(bench.commands.order(verb), "no_mission")
 
 
 def ready_refuses(bench: RobotBench) -> None:
@@ -59,9 +60,9 @@ def ready_refuses(bench: RobotBench) -> None:
 
 
 def an_answer_is_stored(bench: RobotBench) -> None:
-    """Asked again when another mission lies ready, which it would be judged by anew."""
+    """The command is repeated after another mission was pushed; a new judgement would be different."""
     mission = ready(bench)
-    order, key = bench.order("skip", revision=mission.revision), bench.keys.command("skip")
+    order, key = bench.commands.order("skip", revision=mission.revision), bench.keys.command("skip")
     first = bench.ask_raw(key, encode(order))
     ready(bench)
     again = bench.ask_raw(key, encode(order))
@@ -70,9 +71,9 @@ def an_answer_is_stored(bench: RobotBench) -> None:
 
 def an_id_is_for_one_order(bench: RobotBench) -> None:
     ready(bench)
-    order = bench.order("skip")
-    bench.give(order)
-    bench.refused(bench.order("skip", cmd_id=order.cmd_id, stop="another"), "id_reused")
+    order = bench.commands.order("skip")
+    bench.commands.give(order)
+    bench.commands.must_refuse(bench.commands.order("skip", cmd_id=order.cmd_id, stop="another"), "id_reused")
 
 
 def late_orders_are_expired(bench: RobotBench) -> None:
@@ -86,22 +87,24 @@ def late_orders_are_expired(bench: RobotBench) -> None:
         {"valid_for_s": 0.0},
         {"boot_id": "another-boot"},
     ):
-        bench.refused(bench.order("skip", **details), "expired")
+        bench.commands.must_refuse(bench.commands.order("skip", **details), "expired")
 
 
 def a_stop_is_never_late(bench: RobotBench) -> None:
-    """Where it means nothing it is refused for that, and not for its age."""
+    """In a state where a stop command has no meaning it is refused for the state, not for its age."""
     ready(bench)
     for verb in ("pause", "abort"):
-        bench.refused(bench.order(verb, issued_ns=0, boot_id=None, valid_for_s=60.0), "wrong_state")
+        bench.commands.must_refuse(
+            bench.commands.order(verb, issued_ns=0, boot_id=None, valid_for_s=60.0), "wrong_state"
+        )
 
 
 def what_was_meant_is_heeded(bench: RobotBench) -> None:
     ready(bench)
-    bench.refused(bench.order("skip", expect_state=("RUNNING",)), "wrong_state")
-    bench.refused(bench.order("skip", run_id="another-run"), "wrong_run")
-    bench.refused(bench.order("skip", mission_id="another"), "wrong_mission")
-    bench.refused(bench.order("skip", revision=10**6), "wrong_mission")
+    bench.commands.must_refuse(bench.commands.order("skip", expect_state=("RUNNING",)), "wrong_state")
+    bench.commands.must_refuse(bench.commands.order("skip", run_id="another-run"), "wrong_run")
+    bench.commands.must_refuse(bench.commands.order("skip", mission_id="another"), "wrong_mission")
+    bench.commands.must_refuse(bench.commands.order("skip", revision=10**6), "wrong_mission")
 
 
 def an_older_fence_is_fenced(bench: RobotBench) -> None:
@@ -110,48 +113,51 @@ def an_older_fence_is_fenced(bench: RobotBench) -> None:
     must(lease is not None, "after a push Info tells of no lease")
     assert lease is not None
     must(lease.commander == bench.commander, f"after a push {lease.commander} holds the lease")
-    bench.refused(bench.order("skip", fence=lease.fence - 1), "fenced")
+    bench.commands.must_refuse(bench.commands.order("skip", fence=lease.fence - 1), "fenced")
 
 
 def another_is_not_the_commander(bench: RobotBench) -> None:
     ready(bench)
     with as_another(bench):
-        bench.refused(bench.order("skip"), "not_the_commander")
-        reply = bench.push(bench.mission())
-        rejects(reply, "not_the_commander")
+        bench.commands.must_refuse(bench.commands.order("skip"), "not_the_commander")
+        reply = bench.missions.push(bench.missions.mission())
+        must_reject(reply, "not_the_commander")
 
 
 def anybody_may_stop(bench: RobotBench) -> None:
-    """In a mission that lies ready a stop means nothing; it must be refused for that alone."""
+    """In READY a stop command has no meaning; it must be refused for the state alone."""
     ready(bench)
     with as_another(bench):
         for verb in ("pause", "abort"):
-            bench.refused(bench.order(verb), "wrong_state")
+            bench.commands.must_refuse(bench.commands.order(verb), "wrong_state")
 
 
 def taking_over_is_recorded(bench: RobotBench) -> None:
     ready(bench)
     lease, newest = bench.info().lease, bench.info().state.last_event
-    mission = bench.mission()
+    mission = bench.missions.mission()
     with as_another(bench):
         other = bench.commander
-        reply = bench.push(mission, take_over=True)
-        must(isinstance(reply, Accepted), f"a push that takes over: {told_of(reply)}")
+        reply = bench.missions.push(mission, take_over=True)
+        must(isinstance(reply, Accepted), f"a push that takes over: {describe(reply)}")
     try:
         now = bench.info().lease
         must(now is not None and now.commander == other, "a push that takes over does not get the lease")
-        must(lease is None or now is None or now.fence > lease.fence, "`fence` does not grow with the hands")
+        must(
+            lease is None or now is None or now.fence > lease.fence,
+            "`fence` does not grow with the commander",
+        )
         told = [event for event in bench.log(newest) if isinstance(event, TakenOver)]
-        must(told and told[-1].commander == other, "the log tells no TakenOver")
-        stale = bench.order("skip", fence=lease.fence if lease else 0)
-        bench.refused(stale, "fenced")
+        must(told and told[-1].commander == other, "the journal has no TakenOver")
+        stale = bench.commands.order("skip", fence=lease.fence if lease else 0)
+        bench.commands.must_refuse(stale, "fenced")
     finally:
-        bench.push(bench.mission(), take_over=True)
+        bench.missions.push(bench.missions.mission(), take_over=True)
 
 
 ORDERS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement("Orders", text, find_out)
-    for text, find_out in (
+    Requirement("Orders", text, test)
+    for text, test in (
         ("READY: every order but `start` is `wrong_state`", ready_refuses),
         ("the same order again gets the stored answer", an_answer_is_stored),
         ("another order under a used id: `id_reused`", an_id_is_for_one_order),

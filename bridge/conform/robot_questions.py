@@ -1,4 +1,4 @@
-"""What a robot must answer, and tell of itself, whoever asks and however badly: nothing of this moves it."""
+"""Requirements on answers to queries, also to malformed ones; the robot does not move in these tests."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from itertools import pairwise
 from typing import Any
 
 from stopgo.bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
-from stopgo.bridge.conform.robot_bench import RobotBench, manifest_of, read, read_event
+from stopgo.bridge.conform.robot_bench import RobotBench
+from stopgo.bridge.conform.robot_queries import read, read_event
 from stopgo.bridge.conform.trial_mission import trial_mission
+from stopgo.bridge.conform.trial_pushes import manifest_of
 from stopgo.bridge.link.capabilities import RECORD
 from stopgo.bridge.link.protocol import (
     LOG_PAGE,
@@ -33,12 +35,13 @@ from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
 from stopgo.mission.run.orders import Order
 
 STATE_BYTES = 16 * 1024
-"""No state is larger, with fifty stops of any sensible name done and fifty skipped."""
+"""Largest size of a state, with fifty stops done and fifty skipped."""
 STATES_S = 3.5
-"""In which a robot that tells its state every second is heard three times."""
+"""Time in which a robot publishes at least three states, one every second."""
 OVERSIZE = 2_000_000
+"""Bytes of a message that no robot can accept."""
 LATER = {"later": {"than": [1, 2, 3]}, "also": None}
-"""What a newer peer may add to a message."""
+"""Fields that a newer peer may add to a message."""
 
 
 def info_names_the_robot(bench: RobotBench) -> None:
@@ -57,7 +60,7 @@ def boot_is_the_one_of_info(bench: RobotBench) -> None:
 
 def clock_and_state_go_on(bench: RobotBench) -> None:
     first, second = bench.info(), bench.info()
-    must(second.clock_ns > first.clock_ns, "Info.clock_ns stands still")
+    must(second.clock_ns > first.clock_ns, "Info.clock_ns does not grow")
     must(second.state.seq > first.state.seq, "StateReport.seq does not grow")
 
 
@@ -66,9 +69,9 @@ def keep_is_answered_with_info(bench: RobotBench) -> None:
 
 
 def state_is_told_every_second(bench: RobotBench) -> None:
-    before = len(bench.heard.states)
+    before = len(bench.published.states)
     time.sleep(STATES_S)
-    told = [read(raw, StateReport, "a state") for raw in bench.heard.states[before:]]
+    told = [read(raw, StateReport, "a state") for raw in bench.published.states[before:]]
     must(len(told) >= 3, f"{len(told)} states came in {STATES_S:g} s{_why(bench)}")
     grows = all(one.seq < next_.seq for one, next_ in pairwise(told))
     must(grows, "the `seq` of the states that were told does not grow")
@@ -118,7 +121,7 @@ def parameters_must_be_numbers(bench: RobotBench) -> None:
     keys = (bench.keys.log, bench.keys.poses, *((bench.keys.record,) if keeps_a_record(bench) else ()))
     for key in keys:
         for value in ("-1", "1.5", "many", "9" * 30):
-            bench.refuses_to_read(key, b"", f"since={value}", since=value)
+            bench.must_be_malformed(key, b"", f"since={value}", since=value)
 
 
 def keeps_a_record(bench: RobotBench) -> bool:
@@ -141,14 +144,14 @@ def a_mission_that_is_not_there_is_no_mission(bench: RobotBench) -> None:
 
 
 def unknown_keys_are_malformed(bench: RobotBench) -> None:
-    bench.refuses_to_read(bench.keys.mission("not-there", "later"), b"", "a step that is not known")
+    bench.must_be_malformed(bench.keys.mission("not-there", "later"), b"", "a step that is not known")
     later = encode({**_fields(_stop_order(bench)), "verb": "later"})
-    bench.refuses_to_read(bench.keys.command("later"), later, "a verb that is not known")
+    bench.must_be_malformed(bench.keys.command("later"), later, "a verb that is not known")
 
 
 def a_verb_counts_on_its_own_key(bench: RobotBench) -> None:
     order = encode(_stop_order(bench))
-    bench.refuses_to_read(bench.keys.command("abort"), order, "a pause")
+    bench.must_be_malformed(bench.keys.command("abort"), order, "a pause")
 
 
 def unknown_fields_are_passed_over(bench: RobotBench) -> None:
@@ -165,14 +168,14 @@ def cut_messages_are_malformed(bench: RobotBench) -> None:
     for what, (key, message) in _messages(bench).items():
         whole = encode(message)
         for length in (0, 1, len(whole) // 2, len(whole) - 1):
-            bench.refuses_to_read(key, whole[:length], f"{what} cut to {length} bytes")
+            bench.must_be_malformed(key, whole[:length], f"{what} cut to {length} bytes")
 
 
 def missing_fields_are_malformed(bench: RobotBench) -> None:
     for what, (key, message) in _messages(bench).items():
         needed = "commander" if "commander" in message else "sha256"
         less = {name: value for name, value in message.items() if name != needed}
-        bench.refuses_to_read(key, encode(less), f"{what} without {needed}")
+        bench.must_be_malformed(key, encode(less), f"{what} without {needed}")
 
 
 def wrong_types_are_malformed(bench: RobotBench) -> None:
@@ -189,13 +192,13 @@ def wrong_types_are_malformed(bench: RobotBench) -> None:
     messages = _messages(bench)
     for what, (name, change) in wrong.items():
         key, message = messages[name]
-        bench.refuses_to_read(key, encode({**message, **change}), what)
+        bench.must_be_malformed(key, encode({**message, **change}), what)
 
 
 def what_is_no_json_is_malformed(bench: RobotBench) -> None:
     for what, (key, _) in _messages(bench).items():
         for name, payload in NO_JSON.items():
-            bench.refuses_to_read(key, payload, f"{name} for {what}")
+            bench.must_be_malformed(key, payload, f"{name} for {what}")
 
 
 NO_JSON = {
@@ -207,7 +210,7 @@ NO_JSON = {
 
 
 def oversize_does_no_harm(bench: RobotBench) -> None:
-    """It may be answered or not; the robot must be there afterwards."""
+    """The message may be answered or not; the robot must answer after it."""
     payload = encode({"is": "Watching", "commander": "x", "later": "x" * OVERSIZE})
     bench.link.ask(bench.keys.keep, payload, timeout_s=1.0)
     bench.wait(lambda: _info_if_there(bench), 20.0, "the robot did not answer after a message of 2 MB")
@@ -221,7 +224,7 @@ def _info_if_there(bench: RobotBench) -> Info | None:
 
 
 def _messages(bench: RobotBench) -> dict[str, tuple[str, dict[str, Any]]]:
-    """A message of each kind that a robot reads, as fields, on its key; carried out, none does anything."""
+    """Return key expression and fields of a message of each kind; none has an effect if it is executed."""
     mission = _unsent(bench)
     manifest = manifest_of(mission, json.dumps(json.loads(encode(mission))).encode())
     info = bench.info()
@@ -239,11 +242,11 @@ def _messages(bench: RobotBench) -> dict[str, tuple[str, dict[str, Any]]]:
 
 
 def _unsent(bench: RobotBench) -> Mission:
-    return trial_mission(f"{bench.mission_id}-unsent", 1, Pose(x=0.0, y=0.0, heading=0.0))
+    return trial_mission(f"{bench.missions.mission_id}-unsent", 1, Pose(x=0.0, y=0.0, heading=0.0))
 
 
 def _stop_order(bench: RobotBench) -> Order:
-    return bench.order("pause", issued_ns=0)
+    return bench.commands.order("pause", issued_ns=0)
 
 
 def _fields(message: Any) -> dict[str, Any]:

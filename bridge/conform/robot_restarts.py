@@ -1,4 +1,4 @@
-"""What a robot must still know after its program was ended and started anew."""
+"""Requirements on the state that outlives a restart of the robot's program."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from stopgo.bridge.conform.robot_orders import ready
 from stopgo.bridge.link.protocol import Info, encode
 
 BOOT_S = 60.0
-"""How long a robot may take to answer again."""
+"""Longest time until a restarted robot answers again."""
 
 
 def _restarted(bench: RobotBench) -> Info:
-    """What the robot tells once it has been started anew."""
+    """Restart the robot, and return its info after that."""
     if bench.restart is None:
-        raise NotTried("needs a command that starts the robot's program anew: --restart COMMAND")
+        raise NotTried("needs a command that restarts the robot's program; add --restart COMMAND")
     before = bench.info().boot_id
     bench.restart()
 
@@ -40,20 +40,20 @@ def a_boot_has_an_id_of_its_own(bench: RobotBench) -> None:
 
 def answers_outlive_a_restart(bench: RobotBench) -> None:
     ready(bench)
-    order, key = bench.order("skip"), bench.keys.command("skip")
+    order, key = bench.commands.order("skip"), bench.keys.command("skip")
     first = bench.ask_raw(key, encode(order))
-    late = bench.order("skip")
+    late = bench.commands.order("skip")
     _restarted(bench)
     must(bench.ask_raw(key, encode(order)) == first, "the same order after a restart got another answer")
-    bench.refused(late, "expired")
+    bench.commands.must_refuse(late, "expired")
 
 
 def a_run_waits_after_a_restart(bench: RobotBench) -> None:
     ready(bench)
-    answer = bench.obeyed("start")
+    answer = bench.commands.must_execute("start")
     after = _restarted(bench)
-    must(after.state.state == "PAUSED", f"started anew during a run it is {after.state.state}")
-    must(after.state.run_id == answer.run_id, "started anew during a run it tells another run")
+    must(after.state.state == "PAUSED", f"restarted during a run it is {after.state.state}")
+    must(after.state.run_id == answer.run_id, "restarted during a run it reports another run")
 
 
 RESTARTS: tuple[Requirement[RobotBench], ...] = (

@@ -1,12 +1,13 @@
-"""How a robot must drive: it moves for all of these, half a metre ahead of where it stands and back."""
+"""Requirements on a run: the robot drives in each, half a metre ahead of its position and back."""
 
 from __future__ import annotations
 
 import msgspec
 
 from stopgo.bridge.conform.requirements import NotTried, Requirement, must
-from stopgo.bridge.conform.robot_bench import OVER, RobotBench, read, read_event, rejects, told_of
+from stopgo.bridge.conform.robot_bench import OVER, RobotBench
 from stopgo.bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
+from stopgo.bridge.conform.robot_queries import describe, must_reject, read, read_event
 from stopgo.bridge.conform.robot_questions import keeps_a_record, states_are_bounded
 from stopgo.bridge.link.capabilities import RECORD
 from stopgo.bridge.link.protocol import POSE_PAGE, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
@@ -24,31 +25,31 @@ from stopgo.mission.run.events import (
 from stopgo.mission.run.orders import LONGEST_VALID_S, Answer
 
 RUN_S = 180.0
-"""How long a run of the trial mission may take."""
+"""Longest time of a run of the trial mission."""
 MANY_STOPS, MANY_SKIPPED = 110, 105
-"""More than a state lists, and more events than a page has."""
+"""More stops than a state lists, and more events than a page has."""
 RECORD_S = 10.0
-"""Until the end of a run is written down."""
+"""Longest time until the telemetry log has the end of a run."""
 NEAR_M = 0.1
 
 
 def _started(bench: RobotBench) -> tuple[Mission, Answer]:
     mission = ready(bench)
-    return mission, bench.obeyed("start")
+    return mission, bench.commands.must_execute("start")
 
 
 def _arrived(bench: RobotBench, since: int) -> None:
-    """Wait until the robot has driven a leg."""
+    """Wait until the robot has arrived at a stop."""
 
-    def there() -> bool | None:
+    def arrived() -> bool | None:
         return any(isinstance(event, Arrived) for event in bench.log(since)) or None
 
-    bench.wait(there, RUN_S, "the robot did not arrive at the first stop")
+    bench.wait(arrived, RUN_S, "the robot did not arrive at the first stop")
 
 
 def a_run_goes_to_its_end(bench: RobotBench) -> None:
     newest = bench.info().state.last_event
-    bench.heard.events.clear()
+    bench.published.events.clear()
     mission, answer = _started(bench)
     state = bench.wait_for_state(*OVER, within_s=RUN_S)
     must(state.state == "FINISHED", f"the run ended {state.state}")
@@ -74,7 +75,7 @@ def _told_once_in_order(bench: RobotBench, events: list[AnyEvent]) -> None:
     wanted = [event.number for event in events]
 
     def all_heard() -> list[int] | None:
-        numbers = [read_event(raw).number for raw in bench.heard.events]
+        numbers = [read_event(raw).number for raw in bench.published.events]
         mine = [number for number in numbers if number >= wanted[0]]
         return mine if mine and mine[-1] >= wanted[-1] else None
 
@@ -82,8 +83,8 @@ def _told_once_in_order(bench: RobotBench, events: list[AnyEvent]) -> None:
     must(heard == wanted, f"tel/event told {heard}, and the log has {wanted}")
 
 
-def the_way_has_no_gaps(bench: RobotBench) -> None:
-    """The poses of the run before, or of a new one."""
+def poses_have_no_gaps(bench: RobotBench) -> None:
+    """Check the poses of the last run, or of a new one."""
     state = bench.info().state
     if state.state != "FINISHED":
         _started(bench)
@@ -104,15 +105,15 @@ def the_way_has_no_gaps(bench: RobotBench) -> None:
 def a_start_is_carried_out_once(bench: RobotBench) -> None:
     newest = bench.info().state.last_event
     ready(bench)
-    order = bench.order("start")
-    first, again = bench.give(order), bench.give(order)
+    order = bench.commands.order("start")
+    first, again = bench.commands.give(order), bench.commands.give(order)
     must(first.outcome == "ok", f"start was refused: {first.reason}")
     must(first == again, "the same start again got another answer")
-    bench.refused(bench.order("start"), "wrong_state")
+    bench.commands.must_refuse(bench.commands.order("start"), "wrong_state")
     started = [event for event in bench.log(newest) if isinstance(event, Started)]
     must(len(started) == 1, f"one start was told as {len(started)} Started")
     bench.end_run()
-    after = bench.give(order)
+    after = bench.commands.give(order)
     must(after == first, "the same start after the run's end got another answer")
     must(bench.info().state.state in OVER, "the same start after the run's end drove again")
 
@@ -121,30 +122,30 @@ def orders_mean_what_the_table_says(bench: RobotBench) -> None:
     newest = bench.info().state.last_event
     _started(bench)
     refuses_what_means_nothing(bench, "RUNNING")
-    bench.obeyed("pause")
+    bench.commands.must_execute("pause")
     bench.wait_for_state("PAUSED")
     refuses_what_means_nothing(bench, "PAUSED")
-    bench.obeyed("resume")
+    bench.commands.must_execute("resume")
     bench.wait_for_state("RUNNING")
     _arrived(bench, newest)
-    bench.obeyed("pause")
+    bench.commands.must_execute("pause")
     bench.wait_for_state("PAUSED")
-    bench.obeyed("home")
-    answer = bench.give(bench.order("pause"))
+    bench.commands.must_execute("home")
+    answer = bench.commands.give(bench.commands.order("pause"))
     if answer.outcome == "refused" and bench.info().state.state in OVER:
         raise NotTried("the way home was over before it could be paused; all before it passed")
     must(answer.outcome == "ok", f"pause on the way home was refused: {answer.reason}")
     refuses_what_means_nothing(bench, "PAUSED homing")
-    bench.obeyed("resume")
+    bench.commands.must_execute("resume")
     bench.wait_for_state("HOMING", *OVER)
     bench.wait_for_state("ABORTED", within_s=RUN_S)
     refuses_what_means_nothing(bench, "ABORTED")
-    bench.refused(bench.order("start"), "finished_before")
+    bench.commands.must_refuse(bench.commands.order("start"), "finished_before")
 
 
 def an_abort_ends_a_run(bench: RobotBench) -> None:
     _started(bench)
-    answer = bench.obeyed("abort", issued_ns=0, boot_id=None, valid_for_s=LONGEST_VALID_S)
+    answer = bench.commands.must_execute("abort", issued_ns=0, boot_id=None, valid_for_s=LONGEST_VALID_S)
     must(answer.state == "ABORTED", f"an abort was answered with state {answer.state}")
     bench.wait_for_state("ABORTED")
 
@@ -152,9 +153,9 @@ def an_abort_ends_a_run(bench: RobotBench) -> None:
 def anybody_may_pause(bench: RobotBench) -> None:
     _started(bench)
     with as_another(bench):
-        bench.obeyed("pause")
+        bench.commands.must_execute("pause")
         bench.wait_for_state("PAUSED")
-        bench.refused(bench.order("resume"), "not_the_commander")
+        bench.commands.must_refuse(bench.commands.order("resume"), "not_the_commander")
     must(bench.info().state.state == "PAUSED", "another's resume was carried out though it was refused")
 
 
@@ -169,30 +170,30 @@ def a_late_start_does_not_drive(bench: RobotBench) -> None:
         ("wrong_state", {"expect_state": ("PAUSED",)}),
         ("wrong_mission", {"revision": 10**6}),
     ):
-        bench.refused(bench.order("start", **details), reason)
+        bench.commands.must_refuse(bench.commands.order("start", **details), reason)
         must(bench.info().state.state == "READY", f"a start that was refused as {reason} drove")
 
 
 def a_start_from_elsewhere_is_refused(bench: RobotBench) -> None:
-    mission = bench.mission()
+    mission = bench.missions.mission()
     far = msgspec.structs.replace(mission.start, x=mission.start.x + 5.0)
     first = mission.stops[0]
-    way = msgspec.structs.replace(first, approach=((far.x, far.y), (first.x, first.y)))
-    bench.has(
-        sealed(msgspec.structs.replace(mission, start=far, stops=(way, *mission.stops[1:]), return_=None))
+    moved = msgspec.structs.replace(first, approach=((far.x, far.y), (first.x, first.y)))
+    bench.missions.store(
+        sealed(msgspec.structs.replace(mission, start=far, stops=(moved, *mission.stops[1:]), return_=None))
     )
-    bench.refused(bench.order("start"), "not_at_start")
+    bench.commands.must_refuse(bench.commands.order("start"), "not_at_start")
 
 
 def a_long_run_is_told_in_little(bench: RobotBench) -> None:
     newest = bench.info().state.last_event
-    bench.has(bench.mission(stops=MANY_STOPS, reach_m=NEAR_M))
+    bench.missions.store(bench.missions.mission(stops=MANY_STOPS, reach_m=NEAR_M))
     bench.wait_for_state("READY")
-    bench.obeyed("start")
-    bench.obeyed("pause")
+    bench.commands.must_execute("start")
+    bench.commands.must_execute("pause")
     bench.wait_for_state("PAUSED")
     for _ in range(MANY_SKIPPED):
-        bench.obeyed("skip")
+        bench.commands.must_execute("skip")
     state = bench.info().state
     must(state.skipped_count == MANY_SKIPPED, f"skipped_count is {state.skipped_count}, not {MANY_SKIPPED}")
     states_are_bounded(bench)
@@ -205,40 +206,40 @@ def a_long_run_is_told_in_little(bench: RobotBench) -> None:
 
 def a_revision_waits_for_the_next_stop(bench: RobotBench) -> None:
     mission, _ = _started(bench)
-    bench.obeyed("pause")
+    bench.commands.must_execute("pause")
     bench.wait_for_state("PAUSED")
     later = _next(bench, mission, stops=mission.stops[:-1], return_=None)
-    reply = bench.push(later)
+    reply = bench.missions.push(later)
     if not isinstance(reply, Accepted) and getattr(reply, "reason", "") == "running":
         raise NotTried("the robot takes no revision during a run")
-    must(isinstance(reply, Accepted) and reply.waits, f"a revision during a run: {told_of(reply)}")
+    must(isinstance(reply, Accepted) and reply.waits, f"a revision during a run: {describe(reply)}")
     state: StateReport = bench.info().state
     must(state.next_revision == later.revision, f"next_revision is {state.next_revision}")
 
 
-def a_way_that_differs_is_refused(bench: RobotBench) -> None:
+def a_path_that_differs_is_refused(bench: RobotBench) -> None:
     mission, _ = _started(bench)
-    bench.obeyed("pause")
+    bench.commands.must_execute("pause")
     bench.wait_for_state("PAUSED")
     first = mission.stops[0]
     renamed = msgspec.structs.replace(first, id=f"{first.id}-other")
-    reply = bench.push(_next(bench, mission, stops=(renamed, *mission.stops[1:])))
-    rejects(reply, "way_differs", "running")
+    reply = bench.missions.push(_next(bench, mission, stops=(renamed, *mission.stops[1:])))
+    must_reject(reply, "way_differs", "running")
 
 
 def another_mission_is_refused_during_a_run(bench: RobotBench) -> None:
     mission, _ = _started(bench)
     other = sealed(msgspec.structs.replace(mission, id=f"{mission.id}-other"))
-    rejects(bench.push(other), "running")
+    must_reject(bench.missions.push(other), "running")
 
 
 def _next(bench: RobotBench, mission: Mission, **changes: object) -> Mission:
-    revision = bench.mission().revision
+    revision = bench.missions.mission().revision
     return sealed(msgspec.structs.replace(mission, revision=revision, **changes))
 
 
 def the_record_has_no_gaps(bench: RobotBench) -> None:
-    """Every page is believed only where its seal holds, as every answer is."""
+    """The link verifies the signature of every page, as of every answer."""
     if not keeps_a_record(bench):
         raise NotTried(f"the robot does not name the capability `{RECORD}`")
     _, answer = _started(bench)
@@ -256,11 +257,11 @@ def the_record_has_no_gaps(bench: RobotBench) -> None:
     must(again == entries[middle:][: len(again)], "an entry is another when it is read again")
     late = bench.ask_for(RecordPage, bench.keys.record, run=run_id, time=str(times[-1] - 1))
     later = [pose.robot_ns for entry in late.entries[:1] for pose in entry.poses]
-    must(later and later[-1] >= times[-1], "`time` is not heeded")
+    must(later and later[-1] >= times[-1], "`time` has no effect")
 
 
 def _record(bench: RobotBench, run_id: str) -> list[RecordEntry] | None:
-    """All entries, once the last tells that the run is over."""
+    """Read all entries; `None` until the last one shows the end of the run."""
     entries: list[RecordEntry] = []
     newest = 1
     while len(entries) < newest:
@@ -286,18 +287,18 @@ def _record(bench: RobotBench, run_id: str) -> list[RecordEntry] | None:
 def poses_tell_run_and_boot(bench: RobotBench) -> None:
     _, answer = _started(bench)
     bench.pose()
-    told = read(bench.heard.poses[-1], dict, "a pose")
+    told = read(bench.published.poses[-1], dict, "a pose")
     must(told.get("boot_id") == bench.info().boot_id, "a pose tells another boot than info")
     must(told.get("run_id") == answer.run_id, "a pose tells another run than the answer to start")
 
 
 RUNS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement(section, text, find_out, drives=True)
-    for section, text, find_out in (
+    Requirement(section, text, test, drives=True)
+    for section, text, test in (
         ("Orders", "a start late, fenced or meant otherwise does not drive", a_late_start_does_not_drive),
         ("Orders", "a start away from the mission's: `not_at_start`", a_start_from_elsewhere_is_refused),
         ("States of a run", "a run goes stop by stop to FINISHED", a_run_goes_to_its_end),
-        ("Events", "the way of a run is kept without gaps", the_way_has_no_gaps),
+        ("Events", "the way of a run is kept without gaps", poses_have_no_gaps),
         ("Events", "a pose tells run and boot", poses_tell_run_and_boot),
         ("The record of a run", "every entry and pose once, and the same again", the_record_has_no_gaps),
         ("Orders", "a start that comes again is carried out once", a_start_is_carried_out_once),
@@ -306,7 +307,7 @@ RUNS: tuple[Requirement[RobotBench], ...] = tuple(
         ("Orders", "anybody may pause; only the commander resumes", anybody_may_pause),
         ("Messages", "110 stops are told in a small state, without gaps", a_long_run_is_told_in_little),
         ("Pushing a mission", "a new revision during a run waits", a_revision_waits_for_the_next_stop),
-        ("Pushing a mission", "a revision of the way so far: `way_differs`", a_way_that_differs_is_refused),
+        ("Pushing a mission", "a revision of the way so far: `way_differs`", a_path_that_differs_is_refused),
         ("Pushing a mission", "another mission in a run: `running`", another_mission_is_refused_during_a_run),
     )
 )  # fmt: skip

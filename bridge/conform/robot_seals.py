@@ -1,80 +1,81 @@
-"""Whom a robot with keys must believe: nobody whose seal does not hold."""
+"""Requirements on message signatures: a robot with keys refuses every query without a valid one."""
 
 from __future__ import annotations
 
 from stopgo.bridge.conform import falsified_seals as falsified
-from stopgo.bridge.conform.falsified_seals import Spoiling
+from stopgo.bridge.conform.falsified_seals import Falsifying
 from stopgo.bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
-from stopgo.bridge.conform.robot_bench import RobotBench, read_reply, rejects, told_of
+from stopgo.bridge.conform.robot_bench import RobotBench
+from stopgo.bridge.conform.robot_queries import describe, must_reject, read_reply
 from stopgo.bridge.link.protocol import Info, LogPage, encode
 
 NO_KEYS = "the link has no keys: --keys DIR"
 
 
-def _asked_wrongly(bench: RobotBench, spoil: Spoiling, what: str) -> None:
-    """Ask with seals that are spoilt; neither questions nor orders may be heeded."""
+def _must_be_untrusted(bench: RobotBench, falsify: Falsifying, what: str) -> None:
+    """Send queries and a command with falsified signatures; all must be refused."""
     if bench.forger is None:
         raise NotTried(NO_KEYS)
-    bench.forger.seals.spoil = spoil
+    bench.forger.seals.falsify = falsify
     for key, payload, parameters in (
         (bench.keys.info, b"", {}),
         (bench.keys.log, b"", {"since": "0"}),
-        (bench.keys.command("pause"), encode(bench.order("pause", issued_ns=0)), {}),
+        (bench.keys.command("pause"), encode(bench.commands.order("pause", issued_ns=0)), {}),
     ):
         raw = bench.forger.link.ask(key, payload, timeout_s=bench.timeout_s, parameters=parameters)
         must(raw is not None, f"a question {what} was not answered; it is to be refused as untrusted")
         reply = read_reply(raw or b"")
-        must(not isinstance(reply, Info | LogPage), f"a question {what} was answered with {told_of(reply)}")
-        rejects(reply, "untrusted")
+        must(not isinstance(reply, Info | LogPage), f"a question {what} was answered with {describe(reply)}")
+        must_reject(reply, "untrusted")
 
 
 def unsigned_is_untrusted(bench: RobotBench) -> None:
-    _asked_wrongly(bench, falsified.unsigned, "without a seal")
+    _must_be_untrusted(bench, falsified.unsigned, "without a seal")
 
 
 def wrong_signatures_are_untrusted(bench: RobotBench) -> None:
-    _asked_wrongly(bench, falsified.flipped, "with a wrong signature")
+    _must_be_untrusted(bench, falsified.flipped, "with a wrong signature")
 
 
 def seals_are_for_one_key(bench: RobotBench) -> None:
-    _asked_wrongly(bench, falsified.of_another_key, "with the seal of another key")
+    _must_be_untrusted(bench, falsified.of_another_key, "with the seal of another key")
 
 
 def seals_are_for_one_payload(bench: RobotBench) -> None:
-    _asked_wrongly(bench, falsified.of_another_payload, "with the seal of other bytes")
+    _must_be_untrusted(bench, falsified.of_another_payload, "with the seal of other bytes")
 
 
 def seals_are_for_their_parameters(bench: RobotBench) -> None:
-    _asked_wrongly(bench, falsified.of_other_parameters, "with the seal of other parameters")
+    _must_be_untrusted(bench, falsified.of_other_parameters, "with the seal of other parameters")
 
 
 def certificates_are_needed(bench: RobotBench) -> None:
-    _asked_wrongly(bench, falsified.without_certificate, "without a certificate")
+    _must_be_untrusted(bench, falsified.without_certificate, "without a certificate")
 
 
 def orders_are_given_in_ones_own_name(bench: RobotBench) -> None:
     if bench.forger is None:
         raise NotTried(NO_KEYS)
-    order = bench.order("pause", issued_ns=0, commander="somebody-else")
-    rejects(bench.ask(bench.keys.command("pause"), encode(order)), "untrusted")
+    order = bench.commands.order("pause", issued_ns=0, commander="somebody-else")
+    must_reject(bench.ask(bench.keys.command("pause"), encode(order)), "untrusted")
 
 
 def what_is_published_is_sealed(bench: RobotBench) -> None:
-    """What is heard has been verified by the link before it is."""
+    """The link delivers only publications whose signature is valid."""
     if bench.forger is None:
         raise NotTried(NO_KEYS)
     bench.info()
-    before = len(bench.heard.states)
+    before = len(bench.published.states)
     try:
-        bench.wait(lambda: len(bench.heard.states) > before or None, bench.timeout_s, "")
+        bench.wait(lambda: len(bench.published.states) > before or None, bench.timeout_s, "")
     except Nonconforming:
         why = bench.link.distrusted or "none came"
         raise Nonconforming(f"no state was heard whose seal holds ({why})") from None
 
 
 SEALS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement("Seals", text, find_out)
-    for text, find_out in (
+    Requirement("Seals", text, test)
+    for text, test in (
         ("a question without a seal: `untrusted`", unsigned_is_untrusted),
         ("a wrong signature: `untrusted`", wrong_signatures_are_untrusted),
         ("a seal counts on its own key only", seals_are_for_one_key),

@@ -1,4 +1,4 @@
-"""A robot that a station under test believes to command; what that station is to do is told by `do`."""
+"""Bench of a station under test: a fake robot, and a function that makes the station act."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 import msgspec
 
 from stopgo.bridge.conform.fake_robot import (
+    AnswerFault,
     FakeRobot,
     ForgedAnswers,
-    Meddling,
-    Withholding,
+    PublishFault,
     everything,
     plainly,
 )
@@ -25,10 +25,11 @@ from stopgo.bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, count_of,
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.run.orders import Answer, Order, Verb
 
-Doing = Callable[[str, Mission | None], int | None]
-"""Lets the station do something (`push` with a mission, `start`, `watch`); its exit code, if it has one."""
+StationAction = Callable[[str, Mission | None], int | None]
+"""Makes the station act (`push` with a mission, `start`, `watch`); returns its exit code, if it has one."""
 DONE, NO, UNKNOWN = 0, 1, 3
 LONG_SCAN_S = 3_600.0
+"""Scan time of a run that does not end during a test."""
 
 M = TypeVar("M")
 
@@ -36,7 +37,7 @@ M = TypeVar("M")
 class StationBench:
     """One station under test."""
 
-    def __init__(self, robot: FakeRobot, do: Doing, *, forged: ForgedAnswers | None = None) -> None:
+    def __init__(self, robot: FakeRobot, do: StationAction, *, forged: ForgedAnswers | None = None) -> None:
         self.robot = robot
         self.link = robot.link
         self.forged = forged
@@ -48,25 +49,26 @@ class StationBench:
     # Letting the station do something
 
     def does(self, what: str, mission: Mission | None = None) -> int | None:
-        """Let the station do something; what it asks is noted from now on."""
+        """Make the station act, and record its queries; return its exit code."""
         self.link.asked.clear()
         code = self._do(what, mission)
         if not self.link.asked:
-            told = "" if code is None else f" (exit code {code})"
-            raise NotTried(f"the station was to {what} and asked nothing{told}; does it find the robot?")
+            ended = "" if code is None else f" (exit code {code})"
+            raise NotTried(f"the station was to {what} and asked nothing{ended}; does it find the robot?")
         return code
 
     @contextmanager
-    def meddling(self, meddle: Meddling = plainly, withhold: Withholding = everything) -> Iterator[None]:
-        self.link.meddle, self.link.withhold = meddle, withhold
+    def faults(self, answer: AnswerFault = plainly, publish: PublishFault = everything) -> Iterator[None]:
+        """Put faults into answers and publications within the block."""
+        self.link.answer_fault, self.link.publish_fault = answer, publish
         try:
             yield
         finally:
-            self.link.meddle, self.link.withhold = plainly, everything
+            self.link.answer_fault, self.link.publish_fault = plainly, everything
 
     @contextmanager
     def forging(self, part: str) -> Iterator[None]:
-        """Answers on keys with this in them are sealed wrongly."""
+        """Falsify the signatures of answers on keys that contain `part`, within the block."""
         if self.forged is None:
             raise NotTried("the link has no keys: --keys DIR")
         self.forged.forges = lambda key: part in key
@@ -93,17 +95,17 @@ class StationBench:
         return self._steps("commit", Commit)
 
     def _steps(self, step: str, kind: type[M]) -> list[M]:
-        """What was sent for a step of a push, read."""
+        """Decode the messages of a step of a push."""
         sent = (request for request in self.asked("mission/") if request.key.endswith(f"/{step}"))
         return [_read(request, kind, f"a {step}") for request in sent]
 
     def chunks(self) -> list[int]:
-        """Numbers of the chunks that came, in their order."""
+        """Return the numbers of the chunks in the order in which they came."""
         return [self._number(tail.split("/")[-1]) for tail in self.tails() if "/chunk/" in tail]
 
-    def _number(self, told: str) -> int:
+    def _number(self, text: str) -> int:
         try:
-            return count_of(told)
+            return count_of(text)
         except ValueError as error:
             raise Nonconforming(f"a chunk's number: {error}") from None
 
@@ -115,11 +117,11 @@ class StationBench:
         return trial_mission(self._mission_id, self._revision, here, stops=stops, scan_s=scan_s)
 
     def large(self) -> Mission:
-        """A mission of several chunks."""
+        """Make a mission of several chunks."""
         return self.mission(stops=3 * CHUNK_BYTES // _bytes_of_a_stop(self.mission()))
 
     def ready(self, *, scan_s: float = 1.0) -> Mission:
-        """A mission that lies on the robot, and that nobody commands."""
+        """Store a mission on the robot, in READY and without a lease, and return it."""
         self.at_rest()
         mission = self.mission(scan_s=scan_s)
         document = msgspec.json.encode(mission)
@@ -130,8 +132,8 @@ class StationBench:
         journal, controller = self.robot.journal, self.robot.controller
         journal.begin_transfer(manifest)
         for number in range(manifest.chunks):
-            piece = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES]
-            journal.store_chunk(manifest, number, piece)
+            data = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES]
+            journal.store_chunk(manifest, number, data)
         commit = Commit(
             manifest=manifest, commander=self.commander, nonce=uuid.uuid4().hex, take_over=True,
             not_after_ns=self.robot.wall.now_ns() + 10**10,
@@ -142,18 +144,18 @@ class StationBench:
         return mission
 
     def info(self) -> dict[str, Any]:
-        """What the robot would tell of itself."""
+        """Return the robot's info."""
         key = self.robot.keys.info
         info: dict[str, Any] = msgspec.json.decode(self.link.served[key](Request(key, b"")))
         return info
 
     def long_run(self) -> None:
-        """A run that nobody need hurry for: each of its scans takes an hour."""
+        """Start a run that does not end during a test: each of its scans takes an hour."""
         self.ready(scan_s=LONG_SCAN_S)
         self.gives("start")
 
     def free_lease(self) -> None:
-        """Let the lease of whoever holds it be over."""
+        """End the lease of the present commander."""
         lease = self.robot.controller.lease
         if lease is not None:
             self.robot.journal.store_fact("lease", msgspec.structs.replace(lease, until_ns=0))
@@ -168,7 +170,7 @@ class StationBench:
         self.robot.journal.store_fact("lease", held)
 
     def gives(self, verb: Verb) -> Answer:
-        """An order that does not come from the station under test."""
+        """Execute a command that does not come from the station under test."""
         order = Order(
             cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, valid_for_s=5.0, take_over=True,
             issued_ns=self.robot.wall.now_ns(),
@@ -181,9 +183,9 @@ class StationBench:
         if not self.robot.controller.run.over:
             self.gives("abort")
 
-    def check_in(self, *, may_drive: bool) -> None:
+    def return_to_rest(self, *, may_drive: bool) -> None:
         self.at_rest()
-        self.link.meddle, self.link.withhold = plainly, everything
+        self.link.answer_fault, self.link.publish_fault = plainly, everything
         self.free_lease()
 
 
@@ -200,7 +202,7 @@ def _read(request: Request, kind: type[M], what: str) -> M:
 
 
 def changed_answer(answer: Answering, **changes: Any) -> Answering:
-    """The same answer with fields that are otherwise, or that are more."""
+    """Return the answer with changed or additional fields."""
 
     def answered(request: Request) -> bytes:
         return encode({**msgspec.json.decode(answer(request)), **changes})
@@ -208,6 +210,6 @@ def changed_answer(answer: Answering, **changes: Any) -> Answering:
     return answered
 
 
-def tells(code: int | None, wanted: int, otherwise: str) -> None:
-    """Raise `Nonconforming` if the station has an exit code and it is another."""
+def must_exit(code: int | None, wanted: int, otherwise: str) -> None:
+    """Raise `Nonconforming` if the station has an exit code other than `wanted`."""
     must(code is None or code == wanted, f"{otherwise} (exit code {code}, not {wanted})")

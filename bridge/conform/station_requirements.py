@@ -1,4 +1,4 @@
-"""What a station must do when answers are lost, late, forged, or newer than it is."""
+"""Requirements on a station when answers are lost, late, forged, or of a newer version."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ import msgspec
 
 from stopgo.bridge.conform.fake_robot import lost, no_answer, plainly
 from stopgo.bridge.conform.requirements import Requirement, must
-from stopgo.bridge.conform.station_bench import DONE, NO, UNKNOWN, StationBench, changed_answer, tells
+from stopgo.bridge.conform.station_bench import DONE, NO, UNKNOWN, StationBench, changed_answer, must_exit
 from stopgo.bridge.link.link import Answering, Request, Unanswered
 from stopgo.bridge.link.protocol import Booted, ChunkHeld, Rejected, encode
 from stopgo.mission.run.orders import LONGEST_VALID_S
 
 LATE_S = 2.0
-"""Longer than anybody waits for one try, shorter than for the whole."""
+"""Delay of a late answer: longer than the timeout of one try, shorter than that of the request."""
 WATCHED_SCAN_S = 40.0
-"""At ten times the speed a run of two stops still goes on when a slow station has begun to watch."""
+"""Scan time with which a run of two stops, at ten times the speed, outlasts the start of a slow watch."""
 STOP_BYTES = 1000
-"""No pause or abort is larger."""
+"""Largest size of a pause or an abort."""
 
 
 def _on(part: str, instead: Callable[[Request, Answering], bytes]) -> Callable[[Request, Answering], bytes]:
-    """Meddle with questions on keys with this in them alone."""
+    """Put a fault into queries whose key contains `part`."""
 
-    def meddle(request: Request, answer: Answering) -> bytes:
+    def fault(request: Request, answer: Answering) -> bytes:
         return instead(request, answer) if part in request.key else plainly(request, answer)
 
-    return meddle
+    return fault
 
 
 def _first(part: str, instead: Callable[[Request, Answering], bytes]) -> Any:
-    """Meddle with the first question on such keys alone."""
+    """Put a fault into the first query whose key contains `part`."""
     seen: list[Request] = []
 
-    def meddle(request: Request, answer: Answering) -> bytes:
+    def fault(request: Request, answer: Answering) -> bytes:
         if part not in request.key or seen:
             return plainly(request, answer)
         seen.append(request)
         return instead(request, answer)
 
-    return meddle
+    return fault
 
 
 # Orders
@@ -52,7 +52,7 @@ def _first(part: str, instead: Callable[[Request, Answering], bytes]) -> Any:
 def an_order_is_for_one_boot_and_state(bench: StationBench) -> None:
     mission = bench.ready()
     before_ns = bench.robot.wall.now_ns()
-    tells(bench.does("start"), DONE, "a start that was carried out is not told as done")
+    must_exit(bench.does("start"), DONE, "a start that was carried out is not reported as done")
     orders = bench.orders("start")
     must(orders, "no start came")
     order = orders[0]
@@ -66,19 +66,19 @@ def an_order_is_for_one_boot_and_state(bench: StationBench) -> None:
 
 def an_order_is_repeated_under_its_id(bench: StationBench) -> None:
     bench.ready()
-    with bench.meddling(_first("/cmd/start", lost)):
+    with bench.faults(_first("/cmd/start", lost)):
         code = bench.does("start")
     ids = {order.cmd_id for order in bench.orders("start")}
     must(len(ids) == 1, f"a start without an answer was sent under {len(ids)} ids")
     payloads = {request.payload for request in bench.asked("cmd/start")}
     must(len(payloads) == 1, "a start that was sent again under one id is another")
-    tells(code, DONE, "a start whose first answer was lost is not told as done")
+    must_exit(code, DONE, "a start whose first answer was lost is not reported as done")
 
 
 def silence_is_unknown(bench: StationBench) -> None:
     bench.ready()
-    with bench.meddling(_on("/cmd/start", lost)):
-        tells(bench.does("start"), UNKNOWN, "a start without an answer is not told as unknown")
+    with bench.faults(_on("/cmd/start", lost)):
+        must_exit(bench.does("start"), UNKNOWN, "a start without an answer is not reported as unknown")
     must(bench.orders("start"), "no start came")
     ids = {order.cmd_id for order in bench.orders("start")}
     must(len(ids) == 1, f"a start without an answer was sent under {len(ids)} ids")
@@ -92,14 +92,14 @@ def a_late_answer_counts(bench: StationBench) -> None:
         time.sleep(LATE_S)
         return reply
 
-    with bench.meddling(_first("/cmd/start", late)):
-        tells(bench.does("start"), DONE, "a start that was answered late is not told as done")
+    with bench.faults(_first("/cmd/start", late)):
+        must_exit(bench.does("start"), DONE, "a start that was answered late is not reported as done")
     must(len({order.cmd_id for order in bench.orders("start")}) == 1, "a late answer made a second order")
 
 
 def a_refusal_is_told_and_left_at_that(bench: StationBench) -> None:
     bench.ready()
-    tells(bench.does("resume"), NO, "a resume that was refused is not told as refused")
+    must_exit(bench.does("resume"), NO, "a resume that was refused is not reported as refused")
     ids = {order.cmd_id for order in bench.orders("resume")}
     must(len(ids) <= 1, f"a resume that was refused was ordered {len(ids)} times")
 
@@ -107,7 +107,7 @@ def a_refusal_is_told_and_left_at_that(bench: StationBench) -> None:
 def the_lease_is_not_taken_unasked(bench: StationBench) -> None:
     bench.ready()
     bench.leased_to("somebody-else")
-    tells(bench.does("start"), NO, "a start under another's lease is not told as refused")
+    must_exit(bench.does("start"), NO, "a start under another's lease is not reported as refused")
     must(bench.orders("start"), "no start came")
     must(not any(order.take_over for order in bench.orders("start")), "it takes over though nobody said so")
     lease = bench.robot.controller.lease
@@ -116,9 +116,9 @@ def the_lease_is_not_taken_unasked(bench: StationBench) -> None:
 
 def a_stop_asks_nothing_first(bench: StationBench) -> None:
     bench.long_run()
-    with bench.meddling(lambda request, answer: _only("/cmd/", request, answer)):
-        tells(bench.does("pause"), DONE, "a pause of a robot that tells no state is not told as done")
-    must(bench.orders("pause"), "where the robot tells no state, no pause comes")
+    with bench.faults(lambda request, answer: _only("/cmd/", request, answer)):
+        must_exit(bench.does("pause"), DONE, "a pause without a state of the robot is not reported as done")
+    must(bench.orders("pause"), "a robot that reports no state gets no pause")
     size = max(len(request.payload) for request in bench.asked("cmd/pause"))
     must(size <= STOP_BYTES, f"a pause has {size} bytes")
     must(bench.robot.controller.run.state == "PAUSED", "the robot was not paused")
@@ -134,7 +134,7 @@ def _only(part: str, request: Request, answer: Answering) -> bytes:
 def a_push_is_whole_and_read_back(bench: StationBench) -> None:
     bench.at_rest()
     mission = bench.large()
-    tells(bench.does("push", mission), DONE, "a push that was taken is not told as done")
+    must_exit(bench.does("push", mission), DONE, "a push that was taken is not reported as done")
     must(bench.robot.holds(mission), "the robot does not hold what was to be pushed")
     manifest = bench.announced()[-1]
     numbers = bench.chunks()
@@ -158,10 +158,10 @@ def a_push_goes_on_where_it_was_cut(bench: StationBench) -> None:
             return plainly(request, answer)
         raise Unanswered
 
-    with bench.meddling(cut):
-        tells(bench.does("push", mission), UNKNOWN, "a push that was cut off is not told as unknown")
+    with bench.faults(cut):
+        must_exit(bench.does("push", mission), UNKNOWN, "a push that was cut off is not reported as unknown")
     must(not bench.commits(), "a commit was sent before all chunks were held")
-    tells(bench.does("push", mission), DONE, "a push that went on is not told as done")
+    must_exit(bench.does("push", mission), DONE, "a push that went on is not reported as done")
     must(0 not in bench.chunks(), "a chunk that is held was sent again")
     must(bench.robot.holds(mission), "the robot does not hold what was to be pushed")
 
@@ -169,8 +169,12 @@ def a_push_goes_on_where_it_was_cut(bench: StationBench) -> None:
 def a_commit_is_repeated_as_it_is(bench: StationBench) -> None:
     bench.at_rest()
     mission = bench.mission()
-    with bench.meddling(_first("/commit", lost)):
-        tells(bench.does("push", mission), DONE, "a push whose commit was answered late is not told as done")
+    with bench.faults(_first("/commit", lost)):
+        must_exit(
+            bench.does("push", mission),
+            DONE,
+            "a push whose commit is answered late is not reported as done",
+        )
     nonces = {commit.nonce for commit in bench.commits()}
     must(len(nonces) == 1, f"one commit was sent under {len(nonces)} nonces")
 
@@ -179,23 +183,23 @@ def a_damaged_chunk_is_not_committed(bench: StationBench) -> None:
     bench.at_rest()
     mission = bench.mission()
     damaged = encode(ChunkHeld(index=0, sha256="0" * 64))
-    with bench.meddling(_on("/chunk/", lambda request, answer: damaged)):
+    with bench.faults(_on("/chunk/", lambda request, answer: damaged)):
         code = bench.does("push", mission)
-    must(code != DONE, "a push whose chunk arrived damaged is told as done")
+    must(code != DONE, "a push whose chunk arrived damaged is reported as done")
     must(not bench.commits(), "what arrived damaged was committed")
 
 
 def a_rejection_is_told(bench: StationBench) -> None:
     bench.at_rest()
     no = encode(Rejected(reason="later_reason", messages=("for a reason that nobody knows yet",)))
-    with bench.meddling(_on("/commit", lambda request, answer: no)):
+    with bench.faults(_on("/commit", lambda request, answer: no)):
         code = bench.does("push", bench.mission())
     must(bench.commits(), "no commit came")
-    tells(code, NO, "a push that was rejected is not told as rejected")
+    must_exit(code, NO, "a push that was rejected is not reported as rejected")
 
 
 def acceptance_is_not_believed_blindly(bench: StationBench) -> None:
-    """Somebody else pushed between the commit and the look."""
+    """The robot reports another mission after the commit, as if somebody else had pushed."""
     bench.at_rest()
     mission = bench.mission()
     seen: list[Request] = []
@@ -209,9 +213,9 @@ def acceptance_is_not_believed_blindly(bench: StationBench) -> None:
         told["state"]["mission_id"] = "another"
         return encode(told)
 
-    with bench.meddling(another_since):
+    with bench.faults(another_since):
         code = bench.does("push", mission)
-    must(code != DONE, "a push is told as done though the robot tells of another mission")
+    must(code != DONE, "a push is reported as done although the robot reports another mission")
 
 
 # A newer robot
@@ -223,8 +227,8 @@ def newer_fields_are_passed_over(bench: StationBench) -> None:
     def newer(request: Request, answer: Answering) -> bytes:
         return changed_answer(answer, later={"than": [1, 2]}, also="new")(request)
 
-    with bench.meddling(newer):
-        tells(bench.does("start"), DONE, "a robot that adds fields to its answers cannot be started")
+    with bench.faults(newer):
+        must_exit(bench.does("start"), DONE, "a robot that adds fields to its answers cannot be started")
     must(bench.orders("start"), "to a robot that adds fields to its answers no start comes")
 
 
@@ -236,9 +240,9 @@ def an_unknown_state_is_no_hindrance(bench: StationBench) -> None:
         told["state"]["state"] = "HOVERING"
         return encode(told)
 
-    with bench.meddling(_on("/info", hovering)):
-        tells(bench.does("status"), DONE, "a robot in a state that is not known cannot be asked")
-        tells(bench.does("pause"), DONE, "a robot in a state that is not known cannot be paused")
+    with bench.faults(_on("/info", hovering)):
+        must_exit(bench.does("status"), DONE, "a robot in a state that is not known cannot be asked")
+        must_exit(bench.does("pause"), DONE, "a robot in a state that is not known cannot be paused")
     must(bench.orders("pause"), "to a robot in a state that is not known no pause comes")
 
 
@@ -253,8 +257,8 @@ def unknown_events_are_passed_over(bench: StationBench) -> None:
                 event["event"], event["later"] = "Levelled", 1
         return encode(page)
 
-    with bench.meddling(_on("/log", newer)):
-        tells(bench.does("watch"), DONE, "a run with events that are not known is not followed to its end")
+    with bench.faults(_on("/log", newer)):
+        must_exit(bench.does("watch"), DONE, "a run with unknown events is not followed to its end")
 
 
 # Following
@@ -263,13 +267,13 @@ def unknown_events_are_passed_over(bench: StationBench) -> None:
 def missed_events_are_asked_for(bench: StationBench) -> None:
     bench.ready()
     bench.gives("start")
-    with bench.meddling(withhold=lambda key, payload: None if key.endswith("/tel/event") else payload):
-        tells(bench.does("watch"), DONE, "a run whose events were lost is not followed to its end")
+    with bench.faults(publish=lambda key, payload: None if key.endswith("/tel/event") else payload):
+        must_exit(bench.does("watch"), DONE, "a run whose events were lost is not followed to its end")
     must(bench.asked("log"), "events that were lost are not asked for")
 
 
 def missed_poses_are_asked_for(bench: StationBench) -> None:
-    """In a run that goes on while it is watched, every second half second of poses is lost."""
+    """During the watch of a run, the poses of every second half second are lost."""
     bench.ready(scan_s=WATCHED_SCAN_S)
     bench.gives("start")
     told = count()
@@ -277,7 +281,7 @@ def missed_poses_are_asked_for(bench: StationBench) -> None:
     def half(key: str, payload: bytes) -> bytes | None:
         return None if key.endswith("/tel/pose") and next(told) // 10 % 2 else payload
 
-    with bench.meddling(withhold=half):
+    with bench.faults(publish=half):
         bench.does("watch")
     must(bench.asked("poses") or bench.asked("record"), "poses that were lost are not asked for")
 
@@ -286,7 +290,7 @@ def a_watch_is_known_to_the_robot(bench: StationBench) -> None:
     bench.ready()
     bench.gives("start")
     bench.link.watchers.clear()
-    tells(bench.does("watch"), DONE, "a run that finished is not told as done")
+    must_exit(bench.does("watch"), DONE, "a run that finished is not reported as done")
     must(bench.link.watchers, "no token on watch/<name> was shown")
     must(bench.asked("keep"), "`keep` was not asked")
 
@@ -311,7 +315,7 @@ def two_of_one_name_are_stopped(bench: StationBench) -> None:
         code = bench.does("resume")
     finally:
         there = False
-    must(code != DONE, "an order to two robots of one name is told as done")
+    must(code != DONE, "an order to two robots of one name is reported as done")
     must(not bench.orders("resume"), "an order was given though two robots answer to the name")
     must(bench.orders("pause"), "two robots of one name are not paused")
 
@@ -325,28 +329,28 @@ def _boot_of(there: bool) -> bytes:
 def questions_are_sealed(bench: StationBench) -> None:
     with bench.forging("no such key"):
         bench.ready()
-        tells(bench.does("start"), DONE, "a start that was carried out is not told as done")
+        must_exit(bench.does("start"), DONE, "a start that was carried out is not reported as done")
     holders = {request.holder for request in bench.asked("cmd/start")}
-    must(holders and None not in holders, "a start without a seal that holds")
+    must(holders and None not in holders, "a start without a valid message signature")
 
 
 def forged_states_are_not_believed(bench: StationBench) -> None:
     bench.ready()
     with bench.forging("/info"):
         code = bench.does("start")
-    must(code != DONE, "a start after a forged Info is told as done")
-    must(not bench.orders("start"), "an order was written by an Info whose seal does not hold")
+    must(code != DONE, "a start after a forged Info is reported as done")
+    must(not bench.orders("start"), "a command was made from an Info without a valid message signature")
 
 
 def forged_answers_are_not_believed(bench: StationBench) -> None:
     bench.ready()
     with bench.forging("/cmd/"):
-        tells(bench.does("start"), UNKNOWN, "a start that was answered by a forger is not told as unknown")
+        must_exit(bench.does("start"), UNKNOWN, "a start with a forged answer is not reported as unknown")
 
 
 STATION_REQUIREMENTS: tuple[Requirement[StationBench], ...] = tuple(
-    Requirement(section, text, find_out)
-    for section, text, find_out in (
+    Requirement(section, text, test)
+    for section, text, test in (
         ("Orders", "an order names boot, clock and state as told", an_order_is_for_one_boot_and_state),
         ("Orders", "an answer lost: the same order again, under its id", an_order_is_repeated_under_its_id),
         ("Orders", "no answer: told as unknown, one id", silence_is_unknown),

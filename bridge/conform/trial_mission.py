@@ -1,4 +1,4 @@
-"""The small mission that a robot under test is given: a few stops just ahead of where it stands, and back."""
+"""Small mission for a robot under test: a few stops just ahead of its pose, and back."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from stopgo.mission.document import (
 from stopgo.mission.run.events import Pose
 
 REACH_M = 0.5
-"""How far ahead the last stop of a mission lies that is driven."""
+"""Distance of the last stop of a mission that is driven."""
 TOLERANCE_M = 0.1
 
 
@@ -35,8 +35,8 @@ def trial_mission(
     scan_s: float = 1.0,
     stopgo: str = "conform",
 ) -> Mission:
-    """Stops on a straight line ahead of `pose`, the last `reach_m` metres away, and the way straight back."""
-    places = [_ahead(pose, reach_m * (index + 1) / stops) for index in range(stops)]
+    """Make a mission of stops on a line ahead of `pose`, the last `reach_m` metres away, and a return leg."""
+    positions = [_ahead(pose, reach_m * (index + 1) / stops) for index in range(stops)]
     here = (pose.x, pose.y)
     return sealed(
         Mission(
@@ -46,10 +46,10 @@ def trial_mission(
             scanner=ScannerSpec(profile=profile, range=5.0),
             start=Start(x=pose.x, y=pose.y, heading=pose.heading, reason="given"),
             stops=tuple(
-                _stop(index, before, place, pose.heading, profile, scan_s)
-                for index, (before, place) in enumerate(zip([here, *places], places, strict=False))
+                _stop(index, before, position, pose.heading, profile, scan_s)
+                for index, (before, position) in enumerate(zip([here, *positions], positions, strict=False))
             ),
-            return_=(places[-1], here),
+            return_=(positions[-1], here),
             policy=Policy(link_loss="hold", link_loss_after_s=30.0, battery_min=0.05),
             origin=Origin(floor="conformance", floor_digest="0" * 64, parameters={}, stopgo=stopgo),
         )
@@ -63,13 +63,14 @@ def _ahead(pose: Pose, metres: float) -> tuple[float, float]:
 def _stop(
     index: int,
     before: tuple[float, float],
-    place: tuple[float, float],
+    position: tuple[float, float],
     heading: float,
     profile: str,
     scan_s: float,
 ) -> Stop:
     return Stop(
-        id=f"c{index + 1}", x=place[0], y=place[1], heading=heading, doorway=False, tolerance_m=TOLERANCE_M,
-        settle_s=0.5, scan=Scan(profile=profile, duration_s=scan_s, timeout_s=scan_s + 30.0),
-        on_failure="ask", retries=1, approach=(before, place), sees=Sees(units=1, new_units=0),
+        id=f"c{index + 1}", x=position[0], y=position[1], heading=heading, doorway=False,
+        tolerance_m=TOLERANCE_M, settle_s=0.5,
+        scan=Scan(profile=profile, duration_s=scan_s, timeout_s=scan_s + 30.0),
+        on_failure="ask", retries=1, approach=(before, position), sees=Sees(units=1, new_units=0),
     )  # fmt: skip

@@ -1,1 +1,1 @@
-"""The station's end: it pushes a mission, gives orders, and follows a run."""
+"""The station: it pushes a mission, sends commands, and follows a run."""

@@ -1,4 +1,4 @@
-"""A run that is over, told once more: events from the journal, and where the robot was from its record."""
+"""Replay of a finished run: events from the robot's journal, poses from its telemetry log."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from stopgo.bridge.link.capabilities import RECORD
 from stopgo.bridge.station.follow import Followed
-from stopgo.bridge.station.record import Past, past_run, read_index
+from stopgo.bridge.station.logged_run import LoggedReport, read_index, read_run
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import NegativeResult
@@ -17,14 +17,14 @@ from stopgo.mission.run.tolerance import stops_outside
 def past_reports(
     station: Station, run_id: str, mission_of: Callable[[str, int], Mission | None]
 ) -> Iterator[Followed]:
-    """Events, poses and states of a run that is over, in the order of their times; last how it ended.
+    """Yield events, poses and states of a finished run in the order of their times; last its final state.
 
-    `mission_of` knows a mission and revision once an event of it has been told.
+    `mission_of` returns a mission and revision after the first event of that revision was yielded.
 
     Raises
     ------
-    AnswerIsNo
-        If the robot has no such run, or it is still under way.
+    NegativeResult
+        If the robot has no such run, or it is not finished.
     OutcomeUnknown
         If the robot stopped answering.
     """
@@ -32,31 +32,31 @@ def past_reports(
     events = station.log(run_id=run_id)
     if not events:
         raise NegativeResult(
-            f"{robot} has no run {run_id}; it has {_runs(station) if recorded else 'others'}"
+            f"{robot}: no run {run_id}; its runs are {_runs(station) if recorded else 'others'}"
         )
     end = events[-1]
     if not isinstance(end, Finished | Aborted):
-        raise NegativeResult(f"run {run_id} of {robot} is still under way; follow it without --run")
-    waiting, battery = list(events), 0.0
-    told = past_run(station.link, station.keys, run_id, patience_s=station.patience_s) if recorded else ()
-    for item in told:
-        if isinstance(item, Past):
+        raise NegativeResult(f"run {run_id} of {robot}: not finished; follow it without --run")
+    pending, battery = list(events), 0.0
+    entries = read_run(station.link, station.keys, run_id, patience_s=station.patience_s) if recorded else ()
+    for item in entries:
+        if isinstance(item, LoggedReport):
             battery = item.report.battery
         else:
-            while waiting and waiting[0].robot_ns <= item.robot_ns:
-                yield waiting.pop(0)
+            while pending and pending[0].robot_ns <= item.robot_ns:
+                yield pending.pop(0)
         yield item
-    yield from waiting
-    yield _ended(events, end, battery, tuple(stops_outside(events, mission_of)))
+    yield from pending
+    yield _final_state(events, end, battery, tuple(stops_outside(events, mission_of)))
 
 
 def _runs(station: Station) -> str:
     index = read_index(station.link, station.keys, timeout_s=station.timeout_s)
-    kept = () if index is None else tuple(run.run_id for run in index.runs)
-    return ", ".join(kept) or "none"
+    run_ids = () if index is None else tuple(run.run_id for run in index.runs)
+    return ", ".join(run_ids) or "none"
 
 
-def _ended(
+def _final_state(
     events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float, outside: tuple[str, ...]
 ) -> StateReport:
     done = tuple(event.stop for event in events if isinstance(event, Scanned | Unconfirmed))

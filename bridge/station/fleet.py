@@ -1,4 +1,4 @@
-"""Every robot of a site at one moment: those that answer, and those that are known and do not."""
+"""State of every robot of a site at one moment, also of expected robots that do not answer."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, Ro
 from stopgo.mission.run.events import StateReport
 
 GATHER_S = 0.3
-"""Once one robot of a fleet has shown itself, the others get this long."""
-MOST_ASKED = 16
-"""Robots of a fleet that are asked at the same time."""
+"""Time for the other robots of a fleet to be found, after the first was found."""
+MOST_QUERIED = 16
+"""Robots of a fleet that are queried at the same time."""
 
 
 @dataclass(frozen=True)
 class FleetMember:
-    """One robot of a site, as it answered or did not."""
+    """Robot of a site, and its answer."""
 
     robot: str
     state: StateReport | None
-    """`None` if it is silent."""
+    """`None` if the robot did not answer."""
     trouble: str = ""
-    """Why it is not well, though it may have answered."""
+    """Reason why there is no state; empty if there is one."""
 
 
 def fleet(
@@ -42,12 +42,12 @@ def fleet(
     keys: Path | None = None,
     known: Iterable[str] = (),
 ) -> tuple[FleetMember, ...]:
-    """Every robot of the site that shows itself through `endpoint`, and the `known` that do not, by name.
+    """Return every robot of the site that is found through `endpoint`, and the `known` ones, by name.
 
     Raises
     ------
     RobotUnreachable
-        If not a single robot showed itself within `timeout_s`, and none is known.
+        If no robot was found within `timeout_s`, and none is known.
     """
     from stopgo.bridge.link.zenoh_link import Guard, connecting
 
@@ -55,8 +55,10 @@ def fleet(
     every, names = KeyExpressions.of_every_robot(site), set(known)
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
         station = Station(link, every, commander=whoami(), timeout_s=timeout_s)
-        shown: set[str] = set()
-        link.watch_presence(every.alive, lambda key, alive: shown.add(every.robot_of(key)) if alive else None)
+        present: set[str] = set()
+        link.watch_presence(
+            every.alive, lambda key, alive: present.add(every.robot_of(key)) if alive else None
+        )
         try:
             station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
         except RobotUnreachable as error:
@@ -64,10 +66,10 @@ def fleet(
                 raise
             return tuple(FleetMember(name, None, str(error)) for name in sorted(names))
         time.sleep(GATHER_S)
-        with ThreadPoolExecutor(max_workers=MOST_ASKED) as pool:
-            asked = pool.map(lambda name: _member(link, KeyExpressions(name, site), timeout_s, held), shown)
-            found = (*asked, *(FleetMember(name, None, "does not show itself") for name in names - shown))
-    return tuple(sorted(found, key=lambda member: member.robot))
+        with ThreadPoolExecutor(max_workers=MOST_QUERIED) as pool:
+            found = pool.map(lambda name: _member(link, KeyExpressions(name, site), timeout_s, held), present)
+            members = (*found, *(FleetMember(name, None, "not found") for name in names - present))
+    return tuple(sorted(members, key=lambda member: member.robot))
 
 
 def _member(link: Link, keys: KeyExpressions, timeout_s: float, held: HeldKeys | None) -> FleetMember:
@@ -75,6 +77,6 @@ def _member(link: Link, keys: KeyExpressions, timeout_s: float, held: HeldKeys |
     try:
         return FleetMember(keys.robot, station.status())
     except OutcomeUnknown as silent:
-        return FleetMember(keys.robot, None, f"shows itself, but {silent}")
+        return FleetMember(keys.robot, None, f"found, but {silent}")
     except (NegativeResult, InputError) as no:
         return FleetMember(keys.robot, None, str(no))

@@ -1,4 +1,4 @@
-"""What a robot's answer means: what was asked for, a no, or words that this stopgo does not know."""
+"""Decoding of a robot's answers: the expected message, a rejection, or an unknown message."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class PastEvents(NamedTuple):
 
 
 def read_reply(reply: bytes, kind: type[M], *, robot: str, what: str) -> M:
-    """The answer if it is of `kind`.
+    """Decode an answer of type `kind`.
 
     Raises
     ------
-    AnswerIsNo
-        If the robot says no, or that it was asked for nonsense.
+    NegativeResult
+        If the robot rejected the request, or could not read it.
     OutcomeUnknown
-        If it cannot be read.
+        If the answer cannot be decoded.
     """
     try:
         message: Reply = decode(reply, Reply)  # type: ignore[arg-type]
@@ -38,13 +38,13 @@ def read_reply(reply: bytes, kind: type[M], *, robot: str, what: str) -> M:
         why = f"{message.reason}: {'; '.join(message.messages)}"
         raise NegativeResult(f"{robot} rejected {what}: {why}", reason=message.reason)
     if not isinstance(message, kind):
-        said = message.message if isinstance(message, Malformed) else type(message).__name__
-        raise NegativeResult(f"{robot} could not make sense of {what}: {said}")
+        answer = message.message if isinstance(message, Malformed) else type(message).__name__
+        raise NegativeResult(f"{robot}: request not understood ({what}): {answer}")
     return message
 
 
 def read_events(reply: bytes, *, since: int, robot: str) -> PastEvents:
-    """Events with numbers above `since`, each above the one before; raises as `read_reply` does."""
+    """Decode a page of events, numbered upwards from above `since`; raises the errors of `read_reply`."""
     page = read_reply(reply, LogPage, robot=robot, what="reading its log")
     try:
         events = page.events
@@ -58,6 +58,4 @@ def read_events(reply: bytes, *, since: int, robot: str) -> PastEvents:
 
 
 def _unknown(robot: str, what: str, why: str) -> OutcomeUnknown:
-    return OutcomeUnknown(
-        f"{robot} answered {what} in words this stopgo does not know ({why}); update the older one"
-    )
+    return OutcomeUnknown(f"{robot}: unknown answer ({what}: {why}); update the older stopgo")

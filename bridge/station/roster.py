@@ -1,6 +1,7 @@
-"""Which robots belong to a site: as a roster says, or all that were ever seen from here, and when last.
+"""Expected robots of a site: those of a roster, or all that were ever seen from this station.
 
-A robot that is not there is missed only by who knows of it.
+A robot that does not answer can only be reported as missing if it is expected. `Sightings` store for each
+robot the time and state of its last answer.
 """
 
 from __future__ import annotations
@@ -21,25 +22,25 @@ from stopgo.mission.settings.toml_file import read_toml
 
 
 class LastSeen(msgspec.Struct, frozen=True, kw_only=True):
-    """When a robot last told its state, and that state."""
+    """Time and state of a robot's last answer."""
 
     at: datetime
     state: str
 
 
 Sightings = Mapping[str, LastSeen]
-"""By robot."""
+"""Last answers, by robot."""
 
 
-def usual_roster(endpoint: str, site: str | None) -> Path:
-    """Where robots that were seen through an endpoint are remembered: in `$XDG_STATE_HOME/stopgo/seen`."""
+def default_sightings_file(endpoint: str, site: str | None) -> Path:
+    """Return the file of the robots seen through an endpoint, in `$XDG_STATE_HOME/stopgo/seen`."""
     home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     name = file_name(endpoint if site is None else f"{endpoint} {site}")
     return Path(home) / "stopgo" / "seen" / f"{name}.json"
 
 
-def remembered(path: Path) -> Sightings:
-    """Whom the file tells of; nobody if there is none, or it cannot be read any more."""
+def read_sightings(path: Path) -> Sightings:
+    """Read the robots of a file of sightings; none if it does not exist or is damaged."""
     try:
         with one_decode_error():
             return msgspec.json.decode(path.read_bytes(), type=dict[str, LastSeen])
@@ -48,40 +49,40 @@ def remembered(path: Path) -> Sightings:
 
 
 def remember(path: Path, seen: Sightings) -> None:
-    """Add to what is remembered; raises `InputError` if that cannot be written."""
+    """Add sightings to the file; raises `InputError` if it cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{path.parent}: robots that were seen cannot be remembered there ({error.strerror});"
-            " set XDG_STATE_HOME to a folder that can be written"
+            f"{path.parent}: cannot store the robots that were seen ({error.strerror});"
+            " set XDG_STATE_HOME to a writable folder"
         ) from None
-    write_atomic(path, msgspec.json.encode({**remembered(path), **seen}, order="sorted"))
+    write_atomic(path, msgspec.json.encode({**read_sightings(path), **seen}, order="sorted"))
 
 
 def forget(path: Path, names: Iterable[str]) -> None:
-    """Miss these robots no more.
+    """Remove robots from the file, so that they are expected no more.
 
     Raises
     ------
     InputError
         If one was never seen.
     """
-    known = dict(remembered(path))
+    known = dict(read_sightings(path))
     for name in names:
         if name not in known:
-            raise InputError(f"--forget {name}: was never seen here; known: {', '.join(known) or 'none'}")
+            raise InputError(f"--forget {name}: never seen from here; known: {', '.join(known) or 'none'}")
         del known[name]
     write_atomic(path, msgspec.json.encode(known, order="sorted"))
 
 
 def read_roster(path: Path) -> tuple[str, ...]:
-    """The robots that a roster names: `robots = ["r1", "r2"]`.
+    """Read the robots of a roster file: `robots = ["r1", "r2"]`.
 
     Raises
     ------
     InputError
-        Naming the file and what is wrong with it.
+        Names the file, and its error.
     """
     document = read_toml(path)
     names = document.get("robots")
@@ -89,6 +90,6 @@ def read_roster(path: Path) -> tuple[str, ...]:
         raise InputError(f'{path}: must be one list, as in: robots = ["r1", "r2"]')
     for name in names:
         if not isinstance(name, str):
-            raise InputError(f"{path}: {name!r} is no robot's name; write it in quotes")
+            raise InputError(f"{path}: {name!r} is not a robot's name; write it in quotes")
         KeyExpressions(name)
     return tuple(dict.fromkeys(names))

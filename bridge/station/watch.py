@@ -1,4 +1,4 @@
-"""Watches one run: shows it to a person, and hands everything to a recording."""
+"""Watching of one run: it is displayed, and all its data goes to a recording."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import msgspec
 
 from stopgo.bridge.station.finished_run import past_reports
 from stopgo.bridge.station.follow import Followed, Silence
-from stopgo.bridge.station.record import Past
+from stopgo.bridge.station.logged_run import LoggedReport
 from stopgo.bridge.station.station import Station
 from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.comparing.spans import paused_s
@@ -39,94 +39,98 @@ from stopgo.mission.run.tolerance import outside_tolerance_text, stops_outside_t
 
 REDRAW_S = 0.2
 LOST_S = 3.0
-"""After so long without a word a line says so: a state comes every second, and may be late."""
+"""Time without data after which a line reports it: a state comes every second, and may be late."""
 LAST_EVENTS = 8
 
 
-class Showing(Protocol):
-    """How a person sees the run."""
+class RunDisplay(Protocol):
+    """Display of a run."""
 
-    def mission(self, mission: Mission) -> None: ...
+    def mission(self, mission: Mission) -> None:
+        """Take the mission or the revision that follows."""
+        ...
 
-    def show(self, report: Followed) -> None: ...
+    def show(self, report: Followed) -> None:
+        """Display one item of the run."""
+        ...
 
 
 def watch_run(station: Station, record: RunSink | None, *, say: Callable[[str], None]) -> StateReport:
-    """Follow the run to its end, told line by line, and return the last state."""
-    return watch_showing(station, record, Lines(say))
+    """Follow the run to its end, printed line by line, and return the last state."""
+    return watch_with(station, record, EventLines(say))
 
 
-def watch_showing(
-    station: Station, record: RunSink | None, showing: Showing, *, run_id: str | None = None
+def watch_with(
+    station: Station, record: RunSink | None, display: RunDisplay, *, run_id: str | None = None
 ) -> StateReport:
-    """Follow the run to its end, or tell one that is over once more, and return the last state.
+    """Follow the run to its end, or replay the finished run `run_id`, and return the last state.
 
     Raises
     ------
     OutcomeUnknown
-        If the run is over and the robot's last state was never heard.
+        If the run is over and no state was received.
     """
     state: StateReport | None = None
-    known: tuple[str | None, int | None] = (None, None)
+    shown: tuple[str | None, int | None] = (None, None)
     missions: dict[tuple[str, int], Mission] = {}
     past = None if run_id is None else past_reports(station, run_id, lambda *name: missions.get(name))
     for report in station.reports() if past is None else past:
-        plan = _plan_of(report)
-        if plan is not None and plan != known:
-            known = plan
-            mission = _introduced(station, report, record, showing)
+        revision = _revision_of(report)
+        if revision is not None and revision != shown:
+            shown = revision
+            mission = _fetch_mission(station, report, record, display)
             missions[mission.id, mission.revision] = mission
         if isinstance(report, StateReport):
             state = report
         if record is not None:
             hand_over(record, report)
-        showing.show(report)
+        display.show(report)
     if state is None:
-        raise OutcomeUnknown(f"{station.keys.robot}: the run ended and no state was heard")
+        raise OutcomeUnknown(f"{station.keys.robot}: the run ended and no state was received")
     return state
 
 
-def _plan_of(report: Followed) -> tuple[str | None, int | None] | None:
-    """Run and revision that a state or an event is of; none before a run.
+def _revision_of(report: Followed) -> tuple[str | None, int | None] | None:
+    """Return run and revision of a state or an event; `None` before a run.
 
-    Events tell of every revision in turn; a state may come when two have passed.
+    Events name every revision in turn; a state may come after two changes.
     """
-    if isinstance(report, PoseReport | Silence | PosesMissing | Past) or not report.run_id:
+    if isinstance(report, PoseReport | Silence | PosesMissing | LoggedReport) or not report.run_id:
         return None
     return report.run_id, report.revision
 
 
-def _introduced(station: Station, report: Any, record: RunSink | None, showing: Showing) -> Mission:
-    """Fetch the mission that is run, so that it can be drawn and counted down."""
+def _fetch_mission(station: Station, report: Any, record: RunSink | None, display: RunDisplay) -> Mission:
+    """Fetch the mission of a run for the display and the recording."""
     mission = station.mission(report.mission_id or "", report.revision or 0)
-    showing.mission(mission)
+    display.mission(mission)
     if record is not None:
         record.mission(mission)
     return mission
 
 
 def hand_over(record: RunSink, report: Followed) -> None:
-    """Give a report to the recording's method for it."""
+    """Pass a report to the recording's method for it."""
     if isinstance(report, StateReport):
         record.state(report)
     elif isinstance(report, PoseReport):
         record.pose(report)
     elif isinstance(report, PosesMissing):
         record.missing(report)
-    elif isinstance(report, Past):
+    elif isinstance(report, LoggedReport):
         past = report.report
         record.health(past) if isinstance(past, Health) else record.state(past)
     elif not isinstance(report, Silence):
         record.event(report)
 
 
-class Lines:
-    """One line for every event, for a log or a pipe; one when the link is lost, and one when it is back."""
+class EventLines:
+    """Display of one line per event, for a log or a pipe; link loss and its end have a line each."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
         self._stops: Mapping[str, Stop] = {}
-        self._greeted = False
+        self._has_state = False
         self._lost_s = 0.0
 
     def mission(self, mission: Mission) -> None:
@@ -135,54 +139,54 @@ class Lines:
 
     def show(self, report: Followed) -> None:
         if isinstance(report, Silence):
-            self._silent(report.seconds)
+            self._take_silence(report.seconds)
             return
         if self._lost_s:
-            self._say(f"heard again after {self._lost_s:.0f} s")
+            self._say(f"data again after {self._lost_s:.0f} s")
             self._lost_s = 0.0
         if isinstance(report, StateReport):
-            if not self._greeted and report.run_id is None:
+            if not self._has_state and report.run_id is None:
                 self._say(f"{report.robot} is {report.state}; waiting for a run")
-            self._greeted = True
+            self._has_state = True
         elif isinstance(report, PosesMissing):
             self._say(missing_line(report))
-        elif not isinstance(report, PoseReport | Past):
+        elif not isinstance(report, PoseReport | LoggedReport):
             self._say(event_line(report, self._stops))
             if isinstance(report, Held):
                 self._say(HINT)
 
-    def _silent(self, seconds: float) -> None:
+    def _take_silence(self, seconds: float) -> None:
         if seconds >= LOST_S and not self._lost_s:
-            self._say(f"no word for {seconds:.0f} s; asking until it is heard again")
+            self._say(f"no data for {seconds:.0f} s; retrying")
         if seconds >= LOST_S:
             self._lost_s = seconds
 
 
 class EventObjects:
-    """One JSON object for every event; with `beside`, in words, where a stop was scanned from elsewhere."""
+    """Display of one JSON object per event; `beside` describes a position error outside the tolerance."""
 
     def __init__(self, write: Callable[[dict[str, Any]], None]) -> None:
         self._write = write
         self._stops: Mapping[str, Stop] = {}
 
     def mission(self, mission: Mission) -> None:
-        """Its stops; events and the state name themselves the mission they are of."""
+        """Take the stops of the mission; events and states name the mission themselves."""
         self._stops = {stop.id: stop for stop in mission.stops}
 
     def show(self, report: Followed) -> None:
         if isinstance(report, PosesMissing):
             self._write({"missing": msgspec.to_builtins(report)})
-        elif not isinstance(report, StateReport | PoseReport | Silence | Past):
-            beside = outside_tolerance_text(report, self._stops.get(getattr(report, "stop", "")))
-            self._write(msgspec.to_builtins(report) | ({"beside": beside} if beside else {}))
+        elif not isinstance(report, StateReport | PoseReport | Silence | LoggedReport):
+            error = outside_tolerance_text(report, self._stops.get(getattr(report, "stop", "")))
+            self._write(msgspec.to_builtins(report) | ({"beside": error} if error else {}))
 
 
-_WAITED_FOR = [f"stopgo {verb}" for verb, places in STATES.items() if "HELD" in places]
-HINT = f"{'':11} held: the robot waits for {', '.join(_WAITED_FOR[:-1])} or {_WAITED_FOR[-1]}"
+_REMEDIES = [f"stopgo {verb}" for verb, states in STATES.items() if "HELD" in states]
+HINT = f"{'':11} held: the robot waits for {', '.join(_REMEDIES[:-1])} or {_REMEDIES[-1]}"
 
 
-class Table:
-    """A table that is drawn anew in place, for a terminal."""
+class RunTable:
+    """Display as a table for a terminal, drawn again in place."""
 
     def __init__(self, write: Callable[[str], object] = sys.stderr.write) -> None:
         self._write = write
@@ -192,8 +196,9 @@ class Table:
         self._events: deque[AnyEvent] = deque(maxlen=LAST_EVENTS)
         self._silent_s = 0.0
         self._missing = ""
-        self._drawn = 0
-        self._next = 0.0
+        self._height = 0
+        """Lines of the table that was drawn last."""
+        self._next_s = 0.0
 
     def mission(self, mission: Mission) -> None:
         self._mission = mission
@@ -206,19 +211,19 @@ class Table:
             self._pose = report
         elif isinstance(report, PosesMissing):
             self._missing = missing_line(report)
-        elif not isinstance(report, Silence | Past):
+        elif not isinstance(report, Silence | LoggedReport):
             self._events.append(report)
-        if time.monotonic() >= self._next or not isinstance(report, PoseReport):
-            self._next = time.monotonic() + REDRAW_S
+        if time.monotonic() >= self._next_s or not isinstance(report, PoseReport):
+            self._next_s = time.monotonic() + REDRAW_S
             self._draw()
 
     def _draw(self) -> None:
         lines = table_lines(self._mission, self._state, self._pose, tuple(self._events), self._silent_s)
         lines += [self._missing] if self._missing else []
-        up = f"\x1b[{self._drawn}A" if self._drawn else ""
+        up = f"\x1b[{self._height}A" if self._height else ""
         self._write(up + "".join(f"\x1b[2K{printable(line)}\n" for line in lines))
-        # Lines of a longer table drawn before would stay below: the table never shrinks.
-        self._drawn = max(self._drawn, len(lines))
+        # The table never shrinks: lines of a longer table would stay below.
+        self._height = max(self._height, len(lines))
 
 
 def table_lines(
@@ -228,7 +233,7 @@ def table_lines(
     events: tuple[AnyEvent, ...],
     silent_s: float,
 ) -> list[str]:
-    """The run as a table of fixed height."""
+    """Return the lines of a table of the run, of fixed height."""
     if state is None:
         return ["waiting for the robot's state"]
     of = f" of {len(mission.stops)}" if mission else ""
@@ -240,48 +245,48 @@ def table_lines(
         ("robot", f"{state.robot}  run {state.run_id or 'none yet'}"),
         ("state", f"{state.state}  {stop}"),
         ("stops", f"{state.done_count} done{outside}, {state.skipped_count} skipped{of}"),
-        ("place", f"{pose.pose.x:.2f}, {pose.pose.y:.2f} m at {pose.speed:.2f} m/s" if pose else "-"),
+        ("position", f"{pose.pose.x:.2f}, {pose.pose.y:.2f} m at {pose.speed:.2f} m/s" if pose else "-"),
         ("battery", f"{state.battery:.0%}"),
         ("time", f"{clock(elapsed)} run, {'-' if left is None else clock(left)} left as planned"),
-        ("link", "no word for " + f"{silent_s:.0f} s, asking" if silent_s else "alive"),
+        ("link", f"no data for {silent_s:.0f} s, retrying" if silent_s else "alive"),
     ]
     stops = {} if mission is None else {stop.id: stop for stop in mission.stops}
-    told = [event_line(event, stops) for event in events]
+    lines = [event_line(event, stops) for event in events]
     if state.state == "HELD":
-        told = [*told[1 - LAST_EVENTS :], HINT]
-    return [f"  {name:8} {value}" for name, value in rows] + told + [""] * (LAST_EVENTS - len(told))
+        lines = [*lines[1 - LAST_EVENTS :], HINT]
+    return [f"  {name:8} {value}" for name, value in rows] + lines + [""] * (LAST_EVENTS - len(lines))
 
 
 def remaining_s(
     mission: Mission, state: StateReport, events: tuple[AnyEvent, ...], elapsed_s: float
 ) -> float:
-    """Seconds left if all goes as planned from the stop that is worked on, however long the run stands."""
+    """Return the planned time left from the current stop on; a pause of the run does not count."""
     plan = schedule(mission)
     ids = [stop.id for stop in mission.stops]
     behind = state.done_count + state.skipped_count if state.stop is None else ids.index(state.stop)
     if behind == 0:
-        begun = 0.0
+        began_s = 0.0
     else:
         last = mission.stops[behind - 1]
-        begun = float(plan.arrival_s[behind - 1]) + last.settle_s + last.scan.duration_s
+        began_s = float(plan.arrival_s[behind - 1]) + last.settle_s + last.scan.duration_s
     since = max((event.mission_time_s for event in events if isinstance(event, Scanned)), default=0.0)
-    worked = elapsed_s - since - paused_s(events, since_s=since, until_s=elapsed_s)
-    return max(0.0, plan.total_s - begun - max(0.0, worked))
+    worked_s = elapsed_s - since - paused_s(events, since_s=since, until_s=elapsed_s)
+    return max(0.0, plan.total_s - began_s - max(0.0, worked_s))
 
 
 def clock(seconds: float) -> str:
-    """Seconds as hours, minutes and seconds."""
+    """Format seconds as hours, minutes and seconds."""
     minutes, rest = divmod(int(max(0.0, seconds)), 60)
     return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"
 
 
 def missing_line(gap: PosesMissing) -> str:
-    """That poses are missing, as one line."""
+    """Return the line that reports missing poses."""
     return f"{gap.mission_time_s:8.1f} s  {gap.words}"
 
 
 def event_line(event: AnyEvent, stops: Mapping[str, Stop]) -> str:
-    """An event as one line a person reads, beside the stops of its mission as far as they are known."""
+    """Return the line of an event; `stops` are those of its mission, as far as they are known."""
     name = type(event).__name__
     about = getattr(event, "stop", None) or ""
     detail = getattr(event, "reason", "") or getattr(event, "commander", "")
@@ -290,9 +295,9 @@ def event_line(event: AnyEvent, stops: Mapping[str, Stop]) -> str:
     if isinstance(event, RevisionTaken):
         detail = f"revision {event.revision} after {event.before}"
     if isinstance(event, UnknownKind):
-        detail = f"{event.kind}: this stopgo does not know it"
+        detail = f"{event.kind}: unknown to this stopgo"
     if isinstance(event, Arrived):
-        detail = f"{event.deviation_m * 1000:.0f} mm beside"
+        detail = f"position error {event.deviation_m * 1000:.0f} mm"
     if isinstance(event, Scanned):
         detail = f"{event.file}, {event.points / 1e6:.1f} million points"
     detail = "; ".join(word for word in (outside_tolerance_text(event, stops.get(about)), detail) if word)

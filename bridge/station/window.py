@@ -1,9 +1,15 @@
-"""Pieces of something large, several under way at once: as many as fill the line, and hardly more.
+"""Transfer of chunks with a window: as many in flight as fill the link, and hardly more.
 
-A line of long round trips stands idle where each piece waits for the answer to the last one. One piece too
-many lies in somebody's buffer instead, and an order that comes after it waits for it. So what is under way
-follows what the answers take: the shortest that was seen is that of an empty line (as TCP Vegas has it:
-Brakmo and Peterson, 1995), and the rest is what lies in the way.
+With one chunk at a time, a link of long round trips is idle while each chunk waits for its answer. Too many
+chunks fill buffers, and delay a command that is sent after them. So the window follows the round trips, as in
+TCP Vegas (Brakmo and Peterson, 1995). The shortest round trip is that of an empty link. The excess of the
+others over it gives the number of chunks that wait in buffers.
+
+Invariants of `Window`:
+- `size` is between 1 and `MOST`; a link with quick answers keeps a size of 1.
+- `_round` is a list while the link is being probed: times of the answers of this round. It is `None` after
+  that.
+- While probing, each round at most doubles the size. After that each answer changes it by at most 1 / size.
 """
 
 from __future__ import annotations
@@ -20,114 +26,114 @@ from itertools import islice, pairwise
 from typing import Generic, TypeVar, cast
 
 QUICK_S = 0.02
-"""Answers that come as soon as this make one piece after the other quick enough."""
+"""Round trips below this need no window: one chunk at a time is quick enough."""
 FIRST = 4
-"""Pieces that a line of longer round trips is tried with."""
+"""First size of the window on a link of longer round trips."""
 MOST = 128
-"""Of 32 kB, what 40 Mbit/s hold at 800 ms."""
-FEWEST_WAIT, MOST_WAIT = 0.3, 1.0
-"""Pieces that lie in the way: with fewer, one more is sent; with more, one less."""
-ROUGH_S = 0.01
-"""Answers differ by so much without anything in their way."""
+"""Largest size of the window: chunks of 32 kB that 40 Mbit/s hold at 800 ms."""
+FEWEST_WAITING, MOST_WAITING = 0.3, 1.0
+"""Chunks that wait in buffers: with fewer the window grows, with more it shrinks."""
+JITTER_S = 0.01
+"""Variation of round trips on an empty link."""
 
-P = TypeVar("P")
+C = TypeVar("C")
 T = TypeVar("T")
 
 
 class Window:
-    """How many pieces may be under way.
+    """Number of chunks that may be in flight.
 
-    While the line is being tried there are at most twice as many in each round of answers: as many as it
-    holds, going by how soon after one another answers come.
+    While the link is being probed, each round of answers at most doubles it, up to the number that the link
+    holds. That number follows from the time between answers.
     """
 
     def __init__(self, round_trip_s: float) -> None:
-        """`round_trip_s` is what a small question has just taken."""
+        """Start from the round trip of a small query, in seconds."""
         self._size = 1.0 if round_trip_s < QUICK_S else float(FIRST)
         self._least_s = math.inf
         self._round: list[float] | None = []
-        """When the pieces of this round were answered; none once the line has been tried."""
+        """Times of the answers of this round; `None` once the link was probed."""
 
     @property
     def size(self) -> int:
         return int(self._size)
 
     def answered(self, took_s: float, at_s: float) -> None:
-        """Learn from an answer, how long it took and when it came."""
+        """Adapt the window to an answer, which took `took_s` and came at `at_s`."""
         self._least_s = min(self._least_s, took_s)
         if took_s < QUICK_S:
             return
         if self._round is not None:
-            self._try(self._round, at_s)
+            self._probe(self._round, at_s)
         else:
-            self._keep(self._size * max(0.0, took_s - self._least_s - ROUGH_S) / took_s)
+            self._adjust(self._size * max(0.0, took_s - self._least_s - JITTER_S) / took_s)
         self._size = min(max(self._size, 1.0), float(MOST))
 
-    def _try(self, answers: list[float], at_s: float) -> None:
+    def _probe(self, answers: list[float], at_s: float) -> None:
         answers.append(at_s)
         if len(answers) < max(2, self.size):
             return
-        apart_s = statistics.median(after - before for before, after in pairwise(answers))
-        holds = self._least_s / max(apart_s, 1e-6)
-        self._round = [] if holds > 2 * self._size else None
-        self._size = min(holds, 2 * self._size)
+        interval_s = statistics.median(after - before for before, after in pairwise(answers))
+        capacity = self._least_s / max(interval_s, 1e-6)
+        self._round = [] if capacity > 2 * self._size else None
+        self._size = min(capacity, 2 * self._size)
 
-    def _keep(self, waiting: float) -> None:
-        if waiting > MOST_WAIT:
+    def _adjust(self, waiting: float) -> None:
+        if waiting > MOST_WAITING:
             self._size -= 1 / self._size
-        elif waiting < FEWEST_WAIT:
+        elif waiting < FEWEST_WAITING:
             self._size += 1 / self._size
 
 
 @dataclass(frozen=True)
-class SentPiece(Generic[P, T]):
-    """A piece, and what it was answered with or what went wrong."""
+class AnsweredChunk(Generic[C, T]):
+    """Chunk, and its answer or the error instead."""
 
     number: int
-    piece: P
+    chunk: C
     answer: T | None
     error: BaseException | None
     took_s: float
     at_s: float
 
-    def got(self) -> tuple[P, T]:
-        """The piece and its answer; raises what went wrong."""
+    def value(self) -> tuple[C, T]:
+        """Return the chunk and its answer; raise the error if there is one."""
         if self.error is not None:
             raise self.error
-        return self.piece, cast(T, self.answer)
+        return self.chunk, cast(T, self.answer)
 
 
-def windowed(pieces: Iterable[P], ask: Callable[[P], T], window: Window) -> Iterator[tuple[P, T]]:
-    """Every piece in order, with what `ask` gives for it; that is called on threads, several at a time.
+def windowed(chunks: Iterable[C], ask: Callable[[C], T], window: Window) -> Iterator[tuple[C, T]]:
+    """Yield every chunk in order with its answer by `ask`, which is called on several threads at a time.
 
-    What it raises is raised here; what else is under way is then let go.
+    An error of `ask` is raised here; the answers of other chunks in flight are then ignored.
     """
-    done: queue.SimpleQueue[SentPiece[P, T]] = queue.SimpleQueue()
-    waiting = enumerate(pieces)
-    ahead: dict[int, SentPiece[P, T]] = {}
-    under_way = told = 0
+    done: queue.SimpleQueue[AnsweredChunk[C, T]] = queue.SimpleQueue()
+    unsent = enumerate(chunks)
+    early: dict[int, AnsweredChunk[C, T]] = {}
+    in_flight = yielded = 0
     while True:
-        for number, piece in islice(waiting, max(0, window.size - under_way)):
-            under_way += 1
-            begin = partial(_ask, number, piece, ask, done)
+        for number, chunk in islice(unsent, max(0, window.size - in_flight)):
+            in_flight += 1
+            begin = partial(_ask, number, chunk, ask, done)
             begin() if window.size == 1 else threading.Thread(target=begin, daemon=True).start()
-        if not under_way:
+        if not in_flight:
             return
-        asked = done.get()
-        under_way -= 1
-        window.answered(asked.took_s, asked.at_s)
-        ahead[asked.number] = asked
-        while told in ahead:
-            yield ahead.pop(told).got()
-            told += 1
+        answered = done.get()
+        in_flight -= 1
+        window.answered(answered.took_s, answered.at_s)
+        early[answered.number] = answered
+        while yielded in early:
+            yield early.pop(yielded).value()
+            yielded += 1
 
 
-def _ask(number: int, piece: P, ask: Callable[[P], T], done: queue.SimpleQueue[SentPiece[P, T]]) -> None:
+def _ask(number: int, chunk: C, ask: Callable[[C], T], done: queue.SimpleQueue[AnsweredChunk[C, T]]) -> None:
     began = time.monotonic()
     answer, error = None, None
     try:
-        answer = ask(piece)
+        answer = ask(chunk)
     except BaseException as raised:  # noqa: BLE001 (the end of a thread; raised again where it is waited for)
         error = raised
     at_s = time.monotonic()
-    done.put(SentPiece(number, piece, answer, error, at_s - began, at_s))
+    done.put(AnsweredChunk(number, chunk, answer, error, at_s - began, at_s))

@@ -1,4 +1,4 @@
-"""The bridge's commands, each added to the front door; what `watch` records and compares by is named here."""
+"""The bridge's commands for the CLI, and the recorder that `watch` writes and compares runs with."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stopgo.bridge.commands.order_commands import add_orders
 from stopgo.bridge.commands.robot_commands import robot
 from stopgo.bridge.commands.simulate_commands import simulate_commands
 from stopgo.bridge.commands.tunnel_commands import tunnel_commands
-from stopgo.bridge.commands.watch_commands import watch_by
+from stopgo.bridge.commands.watch_commands import watch_command
 from stopgo.bridge.console import say
 from stopgo.mission.errors import InputError
 
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 
 def add_commands(app: typer.Typer) -> None:
-    """Add this folder's verbs to the front door."""
+    """Add the bridge's commands to the CLI."""
     app.command()(robot)
     app.command()(push)
     app.command("fetch-mission")(fetch_mission)
     app.command()(clear)
     app.command()(doctor)
     add_orders(app)
-    app.command()(watch_by(recording))
+    app.command()(watch_command(recording))
     app.add_typer(simulate_commands(), name="simulate")
     app.add_typer(key_commands(), name="keys")
     app.add_typer(conform_commands(), name="conform")
@@ -43,17 +43,17 @@ def add_commands(app: typer.Typer) -> None:
 
 @contextmanager
 def recording(path: Path | None, plan: Path | None, *, view: bool) -> Iterator[RunCollector]:
-    """What hears a run: records it at `path`, looked at if wanted, and compares it with the plan.
+    """Open the collector of a run; it records at `path`, for a viewer if wanted, and knows the plan.
 
-    Nothing of Rerun is loaded without a recording and a plan.
+    Rerun is loaded only for a recording or a plan.
     """
     from stopgo.mission.comparing.run_collector import RunCollector
 
     if path is None and view:
-        raise InputError("--view shows what is recorded: say where, with --rrd FIELD.rrd")
-    known = None if plan is None else plan_recording(plan)
-    with nullcontext() if path is None else _field(path, known, view=view) as record:
-        yield RunCollector(record, () if known is None else known.sights)
+        raise InputError("--view: no recording to show; add one with --rrd FIELD.rrd")
+    planned = None if plan is None else plan_recording(plan)
+    with nullcontext() if path is None else _field(path, planned, view=view) as record:
+        yield RunCollector(record, () if planned is None else planned.sights)
 
 
 def _field(path: Path, plan: Recording | None, *, view: bool) -> AbstractContextManager[RunSink]:
@@ -68,10 +68,10 @@ def _field(path: Path, plan: Recording | None, *, view: bool) -> AbstractContext
 
 
 def plan_recording(path: Path) -> Recording:
-    """A plan's recording that tells what its stops see."""
+    """Read a plan's recording, which must contain the visibility of its stops."""
     from stopgo.recordings.embedded.reading import read_recording
 
     found = read_recording(path)
     if not found.sights:
-        raise InputError(f"{path}: tells not what stops see; give a plan.rrd that this version wrote")
+        raise InputError(f"{path}: contains no visibility data; give a plan.rrd that this version wrote")
     return found

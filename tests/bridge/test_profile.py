@@ -93,7 +93,7 @@ def test_a_bad_file_is_told_in_one_line(content: str, said: str, capsys: pytest.
 def test_an_order_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
     Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
     assert main(["pause", "--timeout", "0.1"]) == 2
-    assert "tcp/127.0.0.1:1: robot r7 did not show itself" in capsys.readouterr().err
+    assert "tcp/127.0.0.1:1: robot r7 not found" in capsys.readouterr().err
 
 
 def test_doctor_tells_of_everything_and_ends_with_1_if_something_is_wrong(
@@ -136,7 +136,7 @@ def test_doctor_finds_wrong_what_every_order_would_refuse(
 def test_doctor_asks_no_vehicle_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     Path("stopgo.toml").write_text('mavlink = "udpout:127.0.0.1:14550"')
     assert main(["doctor"]) == 0
-    assert "udpout:127.0.0.1:14550 is a MAVLink URL; nobody was asked there" in capsys.readouterr().out
+    assert "udpout:127.0.0.1:14550 is a MAVLink URL; the vehicle was not queried" in capsys.readouterr().out
 
 
 def test_doctor_compares_the_clocks() -> None:
@@ -144,8 +144,8 @@ def test_doctor_compares_the_clocks() -> None:
     right = {check.name: check for check in robot_checks(info, info.clock_ns)}
     assert all(check.ok for check in right.values())
     late = {check.name: check for check in robot_checks(info, info.clock_ns + 3_000_000_000)}
-    assert (late["clock"].ok, late["clock"].told) == (False, "the robot's clock is -3.0 s from this one")
-    assert "NTP" in late["clock"].do
+    assert (late["clock"].ok, late["clock"].result) == (False, "the robot's clock is -3.0 s from this one")
+    assert "NTP" in late["clock"].action
 
 
 def test_doctor_tells_what_a_robot_can_and_what_it_lacks() -> None:
@@ -153,7 +153,7 @@ def test_doctor_tells_what_a_robot_can_and_what_it_lacks() -> None:
 
     def can(*capabilities: str) -> str:
         told = msgspec.structs.replace(info, capabilities=capabilities)
-        return next(check.told for check in robot_checks(told, info.clock_ns) if check.name == "can")
+        return next(check.result for check in robot_checks(told, info.clock_ns) if check.name == "can")
 
     assert can().startswith("nothing beyond version 1; lacks record: of a link lost")
     assert can("record", "levitation") == "levitation, record"

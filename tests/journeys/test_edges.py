@@ -204,7 +204,7 @@ def test_with_json_an_error_is_json_too(
 
 
 def test_an_answer_in_json_is_the_only_one(workplace: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What `check` finds is its answer; that it found something is no second one."""
+    """The findings of `check` are its only answer; that it has some is not a second one."""
     (workplace / "other.dxf").write_text("another floor")
     assert main(["check", "mission.json", "--floor", "other.dxf", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["ok"] is False

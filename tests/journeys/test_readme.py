@@ -17,7 +17,7 @@ from tests.ports import free_port
 
 @pytest.fixture(scope="module")
 def folder() -> Iterator[Path]:
-    """Where the README's commands have planned, shown and exported, and printed what it says."""
+    """Folder in which the README's commands have planned, shown and exported, and printed what it says."""
     found = blocks()
     with workplace() as made:
         for name in PRINTED:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.commands.watch_commands import tell_compared
+from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.station.watch import hand_over
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Mission
@@ -36,7 +36,7 @@ def test_what_was_heard_decides_how_watching_ends(
 ) -> None:
     mission, sight = planned()
     heard, state = heard_run(mission, sight, skips=skips)
-    assert tell_compared(heard, state, json_=False) == code
+    assert print_comparison(heard, state, as_json=False) == code
     assert ("Not acquired. 57.1 %" in capsys.readouterr().out) == bool(skips)
 
 
@@ -44,8 +44,8 @@ def test_a_plan_of_another_mission_is_told(capsys: pytest.CaptureFixture[str]) -
     mission, sight = planned()
     object.__setattr__(sight, "mission_id", "f" * 32)
     heard, state = heard_run(mission, sight)
-    assert tell_compared(heard, state, json_=True) == 0
-    assert "is the plan of another mission" in capsys.readouterr().err
+    assert print_comparison(heard, state, as_json=True) == 0
+    assert "--plan: belongs to another mission" in capsys.readouterr().err
 
 
 def test_a_run_that_is_told_twice_is_one(mission: Mission) -> None:

@@ -25,12 +25,12 @@ def test_a_robot_with_keys_meets_what_can_be_tried_at_rest(tmp_path: Path) -> No
         told = json.loads(done.stdout)
         assert done.returncode == 0, [one for one in told["requirements"] if one["outcome"] == "failed"]
         assert told["counts"]["failed"] == 0
-        assert done.stderr == "r1 will not drive; what needs that is left out (--drive)\n"
+        assert done.stderr == "r1: will not drive, requirements that need it are not tested; add --drive\n"
         untried = {one["reason"] for one in told["requirements"] if one["outcome"] == "not tried"}
         assert untried == {
             "the robot would drive: --drive",
             "the robot takes any scan profile (Info.profiles is null)",
-            "needs a command that starts the robot's program anew: --restart COMMAND",
+            "needs a command that restarts the robot's program; add --restart COMMAND",
         }
 
 
@@ -45,7 +45,7 @@ def test_a_robot_on_a_run_is_not_tried(tmp_path: Path, capsys: pytest.CaptureFix
         said = capsys.readouterr()
         assert said.out == ""
         assert said.err == (
-            "stopgo: r1 is RUNNING: a robot on a run is not tried; end the run first"
+            "stopgo: r1 is RUNNING: a robot on a run is not tested; end the run first"
             " (stopgo abort --robot r1)\n"
         )
         assert main(["pause", *reach]) == 0

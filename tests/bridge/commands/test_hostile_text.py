@@ -1,4 +1,4 @@
-"""What a mission, a stop or a commander is called moves no cursor, forges no line and becomes no path."""
+"""Names of missions, stops and commanders move no cursor, forge no line and become no path."""
 
 from __future__ import annotations
 

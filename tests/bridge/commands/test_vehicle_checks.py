@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from stopgo.bridge.commands.vehicle_checks import knows_its_place, parameter_checks
+from stopgo.bridge.commands.vehicle_checks import has_position, parameter_checks
 from stopgo.bridge.mavlink.line.parameter_reading import value_of
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
@@ -32,7 +32,7 @@ GUIDE = Path(__file__).parents[3] / "docs" / "how-to" / "ardupilot-indoors.md"
 def test_a_rover_that_is_set_up_for_indoors_has_nothing_wrong() -> None:
     (told,) = parameter_checks(ARDUPILOT, INDOORS, any_origin=False)
     assert (told.name, told.ok) == ("params", True)
-    assert "not told by the vehicle: FRAME_CLASS" in told.told
+    assert "not reported by the vehicle: FRAME_CLASS" in told.result
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_what_is_wrong_is_named_with_the_value_to_set(name: str, value: float, w
         for check in parameter_checks(ARDUPILOT, {**INDOORS, name: value}, any_origin=False)
         if not check.ok
     ]
-    assert [(check.name, check.do) for check in wrong] == [(name, wanted)]
+    assert [(check.name, check.action) for check in wrong] == [(name, wanted)]
 
 
 def test_a_parameter_may_have_the_name_of_an_older_release() -> None:
@@ -58,7 +58,7 @@ def test_a_parameter_may_have_the_name_of_an_older_release() -> None:
     (wrong,) = [
         c for c in parameter_checks(ARDUPILOT, {**values, "GPS_TYPE": 9.0}, any_origin=False) if not c.ok
     ]
-    assert wrong.do == "set GPS_TYPE to 0"
+    assert wrong.action == "set GPS_TYPE to 0"
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_a_parameter_may_have_meant_something_else_in_an_older_release(
 ) -> None:
     def told(value: float) -> list[str]:
         checks = parameter_checks(ARDUPILOT, {**INDOORS, name: value}, any_origin=False)
-        return [check.do for check in checks if check.do]
+        return [check.action for check in checks if check.action]
 
     assert told(all_checks) == []
     assert told(none) == [f"set {name} to {all_checks:g}"]
@@ -106,7 +106,7 @@ def test_whole_numbers_of_px4_stand_in_the_float_byte_by_byte() -> None:
     ],
 )
 def test_an_estimator_has_a_place_to_tell(flags: int, knows: bool) -> None:
-    assert knows_its_place(flags) is knows
+    assert has_position(flags) is knows
 
 
 def test_the_guide_names_every_parameter_that_is_looked_at() -> None:

@@ -96,7 +96,7 @@ def booted(robot: RobotUnderTest) -> Iterator[RobotUnderTest]:
 
 
 def verdicts(robot: RobotUnderTest, *, drive: bool = True) -> list[ConformVerdict]:
-    """What the kit finds of a robot."""
+    """Verdicts of the kit on a robot."""
     with booted(robot):
         return list(robot_verdicts(robot.bench(), drive=drive))
 

@@ -16,7 +16,7 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.seals import NO_SEALS, KeySeals
 from stopgo.bridge.station.station import Station
-from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.bridge.station.watch import EventLines, watch_with
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import StopgoError
 
@@ -54,7 +54,7 @@ class StationUnderTest:
             assert mission is not None
             station.push(mission)
         elif what == "watch":
-            watch_showing(station, None, Lines(lambda line: None))
+            watch_with(station, None, EventLines(lambda line: None))
         elif what == "status":
             station.status()
         else:
@@ -70,7 +70,7 @@ class StationUnderTest:
 
 
 def verdicts(station: StationUnderTest, *only: str) -> dict[str, ConformVerdict]:
-    """What the kit finds of a station, by requirement."""
+    """Verdicts of the kit on a station, by requirement."""
     wanted = [one for one in STATION_REQUIREMENTS if not only or one.text in only or one.section in only]
     assert wanted
     with station.bench() as bench:

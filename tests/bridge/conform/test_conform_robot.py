@@ -68,7 +68,7 @@ def test_without_drive_nothing_moves() -> None:
 def test_what_lay_on_the_robot_lies_ready_again() -> None:
     robot = RobotUnderTest()
     with booted(robot):
-        held = robot.bench().has(robot.bench().mission())
+        held = robot.bench().missions.store(robot.bench().missions.mission())
         found = list(robot_verdicts(robot.bench(), drive=False))
         state = robot.bench().info().state
     assert found[-1].text == "what lay there before lies ready again"
@@ -79,7 +79,7 @@ def test_a_mission_that_cannot_be_read_back_is_not_written_over() -> None:
     robot = RobotUnderTest()
     robot.agent = TellsNoParts
     with booted(robot):
-        held = robot.bench().has(robot.bench().mission())
+        held = robot.bench().missions.store(robot.bench().missions.mission())
         with pytest.raises(InputError, match="the mission on r1 cannot be read, and would be lost"):
             next(robot_verdicts(robot.bench(), drive=False))
         assert robot.bench().info().state.revision == held.revision
@@ -89,12 +89,12 @@ def test_a_robot_on_a_run_or_in_others_hands_is_left_alone() -> None:
     robot = RobotUnderTest()
     with booted(robot):
         bench = robot.bench()
-        bench.has(bench.mission())
+        bench.missions.store(bench.missions.mission())
         with pytest.raises(InputError, match="alice commands r1 for"):
             check_at_rest(bench.info(), "carol", take_over=False)
         check_at_rest(bench.info(), "carol", take_over=True)
-        bench.obeyed("start")
-        with pytest.raises(InputError, match="r1 is RUNNING: a robot on a run is not tried"):
+        bench.commands.must_execute("start")
+        with pytest.raises(InputError, match="r1 is RUNNING: a robot on a run is not tested"):
             check_at_rest(bench.info(), "alice", take_over=True)
 
 
@@ -363,9 +363,9 @@ def test_a_robot_that_stops_answering_is_told_as_gone_and_left_alone() -> None:
         bench = robot.bench()
         robot.board.cut = True
         found = list(tried(REQUIREMENTS[:3], bench))
-    assert [verdict.gone for verdict in found] == [True, False, False]
+    assert [verdict.lost for verdict in found] == [True, False, False]
     assert [verdict.outcome for verdict in found] == ["failed", "not tried", "not tried"]
-    assert "answers no more" in found[-1].reason
+    assert "does not answer" in found[-1].reason
 
 
 def test_every_requirement_stands_in_the_document() -> None:

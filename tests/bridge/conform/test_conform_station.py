@@ -47,7 +47,7 @@ def test_our_own_station_with_keys_meets_what_is_said_of_seals(tmp_path: Path) -
 
 
 class NewIdEachTime(Station):
-    def _insist(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
+    def _ask_repeatedly(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
         for _ in range(3):
             if "/cmd/" in key:
                 payload = encode({**json.loads(payload), "cmd_id": uuid.uuid4().hex})
@@ -95,7 +95,7 @@ class NeverLooksBack(Station):
 
 
 class NewNonceEachTime(NewIdEachTime):
-    def _insist(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
+    def _ask_repeatedly(self, key: str, payload: bytes, within_s: float, **details: Any) -> bytes | None:
         for _ in range(3):
             if key.endswith("/commit"):
                 payload = encode({**json.loads(payload), "nonce": uuid.uuid4().hex})
@@ -114,8 +114,8 @@ class ReadsInfoStrictly(Station):
 
 
 class SeesOneOfTwo(Station):
-    def _one_of(self, replies: list[bytes], what: str) -> Info | None:
-        return super()._one_of(replies[-1:], what)
+    def _only_info(self, replies: list[bytes], what: str) -> Info | None:
+        return super()._only_info(replies[-1:], what)
 
 
 class LeavesGaps(Station):
@@ -155,10 +155,10 @@ def _parameters(details: dict[str, Any]) -> dict[str, str]:
         (CallsSilenceDone, "no answer: told as unknown, one id", "exit code 0, not 3"),
         (TriesRefusedOrdersAgain, "a refusal is told, and not tried again", "ordered 2 times"),
         (TakesOverAlways, "another's lease is not taken unasked", "exit code 0, not 1"),
-        (AsksBeforeItStops, "`pause` is sent without asking, and small", "not told as done"),
+        (AsksBeforeItStops, "`pause` is sent without asking, and small", "not reported as done"),
         (SendsEverythingAgain, "a cut: goes on with what is missing", "sent again"),
         (NeverLooksBack, "every chunk, then the commit, then a look", "nothing was read back"),
-        (NeverLooksBack, "done only when the state tells so", "of another mission"),
+        (NeverLooksBack, "done only when the state tells so", "reports another mission"),
         (NewNonceEachTime, "a commit is repeated under its nonce", "under 2 nonces"),
         (ReadsInfoStrictly, "fields that are not known are passed over", "cannot be started"),
         (LeavesGaps, "poses that were missed are asked for", "are not asked for"),
@@ -199,7 +199,7 @@ class Credulous(StationUnderTest):
 @pytest.mark.parametrize(
     ("requirement", "why"),
     [
-        ("an Info whose seal does not hold: no order", "told as done"),
+        ("an Info whose seal does not hold: no order", "reported as done"),
         ("an answer whose seal does not hold: unknown", "exit code 0, not 3"),
     ],
 )

@@ -117,7 +117,7 @@ def test_sigterm_ends_the_robot_cleanly(tmp_path: Path) -> None:
 
 def test_a_robot_that_is_not_there_is_unreachable_and_nothing_is_sent() -> None:
     unreached = connect(f"tcp/127.0.0.1:{free_port()}", robot="r1", timeout_s=0.3)
-    with pytest.raises(RobotUnreachable, match=r"robot r1 did not show itself within 0\.3 s"), unreached:
+    with pytest.raises(RobotUnreachable, match=r"robot r1 not found within 0\.3 s"), unreached:
         pass
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.console import carried_out, refusals_in, tell
+from stopgo.bridge.console import print_line, refusals_printed, reporting_done
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import encode
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown
@@ -140,7 +140,7 @@ def test_a_refusal_is_printed_as_json_where_json_is_wanted(capsys: pytest.Captur
     station = Field().station()
     station.push(corridor())
     for as_json in (False, True):
-        with pytest.raises(NegativeResult) as no, refusals_in(as_json):
+        with pytest.raises(NegativeResult) as no, refusals_printed(as_json=as_json):
             station.command("resume")
         printed = capsys.readouterr().out
         told = {"outcome": "refused", "reason": "wrong_state", "message": str(no.value)}
@@ -243,9 +243,9 @@ def test_what_a_robot_has_done_and_cannot_be_told_is_unknown_not_unsent(
         monkeypatch.setattr(sys, "stdout", full)
         with (
             pytest.raises(OutcomeUnknown, match="start was carried out"),
-            carried_out("start was carried out"),
+            reporting_done("start was carried out"),
         ):
-            tell("r1: start ok")
+            print_line("r1: start ok")
         monkeypatch.undo()
         with contextlib.suppress(OSError):
             full.close()

@@ -200,7 +200,7 @@ def test_an_event_of_a_newer_stopgo_is_told_by_its_kind() -> None:
     event = event_of(body)
     assert isinstance(event, UnknownKind)
     assert (event.kind, event.number, event.run_id) == ("Recharged", 1, "run")
-    assert "Recharged: this stopgo does not know it" in event_line(event, {})
+    assert "Recharged: unknown to this stopgo" in event_line(event, {})
 
 
 def test_missions_that_no_run_needs_are_retired_and_their_names_kept() -> None:

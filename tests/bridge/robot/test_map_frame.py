@@ -66,7 +66,7 @@ def test_push_shows_the_transform(tmp_path: Path) -> None:
         pushed = stopgo("push", str(document), *reach, "--json")
         assert stopgo("start", *reach).returncode == 0
         assert stopgo("watch", *reach).returncode == 0
-    assert "turned by 90.00°, then shifted by (10.000, 20.000) m (robot --map)" in pushed.stderr
+    assert "rotated by 90.00°, then shifted by (10.000, 20.000) m (robot --map)" in pushed.stderr
     assert json.loads(pushed.stdout)["revision"] == 1
     assert json.loads((tmp_path / "state" / "world.json").read_bytes())["pose"]["x"] == pytest.approx(
         10.0, abs=0.05

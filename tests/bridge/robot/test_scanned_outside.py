@@ -8,8 +8,8 @@ import msgspec
 import pytest
 
 from stopgo.bridge.commands.order_commands import state_line, status_json
-from stopgo.bridge.commands.watch_commands import tell_compared
-from stopgo.bridge.station.watch import EventObjects, Lines, event_line, table_lines, watch_showing
+from stopgo.bridge.commands.watch_commands import print_comparison
+from stopgo.bridge.station.watch import EventLines, EventObjects, event_line, table_lines, watch_with
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.run.events import Scanned
 from tests.bridge.world import Field, corridor
@@ -47,12 +47,12 @@ def test_watch_tells_it_at_once_and_at_the_end_and_by_its_exit_code(
     said: list[str] = []
     heard = RunCollector()
     past = None if run_id is None else field.controller.run.run_id
-    state = watch_showing(field.station(), heard, Lines(said.append), run_id=past)
+    state = watch_with(field.station(), heard, EventLines(said.append), run_id=past)
     (line,) = [line for line in said if "Scanned         s2" in line]
     assert BESIDE in line
     assert not [line for line in said if BESIDE in line and "s2" not in line]
     assert state.outside == ("s2",)
-    assert tell_compared(heard, state, json_=False) == 1
+    assert print_comparison(heard, state, as_json=False) == 1
     assert f"s2 was scanned {BESIDE}." in capsys.readouterr().out
 
 

@@ -46,7 +46,7 @@ def test_an_order_is_for_the_one_that_told_its_state() -> None:
 def test_a_station_that_hears_two_stops_both_and_says_so() -> None:
     one, other = twins()
     station = Station(one.board.link(), one.keys, commander="test", timeout_s=0.3)
-    with pytest.raises(NegativeResult, match=r"two robots answer to the name r1 .* both were told to pause"):
+    with pytest.raises(NegativeResult, match=r"r1: two robots answer to this name .* both received a pause"):
         station.status()
     assert (one.controller.run.state, other.controller.run.state) == ("PAUSED", "PAUSED")
 
@@ -113,7 +113,7 @@ def test_two_that_listen_apart_are_found_by_a_station_linked_to_both() -> None:
         with (
             connect(",".join(endpoints), robot="r1") as station,
             pytest.raises(
-                NegativeResult, match=r"two robots answer to the name r1 .* both were told to pause"
+                NegativeResult, match=r"r1: two robots answer to this name .* both received a pause"
             ),
         ):
             station.status()

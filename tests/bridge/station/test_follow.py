@@ -8,7 +8,7 @@ from stopgo.bridge.link.link import Request
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, encode
 from stopgo.bridge.station.follow import PoseHistory, RunFollower
-from stopgo.bridge.station.record import Past
+from stopgo.bridge.station.logged_run import LoggedReport
 from stopgo.mission.run.events import Health, Pose, PoseReport
 from tests.bridge.world import Field, corridor
 
@@ -86,7 +86,7 @@ def test_health_that_is_heard_before_its_run_is_told_with_the_run_and_once() -> 
     follower = RunFollower(field.board.link(), field.keys, lambda: True)
     told = Health(robot_ns=1, run_id=field.controller.run.run_id, battery=0.5, emergency_stop=True)
     assert not list(follower.take(told))
-    assert Past(told) in list(follower.take(field.report()))
-    assert not [item for item in follower.take(field.report()) if isinstance(item, Past)]
+    assert LoggedReport(told) in list(follower.take(field.report()))
+    assert not [item for item in follower.take(field.report()) if isinstance(item, LoggedReport)]
     later = msgspec.structs.replace(told, robot_ns=2, emergency_stop=False)
-    assert list(follower.take(later)) == [Past(later)]
+    assert list(follower.take(later)) == [LoggedReport(later)]

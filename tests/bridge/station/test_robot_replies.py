@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.protocol import LogPage, Malformed, RecordPage, encode
-from stopgo.bridge.station.record import past_run, read_index
+from stopgo.bridge.station.logged_run import read_index, read_run
 from stopgo.bridge.station.station import Station
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import Started
@@ -16,7 +16,7 @@ from tests.bridge.world import Field, corridor
 
 READS: dict[str, Callable[[Station], object]] = {
     "log": lambda station: station.log(),
-    "record": lambda station: list(past_run(station.link, station.keys, "run", patience_s=0.0)),
+    "record": lambda station: list(read_run(station.link, station.keys, "run", patience_s=0.0)),
     "index": lambda station: read_index(station.link, station.keys, timeout_s=0.0),
 }
 
@@ -34,13 +34,15 @@ def lying(answer: bytes) -> Station:
 @pytest.mark.parametrize("read", READS)
 @pytest.mark.parametrize("answer", [b"", b"\xff", b'{"is": "Later"}', b'{"is": "Info", "a":' + b"[" * 20_000])
 def test_an_answer_that_cannot_be_read_is_unknown(read: str, answer: bytes) -> None:
-    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+    with pytest.raises(OutcomeUnknown, match="unknown answer"):
         READS[read](lying(answer))
 
 
 @pytest.mark.parametrize("read", READS)
 def test_a_robot_that_makes_no_sense_of_a_question_is_quoted(read: str) -> None:
-    with pytest.raises(NegativeResult, match=r"r1 could not make sense of reading its .*: since is a word"):
+    with pytest.raises(
+        NegativeResult, match=r"r1: request not understood \(reading its .*\): since is a word"
+    ):
         READS[read](lying(encode(Malformed(message="since is a word"))))
 
 
@@ -60,7 +62,7 @@ def test_a_log_that_does_not_go_on_is_not_read_for_ever(numbers: tuple[int, ...]
 
 
 def test_an_event_that_is_none_is_unknown() -> None:
-    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+    with pytest.raises(OutcomeUnknown, match="unknown answer"):
         lying(encode(LogPage(bodies=(msgspec.Raw(b'{"event": "Started"}'),), newest=1))).log()
 
 
@@ -68,7 +70,7 @@ def test_an_event_that_is_none_is_unknown() -> None:
 def test_a_time_that_no_recording_holds_is_unknown(wrong: dict[str, object]) -> None:
     event = {**msgspec.json.decode(bytes(started(1))), **wrong}
     page = LogPage(bodies=(msgspec.Raw(encode(event)),), newest=1)
-    with pytest.raises(OutcomeUnknown, match=rf"words this stopgo does not know .*{next(iter(wrong))}"):
+    with pytest.raises(OutcomeUnknown, match=rf"unknown answer .*{next(iter(wrong))}"):
         lying(encode(page)).log()
 
 
@@ -93,5 +95,5 @@ def test_a_robot_is_not_heard_with_a_time_that_no_recording_holds(kind: str) -> 
 
 def test_a_record_that_tells_of_more_than_it_gives_is_not_read_for_ever() -> None:
     page = RecordPage(run_id="run", since=0, entries=(), newest=10**12)
-    with pytest.raises(OutcomeUnknown, match="tells of 1000000000000 entries of the run and gives 0"):
-        list(past_run((liar := lying(encode(page))).link, liar.keys, "run", patience_s=0.0))
+    with pytest.raises(OutcomeUnknown, match="announces 1000000000000 entries of the run, returns 0"):
+        list(read_run((liar := lying(encode(page))).link, liar.keys, "run", patience_s=0.0))

@@ -53,7 +53,7 @@ def test_a_robot_that_was_seen_and_is_gone_is_silent(
     assert (code, gone["robot"], gone["state"], gone["silent"]) == (1, "r1", None, True)
     assert gone["last_seen"] is not None
     assert main(["status", "--timeout", "0.2"]) == 1
-    assert "r1: SILENT; IDLE when last seen, 20" in capsys.readouterr().out
+    assert "r1: NO DATA; IDLE when last seen, 20" in capsys.readouterr().out
 
 
 def test_a_robot_that_shows_itself_and_does_not_answer_is_silent(
@@ -65,7 +65,7 @@ def test_a_robot_that_shows_itself_and_does_not_answer_is_silent(
         1,
         [("r1", False), ("r2", True)],
     )
-    assert "shows itself, but r2 did not tell its state" in robots[1]["trouble"]
+    assert "found, but r2: no state received within" in robots[1]["trouble"]
 
 
 def test_a_roster_says_who_is_missed(
@@ -91,7 +91,7 @@ def test_a_robot_that_left_for_good_is_forgotten(field: Field, capsys: pytest.Ca
         "nobody shows itself, and none is known"
     )
     assert main(["status", "--timeout", "0.2", "--forget", "r1"]) == 2
-    assert "was never seen here" in capsys.readouterr().err
+    assert "never seen from here" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def deaf(field: Field, time: StoppedTime, word: str) -> tuple[Station, DeafLink]
 def test_an_order_that_is_not_answered_is_unknown_when_its_time_is_up(time: StoppedTime) -> None:
     station, link = deaf(Field(), time, "/cmd/")
     began = time.now
-    with pytest.raises(OutcomeUnknown, match=r"whether it was carried out is unknown.* It has expired"):
+    with pytest.raises(OutcomeUnknown, match=r"its outcome is unknown.* It has expired"):
         station.command("start")
     assert time.now - began == pytest.approx(5.0, abs=0.1)
     assert link.asked.count("sx/1/r1/cmd/start") > 1

@@ -1,4 +1,4 @@
-"""What a person sees of a run, and what a recording is handed."""
+"""Display of a run, and the data that a recording receives."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from stopgo.bridge.commands import watch_commands
-from stopgo.bridge.console import say, tell
+from stopgo.bridge.console import print_line, say
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
@@ -29,13 +29,13 @@ from stopgo.bridge.station.follow import Report, Silence
 from stopgo.bridge.station.station import Station
 from stopgo.bridge.station.watch import (
     HINT,
+    EventLines,
     EventObjects,
-    Lines,
-    Table,
+    RunTable,
     clock,
     remaining_s,
     table_lines,
-    watch_showing,
+    watch_with,
 )
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
@@ -97,7 +97,7 @@ def test_the_table_names_stop_state_battery_link_and_time() -> None:
         "RUNNING  s1 SCANNING",
         "0 done, 0 skipped of 3",
         "100%",
-        "no word for 4 s",
+        "no data for 4 s",
         "left as planned",
     ):
         assert said in lines
@@ -105,7 +105,7 @@ def test_the_table_names_stop_state_battery_link_and_time() -> None:
 
 def test_the_table_is_drawn_in_place() -> None:
     written: list[str] = []
-    table = Table(written.append)
+    table = RunTable(written.append)
     field = Field()
     for _ in range(2):
         table.show(field.report())
@@ -116,7 +116,7 @@ def test_the_table_is_drawn_in_place() -> None:
 
 def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
     said: list[str] = []
-    lines = Lines(said.append)
+    lines = EventLines(said.append)
     field = Field()
     field.station().push(corridor())
     field.order("start")
@@ -128,12 +128,12 @@ def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
 
 def test_lines_tell_a_lost_link_once_and_its_return_once() -> None:
     said: list[str] = []
-    lines = Lines(said.append)
+    lines = EventLines(said.append)
     for seconds in (1.0, 2.0, 3.0, 4.0, 5.0, 29.0):
         lines.show(Silence(seconds=seconds))
-    assert said == ["no word for 3 s; asking until it is heard again"]
+    assert said == ["no data for 3 s; retrying"]
     lines.show(Field().report())
-    assert said[1:] == ["heard again after 29 s", "r1 is IDLE; waiting for a run"]
+    assert said[1:] == ["data again after 29 s", "r1 is IDLE; waiting for a run"]
     lines.show(Silence(seconds=1.0))
     lines.show(Field().report())
     assert len(said) == 3
@@ -148,7 +148,7 @@ def held(reason: str) -> Held:
 
 def test_a_held_robot_is_told_with_what_it_waits_for() -> None:
     said: list[str] = []
-    Lines(said.append).show(held("the way is blocked"))
+    EventLines(said.append).show(held("the way is blocked"))
     assert said[0].endswith("the way is blocked")
     assert said[1].strip() == HINT.strip()
     assert HINT.endswith("held: the robot waits for stopgo skip, stopgo retry, stopgo abort or stopgo home")
@@ -169,11 +169,11 @@ def test_every_event_is_an_object() -> None:
 
 def test_a_robot_cannot_colour_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     written: list[str] = []
-    table = Table(written.append)
+    table = RunTable(written.append)
     table.show(Field().report())
     table.show(held(RED))
-    Lines(say).show(held(RED))
-    tell(f"one\n{RED}")
+    EventLines(say).show(held(RED))
+    print_line(f"one\n{RED}")
     assert RED not in written[-1]
     assert RED not in "".join(capsys.readouterr())
 
@@ -216,7 +216,7 @@ def test_what_was_missed_while_the_link_was_cut_is_told_once_and_in_order_and_ag
         board.cut = False
         watching.join(20)
         past = list(past_reports(station, str(controller.run.run_id), station.mission))
-        with pytest.raises(NegativeResult, match=f"no run x; it has {controller.run.run_id}"):
+        with pytest.raises(NegativeResult, match=f"no run x; its runs are {controller.run.run_id}"):
             next(past_reports(station, "x", station.mission))
     heard += [told.get() for _ in range(told.qsize())]
     events = [report for report in heard if isinstance(report, Event)]
@@ -252,7 +252,7 @@ def test_an_answer_in_unknown_words_is_unknown() -> None:
     field = Field()
     station = field.station()
     field.board.link().serve(field.keys.info, lambda request: b'{"is": "Info", "protocol": 9}')
-    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+    with pytest.raises(OutcomeUnknown, match="unknown answer"):
         station.status()
 
 
@@ -302,7 +302,7 @@ def test_a_recording_is_handed_every_revision_in_turn_also_when_it_comes_late() 
         while field.controller.run.revision != revision:
             field.controller.step()
     field.work()
-    watch_showing(field.station(), record, Lines(lambda line: None))
+    watch_with(field.station(), record, EventLines(lambda line: None))
     assert record.revisions == [1, 2, 3]
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from stopgo.bridge.commands.order_commands import state_line
-from stopgo.bridge.commands.watch_commands import tell_compared
+from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.mavlink.simulated.estimator import Estimator
-from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.bridge.station.watch import EventLines, watch_with
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import NegativeResult
@@ -62,8 +62,8 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_with_its_deviation_every
     with site.up(), FieldRecording(path, None) as record, site.reached() as station:
         station.command("start")
         heard = RunCollector(record)
-        state = watch_showing(station, heard, Lines(said.append))
-        again = watch_showing(station, RunCollector(), Lines(said.append), run_id=state.run_id)
+        state = watch_with(station, heard, EventLines(said.append))
+        again = watch_with(station, RunCollector(), EventLines(said.append), run_id=state.run_id)
     first = site.mission.stops[0]
     scan = next(event for event in site.events if isinstance(event, Scanned) and event.stop == "S1")
     away = deviation(scan.pose, first)
@@ -72,7 +72,7 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_with_its_deviation_every
     assert len([line for line in said if "Scanned         S1" in line and words in line]) == 2
     assert state.outside == again.outside and "S1" in state.outside
     assert "scanned outside tolerance: S1" in state_line(state)
-    assert tell_compared(heard, state, json_=False) == 1
+    assert print_comparison(heard, state, as_json=False) == 1
     assert f"S1 was scanned {words}" in capsys.readouterr().out
     found = review([path])
     assert found.exit_code == 1
@@ -93,7 +93,7 @@ def test_a_stop_that_is_missed_and_left_out_is_not_done(
     site, said, heard = Site(tmp_path, profile, mission=mission, seed=2), [], RunCollector()
     with site.up(), site.reached() as station:
         station.command("start")
-        state = watch_showing(station, heard, Lines(said.append))
+        state = watch_with(station, heard, EventLines(said.append))
     failed = [event for event in site.events if isinstance(event, Failed)]
     assert [event.stop for event in failed] == ["S1", "S2", "S3"]
     away = [float(re.findall(r"([0-9.]+) m from the stop", event.reason)[0]) for event in failed]
@@ -101,7 +101,7 @@ def test_a_stop_that_is_missed_and_left_out_is_not_done(
     assert all("tolerance is 0.05 m" in event.reason for event in failed)
     assert sum("m from the stop" in line for line in said) >= 3
     assert (state.done, state.skipped) == ((), ("S1", "S2", "S3"))
-    assert tell_compared(heard, state, json_=False) == 1
+    assert print_comparison(heard, state, as_json=False) == 1
     assert "0 of 3 stops scanned" in capsys.readouterr().out
 
 
@@ -116,11 +116,11 @@ def test_within_a_tolerance_that_it_keeps_its_stops_are_done_with_their_deviatio
     )
     with site.up(), site.reached() as station:
         station.command("start")
-        state = watch_showing(station, heard, Lines(said.append))
+        state = watch_with(station, heard, EventLines(said.append))
     compared = heard.compared()
     assert compared is not None and (state.done, state.outside) == (("S1", "S2", "S3"), ())
     assert all(0.08 < (item.deviation_m or 0.0) < WIDE_M for item in compared.stops)
-    assert tell_compared(heard, state, json_=False) == 0
+    assert print_comparison(heard, state, as_json=False) == 0
 
 
 def test_a_stop_that_nobody_saw_scanned_from_elsewhere_has_failed_and_is_not_only_unconfirmed(

@@ -10,12 +10,12 @@ from typing import Any
 import msgspec
 import pytest
 
-from stopgo.bridge.commands.watch_commands import tell_compared
+from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.line.wire import read_signing_key
 from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
-from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.bridge.station.watch import EventLines, watch_with
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Scan, sealed
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
@@ -399,9 +399,9 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_as_made_beside_its_stop(
     ):
         station.push(mission)
         station.command("start")
-        state = watch_showing(station, heard, Lines(said.append))
+        state = watch_with(station, heard, EventLines(said.append))
         assert station.status().outside == ("s1",)
     (line,) = [line for line in said if "Scanned         s1" in line]
     away = float(re.findall(r"(\d+) mm from its stop \(50 mm are tolerated\)", line)[0])
     assert 85 <= away <= 155 and state.outside == ("s1",)
-    assert tell_compared(heard, state, json_=True) == 1
+    assert print_comparison(heard, state, as_json=True) == 1

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.commands.spawn import end_robot, robot_process, start
-from stopgo.bridge.commands.tunnel_commands import Refusals, RefusalsHeard
+from stopgo.bridge.commands.tunnel_commands import RefusalListener, RefusalSender
 from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import now_utc, read_keys
 from stopgo.bridge.link.memory_link import MemoryLink, Switchboard
@@ -232,13 +232,13 @@ def test_without_raw_orders_arming_is_refused_in_words_and_hold_passes(tmp_path:
 def test_the_station_is_told_once_for_each_kind_of_message_that_is_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    heard, reader = RefusalsHeard("r1"), Frames(tunnels.Counter())
+    listener, reader = RefusalListener("r1"), Frames(tunnels.Counter())
     count, arm = dialect.MAVLink_mission_count_message(1, 1, 3, 0), COMMAND(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
-    told = [Refusals().told(message) for message in (count, arm, count)]
+    told = [RefusalSender().text_of(message) for message in (count, arm, count)]
     capsys.readouterr()
     for frame in (*told, *frames(1)):
         for _, message in reader.whole(frame, datagram=True):
-            heard.hears(message)
+            listener.take(message)
     said = capsys.readouterr().err.splitlines()
     assert [line.split("refused ")[1].split(":")[0] for line in said] == [
         "MISSION_COUNT",

@@ -14,8 +14,8 @@ from stopgo.bridge.link.protocol import RECORD_PAGE, KeyExpressions, encode
 from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.recorder import RunRecorder
 from stopgo.bridge.robot.run_record import ANEW
-from stopgo.bridge.station import record
-from stopgo.bridge.station.record import Past, Recorded, RecordHistory, past_run
+from stopgo.bridge.station import logged_run
+from stopgo.bridge.station.logged_run import LoggedReport, LogHistory, LogItem, read_run
 from stopgo.mission.run.events import Health, PoseReport, PosesMissing
 from tests.bridge.robot.test_recorder import BEGAN_NS, idle, ns, pose
 
@@ -29,20 +29,20 @@ class Robot:
     """One that drives and writes down, and a station that follows it, in memory."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(record, "AGAIN_S", 0.0)
+        monkeypatch.setattr(logged_run, "AGAIN_S", 0.0)
         self.folder = folder
         self.board = Switchboard()
         self.keys = KeyExpressions("r1")
         self.asked = 0
         self.lost: set[int] = set()
-        """Which of the questions find no answer."""
+        """Numbers of the queries without an answer."""
         self.short = ""
         self.boot()
         idle(self.recorder)
         self.board.link().serve(self.keys.record, self._answer)
-        self.history = RecordHistory(self.board.link(), self.keys)
+        self.history = LogHistory(self.board.link(), self.keys)
         self.history.run_id = "run"
-        self.told: list[Recorded] = []
+        self.told: list[LogItem] = []
 
     def _answer(self, request: Request) -> bytes:
         self.asked += 1
@@ -105,7 +105,11 @@ def test_health_is_told_once_whether_it_was_heard_or_is_read_later(robot: Robot)
     robot.catch_up()
     robot.drive(range(51, 61), heard=True)
     robot.catch_up()
-    told = [item.report for item in robot.told if isinstance(item, Past) and isinstance(item.report, Health)]
+    told = [
+        item.report
+        for item in robot.told
+        if isinstance(item, LoggedReport) and isinstance(item.report, Health)
+    ]
     assert sorted((one.robot_ns, one.emergency_stop) for one in told) == [
         (ns(20), False), (ns(29), True), (ns(50), False)
     ]  # fmt: skip
@@ -177,6 +181,6 @@ def test_a_past_run_is_read_once_and_in_order_over_a_line_that_is_cut_in_between
     newest = 10 * RECORD_PAGE * 5
     robot.drive(range(1, newest + 1), heard=False)
     robot.lost = {2, 3, 5, 6, 7}
-    told = list(past_run(robot.board.link(), robot.keys, "run", patience_s=LAST_NET_S))
+    told = list(read_run(robot.board.link(), robot.keys, "run", patience_s=LAST_NET_S))
     assert [item.seq for item in told if isinstance(item, PoseReport)] == list(range(1, newest + 1))
     assert robot.asked > max(robot.lost)
