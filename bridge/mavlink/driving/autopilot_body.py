@@ -1,4 +1,4 @@
-"""An autopilot as what a robot's controller drives."""
+"""An autopilot as the base and scanner that a robot's controller drives."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from stopgo.mission.document import Mission
 
 @dataclass(frozen=True)
 class AutopilotBody:
-    """A rover whose autopilot is on the robot's own wire."""
+    """A rover whose autopilot is on the robot's own link."""
 
     url: str
     arm: bool = False
     trigger: ScanTrigger = "camera"
     signing_key: Path | None = None
     vehicle: int | None = None
-    """Its system id, if several are heard."""
+    """Its system id, if several vehicles are found."""
     insecure: bool = False
     patience_s: float = 30.0
-    """How long to wait for it, and for its position."""
+    """Longest wait for the vehicle, and for its position."""
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:

@@ -1,4 +1,4 @@
-"""What a vehicle must say for a scan to count, and what does not count."""
+"""Reports of a vehicle by which a scan counts, and those by which it does not."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Camera:
 
     def __init__(self, *tells: Message, taken: int | None = None, acks: tuple[int, ...] = (0,)) -> None:
         self.who = Who(1, 1)
-        self.peer, self.wire = self, self
+        self.peer, self.wire, self.telemetry = self, self, self
         self.orders: list[tuple[int, tuple[float, ...]]] = []
         self.asked: list[Message] = []
         self.answers: Callable[[Message], Message | None] = lambda request: None
@@ -70,11 +70,7 @@ class Camera:
         if answer is not None:
             self._box.put(answer)
 
-    def order(self, number: int, *params: float, what: str) -> str:
-        self.orders.append((number, params))
-        return ""
-
-    def out_of_reach(self) -> str:
+    def why_unknown(self) -> str:
         return ""
 
     def _tell(self) -> None:

@@ -172,8 +172,8 @@ def test_a_vehicle_that_was_carried_while_it_restarted_is_not_driven_on(tmp_path
         vehicle.off()
         vehicle.on(replace(vehicle.setting, at=Pose(x=3.0, y=3.0, heading=0.0)))
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "the autopilot was started again and tells a place" in held.reason
-        assert "see where it stands" in held.reason
+        assert "the autopilot was restarted and reports a position" in held.reason
+        assert "check where it is" in held.reason
 
 
 def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) -> None:
@@ -189,4 +189,4 @@ def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) 
         vehicle.off()
         vehicle.on()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "started again and is disarmed; arm it, or start stopgo robot with --arm" in held.reason
+        assert "restarted and is disarmed; arm it, or start stopgo robot with --arm" in held.reason
