@@ -19,7 +19,7 @@ from benchmarks.table import put, table, versions
 from stopgo.bridge.mavlink.line.peer import Peer, reached
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import upload
@@ -118,7 +118,7 @@ def line(profile: str, rate: float, seed: int) -> Iterator[tuple[Url, Url]]:
     """An empty vehicle behind a line that loses, and the same vehicle without the line."""
     port = free_port()
     with (
-        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile])),
+        vehicle_on(Url("udpin", "127.0.0.1", port), VehicleSetup(PROFILES[profile])),
         Lossy(port, Roughness(delay_s=DELAY_S, loss=rate), seed=seed) as rough,
     ):
         yield rough.url, Url("udpout", "127.0.0.1", port)

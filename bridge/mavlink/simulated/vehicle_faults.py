@@ -1,4 +1,4 @@
-"""What is to go wrong with the simulated vehicle."""
+"""Faults that the simulated vehicle is to have."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RESULTS = range(15)
 
 @dataclass(frozen=True)
 class VehicleFault:
-    """Something that goes wrong; what `at` and `amount` mean is in `FAULTS`."""
+    """One fault; `FAULTS` explains `at` and `amount`."""
 
     kind: VehicleFaultKind
     at: int
@@ -58,7 +58,7 @@ class VehicleFaults:
         return next((fault for fault in self.all if (fault.kind, fault.at) == (kind, at)), None)
 
     def any(self, kind: VehicleFaultKind) -> VehicleFault | None:
-        """The first fault of a kind, wherever it is due."""
+        """The first fault of a kind, whenever it is due."""
         return next((fault for fault in self.all if fault.kind == kind), None)
 
 
@@ -108,7 +108,7 @@ def read_vehicle_fault(text: str) -> VehicleFault:
 
 
 def _nonsense(fault: VehicleFault) -> str | None:
-    """What a fault must be that could not happen as it is."""
+    """Rule that a fault breaks, as it could not happen; `None` if it breaks none."""
     kind, at, amount = fault.kind, fault.at, fault.amount
     percent = at > 100, f"N is a percentage, 0 to 100, such as {kind}@20"
     counted = at == 0, f"N counts from 1: {kind}@1 is the first"

@@ -18,7 +18,7 @@ from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.line.peer import reached
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.command_line import main
@@ -69,8 +69,8 @@ def vehicle(
 ) -> Iterator[Url]:
     port = free_port()
     made = VehicleFaults(tuple(read_vehicle_fault(text) for text in faults))
-    setting = Setting(PROFILES[profile], origin=origin, faults=made)
-    with vehicle_on(Url("udpin", "127.0.0.1", port), setting, signing_key=key):
+    setup = VehicleSetup(PROFILES[profile], origin=origin, faults=made)
+    with vehicle_on(Url("udpin", "127.0.0.1", port), setup, signing_key=key):
         yield Url("udpout", "127.0.0.1", port)
 
 

@@ -170,7 +170,7 @@ def test_a_vehicle_that_was_carried_while_it_restarted_is_not_driven_on(tmp_path
         reports = station.reports()
         until(reports, is_driving(0.5))
         vehicle.off()
-        vehicle.on(replace(vehicle.setting, at=Pose(x=3.0, y=3.0, heading=0.0)))
+        vehicle.on(replace(vehicle.setup, at=Pose(x=3.0, y=3.0, heading=0.0)))
         held = until(reports, lambda report: isinstance(report, Held))
         assert "the autopilot was restarted and reports a position" in held.reason
         assert "check where it is" in held.reason

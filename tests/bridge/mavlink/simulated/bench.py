@@ -13,7 +13,7 @@ from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
@@ -60,8 +60,8 @@ class Bench:
         self.clock, self.wall = SimulatedClock(), SimulatedClock()
         self.all: list[Message] = []
         made = tuple(read_vehicle_fault(text) for text in faults)
-        setting = Setting(PROFILES[profile], state, origin, at, VehicleFaults(made), seed, changed)
-        self.vehicle = complete_vehicle(setting, clock=self.clock, wall=self.wall, say=self._hear)
+        setup = VehicleSetup(PROFILES[profile], state, origin, at, VehicleFaults(made), seed, changed)
+        self.vehicle = complete_vehicle(setup, clock=self.clock, wall=self.wall, send=self._hear)
         self.first = 1 if self.vehicle.autopilot.home_first else 0
         self._wires = {who: dialect.MAVLink(None, *vars(who).values()) for who in (STATION, OTHER)}
         self._own = dialect.MAVLink(None, 1, 1)

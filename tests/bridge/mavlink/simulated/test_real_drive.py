@@ -178,4 +178,4 @@ def test_all_its_parameters_are_told_and_kept() -> None:
     bench.say(dialect.MAVLink_param_set_message(1, 1, b"ATC_STR_ANG_P", 2.5, 9))
     bench.say(dialect.MAVLink_param_set_message(1, 1, b"ATC_STR_ANG_P", math.nan, 9))
     assert bench.last("PARAM_VALUE").param_value == 2.5
-    assert bench.vehicle.tell(MessageId.HEARTBEAT)
+    assert bench.vehicle.report(MessageId.HEARTBEAT)

@@ -17,7 +17,7 @@ from stopgo.bridge.mavlink.line import transport
 from stopgo.bridge.mavlink.line.peer import reached
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, upload
 from stopgo.mission.errors import OutcomeUnknown
@@ -71,7 +71,7 @@ SENT = stops(20, "ardupilot")
 
 def test_a_mission_goes_over_a_serial_line(line: NullModem) -> None:
     with (
-        vehicle_on(Url("serial", str(line.far), 57600), Setting(PROFILES["ardupilot"])),
+        vehicle_on(Url("serial", str(line.far), 57600), VehicleSetup(PROFILES["ardupilot"])),
         reached(Url("serial", str(line.near), 57600), vehicle=1) as peer,
     ):
         assert upload(peer, SENT) == Uploaded(items=40, already=False)
@@ -84,7 +84,7 @@ def test_a_pulled_plug_leaves_it_unknown(line: NullModem) -> None:
 
     said = r"fell silent when 1\d of 41 items had arrived .*serial line is gone.*do not start it"
     with (
-        vehicle_on(Url("serial", str(line.far), 57600), Setting(PROFILES["ardupilot"])),
+        vehicle_on(Url("serial", str(line.far), 57600), VehicleSetup(PROFILES["ardupilot"])),
         reached(Url("serial", str(line.near), 57600), vehicle=1, timeout_s=2.0) as peer,
         pytest.raises(OutcomeUnknown, match=said),
     ):
