@@ -17,12 +17,12 @@ from stopgo.bridge.mavlink.line.origin import check_origin
 from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
 from stopgo.bridge.mavlink.line.peer import Peer, reached
 from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import read_line
+from stopgo.bridge.mavlink.line.wire import read_link
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import (
     NOTHING_SENT,
     Uploaded,
-    check_standing,
+    check_mission_idle,
     clear,
     if_stopped,
     upload,
@@ -91,7 +91,7 @@ def push_mission(
         if not leave.while_running:
             with logbook(url, peer.who.system, state) as book:
                 check_run_over(peer, url, book, "a push")
-        check_standing(peer, leave.while_running)
+        check_mission_idle(peer, leave.while_running)
         site = sent.origin
         with if_stopped(say, lambda: NOTHING_SENT):
             origin = None if leave.any_origin else check_origin(peer, site, set_it=leave.set_origin)
@@ -99,7 +99,7 @@ def push_mission(
         if beside:
             say(beside)
         with Bar("pushing", ITEMS) as bar:
-            done = upload(peer, sent, while_running=leave.while_running, progress=bar.show, tell=say)
+            done = upload(peer, sent, while_running=leave.while_running, progress=bar.show, report=say)
         _note_down(url, peer, mission, sent, state, done)
         for note in sent.notes:
             say(f"note: {note}")
@@ -131,7 +131,7 @@ def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_jso
     with _peer(line) as (url, peer), logbook(url, peer.who.system, state) as book:
         if not while_running:
             check_run_over(peer, url, book, "to clear it")
-        had = clear(peer, while_running=while_running, tell=say)
+        had = clear(peer, while_running=while_running, report=say)
         forget(book)
     if as_json:
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot.name, "had": had})
@@ -161,7 +161,7 @@ def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
     """The vehicle that is meant."""
     if line.autopilot is not None:
         _choice("--autopilot", line.autopilot, tuple(AUTOPILOTS))
-    url, key = read_line(line.url, line.signing_key, insecure=line.insecure)
+    url, key = read_link(line.url, line.signing_key, insecure=line.insecure)
     with reached(url, vehicle=line.vehicle, signing_key=key, timeout_s=line.timeout_s) as peer:
         peer.autopilot = autopilot_named(line.autopilot) if line.autopilot else peer.autopilot
         yield url, peer
