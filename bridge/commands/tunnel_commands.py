@@ -187,12 +187,12 @@ def _transport(mavlink: str, insecure: bool) -> Transport:
 
 def _work(tunnel: Tunnel) -> None:
     """Until it is told to end; then say what was done."""
-    from stopgo.bridge.mavlink.tunnel.tunnel import told
+    from stopgo.bridge.mavlink.tunnel.tunnel import summary
 
     try:
         tunnel.wait()
     finally:
-        for line in told(tunnel.carried, tunnel.dropped):
+        for line in summary(tunnel.carried, tunnel.dropped):
             say(line)
 
 
