@@ -91,10 +91,10 @@ def doctor(
     if told["keys"] is not None:
         checks += _checked("keys", lambda: _keys(told["keys"]))
     if mavlink is not None:
-        from stopgo.bridge.mavlink.line.wire import read_line
+        from stopgo.bridge.mavlink.line.wire import read_link
 
         alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
-        url, key = read_line(mavlink, signing_key, insecure=insecure)
+        url, key = read_link(mavlink, signing_key, insecure=insecure)
         checks += _checked(
             "vehicle", lambda: _vehicle(url, vehicle, key, timeout_s=timeout, any_origin=any_origin)
         )

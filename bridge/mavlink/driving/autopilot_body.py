@@ -11,7 +11,7 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.mavlink_base import MavlinkBase
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
 from stopgo.bridge.mavlink.driving.onboard_autopilot import on_board
-from stopgo.bridge.mavlink.line.wire import read_line
+from stopgo.bridge.mavlink.line.wire import read_link
 from stopgo.bridge.robot.robot_hardware import Body
 from stopgo.mission.document import Mission
 
@@ -32,7 +32,7 @@ class AutopilotBody:
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:
-        url, key = read_line(self.url, self.signing_key, insecure=self.insecure, option="--controller")
+        url, key = read_link(self.url, self.signing_key, insecure=self.insecure, option="--controller")
         with on_board(url, signing_key=key, vehicle=self.vehicle, timeout_s=self.patience_s) as autopilot:
             base = MavlinkBase(autopilot, clock=clock, arm=self.arm)
             scanner = MavlinkScanner(autopilot, clock=clock, trigger=self.trigger)

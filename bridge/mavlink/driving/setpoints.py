@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from stopgo.bridge.mavlink.driving.autopilot_telemetry import AutopilotTelemetry
-from stopgo.bridge.mavlink.line.messages import aim_at, aim_yaw, keep_course
+from stopgo.bridge.mavlink.line.messages import course_setpoint, position_setpoint, yaw_setpoint
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.mission.document import Point
 
@@ -28,7 +28,7 @@ class Setpoints:
 
     def go_to(self, position: Point) -> None:
         """Drive to a position in a straight line."""
-        self._peer.send(aim_at(self._peer.who, position, **self._height_and_time))
+        self._peer.send(position_setpoint(self._peer.who, position, **self._height_and_time))
 
     def keep_course(self, yaw: float, speed: float) -> None:
         """Turn to a yaw and drive along it, backwards if the speed is negative.
@@ -37,7 +37,7 @@ class Setpoints:
         """
         speed = max(speed, TURNING_M_S) if self._by_vector else speed
         velocity = (speed * math.cos(yaw), speed * math.sin(yaw)) if self._by_vector else (speed, 0.0)
-        self._peer.send(keep_course(self._peer.who, velocity, yaw, **self._height_and_time))
+        self._peer.send(course_setpoint(self._peer.who, velocity, yaw, **self._height_and_time))
 
     def halt(self) -> None:
         """Stay at the present position, and neither drive nor turn."""
@@ -48,7 +48,7 @@ class Setpoints:
 
     def turn_to(self, yaw: float) -> None:
         """Turn on the spot."""
-        self._peer.send(aim_yaw(self._peer.who, yaw, **self._height_and_time))
+        self._peer.send(yaw_setpoint(self._peer.who, yaw, **self._height_and_time))
 
     @contextmanager
     def standing_at(self, position: Point) -> Iterator[None]:

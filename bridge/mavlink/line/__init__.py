@@ -1,4 +1,4 @@
-"""The line to a vehicle: bytes and frames, and the one at the other end.
+"""The link to a vehicle: bytes and frames, and the peer at its other end.
 
-`url`, `transport` and `wire` are the edge; `peer` is the vehicle, found, asked and ordered.
+`url`, `transport` and `wire` are the edge; `peer` is the vehicle: found, queried and commanded.
 """

@@ -12,7 +12,7 @@ from pathlib import Path
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.mavlink.line.transport import open_transport
 from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import Who, Wire, read_line
+from stopgo.bridge.mavlink.line.wire import Who, Wire, read_link
 from stopgo.bridge.mavlink.simulated.command_handlers import NORTHMOST
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.lossy_line import on_line
@@ -56,7 +56,7 @@ class VehicleOptions:
 def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
     """Run a vehicle until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
     signal.signal(signal.SIGTERM, _leave)
-    url, key = read_line(options.url, options.signing_key, insecure=options.insecure, option=OPTION)
+    url, key = read_link(options.url, options.signing_key, insecure=options.insecure, option=OPTION)
     with vehicle_on(url, setup_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
         ready(url)
         stopped.wait()

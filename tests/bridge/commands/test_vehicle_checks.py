@@ -140,7 +140,7 @@ def test_an_origin_that_is_of_no_use_to_the_vehicle_is_wrong(capsys: pytest.Capt
     told = {check["name"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
     assert (code, told["origin"]["ok"]) == (1, False)
     assert told["origin"]["told"].endswith("in AUTO it would pass over its waypoints")
-    assert told["origin"]["do"].startswith("start it again")
+    assert told["origin"]["do"].startswith("restart it")
 
 
 def test_nobody_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:

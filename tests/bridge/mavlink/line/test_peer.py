@@ -70,7 +70,7 @@ def test_of_several_vehicles_one_must_be_named() -> None:
             pass
         with found(station, 2) as peer:
             assert peer.who == Who(2, 1)
-        unheard = pytest.raises(RobotUnreachable, match=r"no vehicle 3 within .*heard: 1")
+        unheard = pytest.raises(RobotUnreachable, match=r"no vehicle 3 within .*found: 1")
         with unheard, found(station, 3, timeout_s=1.2):
             pass
 

@@ -147,7 +147,7 @@ def test_a_serial_line_that_is_unplugged_comes_back(cable: Cable) -> None:
         assert os.read(cable.end, 300)[:1] == b"\xfd"
         cable.unplug()
         until = time.monotonic() + WAIT_S
-        while "serial line is gone" not in station.gone:
+        while "serial port is disconnected" not in station.gone:
             station.send(text(2))  # to a line that is gone, which is no error
             assert time.monotonic() < until
         cable.plug()
