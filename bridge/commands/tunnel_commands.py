@@ -89,7 +89,8 @@ def tunnel_robot(
     transport = _transport(mavlink, insecure)
     opened = joining(connect, guard) if connect else listening(listen, guard)
     with opened as link, open_tunnel(
-        link, transport, tells=own.mavlink("down"), hears=own.mavlink("up"), bulk=True, sees=judge.sees,
+        link, transport, publishes=own.mavlink("down"), receives=own.mavlink("up"), bulk=True,
+        sees=judge.sees,
         passes=(lambda message: True) if raw_orders else judge.lets_through, refused=refusals.told,
         knocks=read_url(mavlink).kind == "udpout",
     ) as tunnel:  # fmt: skip
@@ -125,7 +126,7 @@ def tunnel_station(
     transport = _transport(mavlink, insecure)
     end = f"the tunnel's end at {robot}"
     with connecting(connect, Guard(held, insecure)) as link, open_tunnel(
-        link, transport, tells=own.mavlink("up") if speaks else None, hears=own.mavlink("down"),
+        link, transport, publishes=own.mavlink("up") if speaks else None, receives=own.mavlink("down"),
         wrote=RefusalsHeard(robot).hears,
     ) as tunnel, greeting(
         link, own.mavlink("hello"), own.mavlink("alive"),

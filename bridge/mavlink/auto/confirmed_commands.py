@@ -77,14 +77,14 @@ class ConfirmedCommands:
         """Have the vehicle follow its mission."""
         self._mode(AUTO, self._peer.autopilot.modes.auto)
 
-    def jump(self, sequence: int, *, anew: bool = False) -> None:
+    def jump(self, sequence: int, *, reset: bool = False) -> None:
         """Make an item the current one; an item that is no NAV command is passed at once.
 
-        `anew` also takes a mission that is complete out of that state. PX4 does not know the command, but the
-        older message, which it does not answer (measured).
+        `reset` also takes a mission that is complete out of that state. PX4 does not know the command, but
+        the older message, which it does not answer (measured).
         """
         asked_ns, what = self._clock.now_ns(), f"item {sequence}"
-        ack = self._send(Command.DO_SET_MISSION_CURRENT, float(sequence), float(anew))
+        ack = self._send(Command.DO_SET_MISSION_CURRENT, float(sequence), float(reset))
         if ack.result != CommandResult.UNSUPPORTED:
             self._check_accepted(ack, what)
         near = range(sequence, sequence + 3)

@@ -265,10 +265,10 @@ class VehicleOrders:
 
     def _go(self, listed: ListedMission, place: int, observed: Observation | None) -> None:
         """Change to AUTO from an item on; if that skips the first ones, set the speed that they contain."""
-        anew = observed is None or observed.place >= listed.end
-        jumps = anew or observed is None or place != observed.place
+        restarts = observed is None or observed.place >= listed.end
+        jumps = restarts or observed is None or place != observed.place
         if jumps:
-            self._commands.jump(listed.sequence(place), anew=anew)
+            self._commands.jump(listed.sequence(place), reset=restarts)
         self._commands.auto()
         if jumps and place > 0 and listed.speed is not None:
             self._commands.speed(listed.speed)

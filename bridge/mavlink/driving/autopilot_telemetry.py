@@ -165,8 +165,8 @@ class AutopilotTelemetry:
     def why_unknown(self) -> str:
         """Reason why position or state of the vehicle are unknown; empty if they are known."""
         if is_lost(self._peer.silent_s):
-            gone = f" ({self._peer.wire.gone})" if self._peer.wire.gone else ""
-            return f"no data from the autopilot for {self._peer.silent_s:.0f} s{gone}"
+            reason = f" ({self._peer.wire.disconnected})" if self._peer.wire.disconnected else ""
+            return f"no data from the autopilot for {self._peer.silent_s:.0f} s{reason}"
         lost = [name for name in POSE if self._newest.fresh(name) is None]
         return f"the autopilot sends no {lost[0]}: has it lost its position?" if lost else ""
 

@@ -276,8 +276,8 @@ class Peer:
 
     def why_silent(self) -> str:
         """Possible reason why a vehicle that was found does not answer, as a part of a sentence."""
-        if self.wire.gone:
-            return f" ({self.wire.gone})"
+        if self.wire.disconnected:
+            return f" ({self.wire.disconnected})"
         if self.wire.dropped[SIGNATURE]:
             return f" ({self.wire.dropped[SIGNATURE]} frames had a {SIGNATURE}: is the signing key its own?)"
         if self.silent_s > OTHERS_S:
@@ -444,7 +444,7 @@ def _selected(wire: Wire, beats: dict[int, Message], vehicle: int | None, timeou
 
 
 def _why_none(wire: Wire) -> str:
-    if wire.gone:
-        return f" ({wire.gone})"
+    if wire.disconnected:
+        return f" ({wire.disconnected})"
     dropped = wire.dropped[SIGNATURE]
     return f" ({dropped} frames had a {SIGNATURE}: is the signing key the vehicle's?)" if dropped else ""

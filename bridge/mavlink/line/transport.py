@@ -1,8 +1,8 @@
 """Bytes in and out of UDP sockets, TCP streams and serial ports, for `wire` and `tunnel`.
 
 A transport that was opened never fails afterwards. While it is disconnected (refused, closed by the other
-end, unplugged) it returns no data, gives the reason in `gone`, and reconnects by itself. Whoever waits for an
-answer decides what missing data mean.
+end, unplugged) it returns no data, gives the reason in `disconnected`, and reconnects by itself. Whoever
+waits for an answer decides what missing data mean.
 
 One thread reads, any may write. If a connection breaks under a writer, the reader closes it: a reader that
 waits on a closed connection would fail in other ways.
@@ -35,7 +35,7 @@ RETRY_S = 0.5
 class Transport(Protocol):
     datagrams: bool
     """True if each chunk read holds whole frames."""
-    gone: str
+    disconnected: str
     """Reason why it is disconnected; empty if it is connected."""
 
     def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
@@ -66,7 +66,7 @@ class UdpOut:
     datagrams = True
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._peer = (url.host, url.number)
         self._socket = _datagrams(url)
         try:
@@ -83,9 +83,9 @@ class UdpOut:
         except BlockingIOError:  # what was ready was an error, and a writer has met it
             return []
         except OSError as error:
-            self.gone = _why(error)
+            self.disconnected = _why(error)
             return []
-        self.gone = ""
+        self.disconnected = ""
         return [(self._peer, data)]
 
     def write(self, data: bytes, to: Address | None = None) -> None:
@@ -94,7 +94,7 @@ class UdpOut:
         except BlockingIOError:  # there is no room: it is lost, as on any link
             pass
         except OSError as error:
-            self.gone = _why(error)
+            self.disconnected = _why(error)
 
     def close(self) -> None:
         self._socket.close()
@@ -106,7 +106,7 @@ class UdpIn:
     datagrams = True
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._peers: dict[Address, None] = {}
         self._socket = _datagrams(url)
         _bind(self._socket, url)
@@ -139,7 +139,7 @@ class TcpOut:
     datagrams = False
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._peer = (url.host, url.number)
         self._tried = time.monotonic()
         try:
@@ -167,7 +167,7 @@ class TcpOut:
             try:
                 stream.sendall(data)
             except OSError as error:
-                self.gone = error.strerror or str(error)
+                self.disconnected = error.strerror or str(error)
                 _end(stream)
 
     def close(self) -> None:
@@ -180,7 +180,7 @@ class TcpOut:
         return made
 
     def _lose(self, why: str) -> None:
-        stream, self._socket, self.gone = self._socket, None, why
+        stream, self._socket, self.disconnected = self._socket, None, why
         if stream is not None:
             stream.close()
 
@@ -191,9 +191,9 @@ class TcpOut:
         self._tried = time.monotonic()
         try:
             self._socket = self._connected()
-            self.gone = ""
+            self.disconnected = ""
         except OSError as error:
-            self.gone = error.strerror or str(error)
+            self.disconnected = error.strerror or str(error)
 
 
 class TcpIn:
@@ -202,7 +202,7 @@ class TcpIn:
     datagrams = False
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._listening = socket.socket(_family(url), socket.SOCK_STREAM)
         self._listening.setblocking(False)
         self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -266,7 +266,7 @@ class Serial:
     datagrams = False
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._url = url
         self._tried = time.monotonic()
         self._broken = ""
@@ -317,7 +317,7 @@ class Serial:
 
     def _lose(self, why: str) -> None:
         port, self._port, self._broken = self._port, None, ""
-        self.gone = f"the serial port is disconnected ({why})"
+        self.disconnected = f"the serial port is disconnected ({why})"
         if port is not None:
             port.close()
 
@@ -326,7 +326,7 @@ class Serial:
         if time.monotonic() >= self._tried + RETRY_S:
             self._tried = time.monotonic()
             with contextlib.suppress(InputError):
-                self._port, self.gone = self._opened(), ""
+                self._port, self.disconnected = self._opened(), ""
 
 
 OPENING: dict[UrlKind, Callable[[Url], Transport]] = {

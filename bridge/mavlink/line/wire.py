@@ -124,9 +124,9 @@ class Wire:
             thread.start()
 
     @property
-    def gone(self) -> str:
+    def disconnected(self) -> str:
         """Reason why no data pass now; empty if they pass."""
-        return self._ended or self._transport.gone
+        return self._ended or self._transport.disconnected
 
     def send(self, message: Message, *, component: int | None = None) -> None:
         """Send to the receiver of the message, if its address is known; else to all.

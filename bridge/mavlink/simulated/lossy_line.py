@@ -19,7 +19,7 @@ class LossyLine:
     """
 
     def __init__(self, transport: Transport, faults: VehicleFaults) -> None:
-        self.datagrams, self.gone = transport.datagrams, transport.gone
+        self.datagrams, self.disconnected = transport.datagrams, transport.disconnected
         self._transport = transport
         self._loss = _fraction(faults, "loss")
         self._twice = _fraction(faults, "duplicates")
@@ -38,7 +38,7 @@ class LossyLine:
             for due in self._times(self._coming):
                 heapq.heappush(self._waiting, (due, next(self._count), address, data))
         self._send_due()
-        self.gone = self._transport.gone
+        self.disconnected = self._transport.disconnected
         came = []
         while self._waiting and self._waiting[0][0] <= time.monotonic():
             _, _, address, data = heapq.heappop(self._waiting)

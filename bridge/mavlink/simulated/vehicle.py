@@ -100,7 +100,10 @@ class Vehicle:
         self.store = Store(setup.state)
         self._tuning = tuning = Tuning(autopilot.name, **setup.changed)
         self.rover = Rover(self.store, self._drive(tuning), rule=autopilot.rule, origin=setup.origin)
-        self.target = GuidedTarget(self.rover, wall, patience_s=self._setpoint_timeout_s)
+        timeout = autopilot.driving.gives_up_parameter
+        self.target = GuidedTarget(
+            self.rover, wall, patience_s=lambda: tuning.values.get(timeout, PATIENCE_S)
+        )
         self.parameters = Parameters(
             autopilot.habits, tuning, speed=self.rover.speed, set_speed=self.rover.set_speed
         )
@@ -122,9 +125,6 @@ class Vehicle:
     def now_ns(self) -> int:
         """Time of the present event."""
         return self.time.now_ns
-
-    def _setpoint_timeout_s(self) -> float:
-        return self._tuning.values.get(self.autopilot.driving.gives_up_parameter, PATIENCE_S)
 
     def _drive(self, tuning: Tuning) -> ExactDrive | RealDrive:
         pose, seed = self._setup.at or self.store.stored.pose or STANDING, self._setup.seed

@@ -113,7 +113,7 @@ class _Reading:
     def _take(self, message: Message) -> None:
         name = message.get_type()
         if name == "MISSION_ACK":
-            self._silence.heard(went_on=False)
+            self._silence.received(went_on=False)
             if message.type != MissionResult.ACCEPTED:
                 self._refused, self._result = True, message.type
             return
@@ -126,7 +126,7 @@ class _Reading:
     def _take_count(self, count: int) -> None:
         if self._count == count:
             return
-        self._silence.heard(went_on=True)
+        self._silence.received(went_on=True)
         if self._count is None:
             see = self._pace.saw if self._lists == 1 else self._pace.guessed
             see(time.monotonic() - self._listed_s)
@@ -139,7 +139,7 @@ class _Reading:
 
     def _take_item(self, message: Message) -> None:
         is_new = message.seq not in self.items
-        self._silence.heard(went_on=is_new)
+        self._silence.received(went_on=is_new)
         self._moved_s = time.monotonic() if is_new else self._moved_s
         asked_s = self._asked_s.pop(message.seq, None)
         if asked_s is not None and message.seq not in self._asked_again:

@@ -63,16 +63,16 @@ class TransferTimeout:
     def __init__(self, patience_s: float, stall_s: float | None = None) -> None:
         self.patience_s = patience_s
         self._stall_s = stall_s or 6 * patience_s
-        self._heard_s = self._went_on_s = time.monotonic()
+        self._received_s = self._went_on_s = time.monotonic()
 
-    def heard(self, *, went_on: bool) -> None:
-        self._heard_s = time.monotonic()
+    def received(self, *, went_on: bool) -> None:
+        self._received_s = time.monotonic()
         if went_on:
-            self._went_on_s = self._heard_s
+            self._went_on_s = self._received_s
 
     @property
     def seconds(self) -> float:
-        return time.monotonic() - self._heard_s
+        return time.monotonic() - self._received_s
 
     @property
     def over(self) -> bool:

@@ -140,7 +140,7 @@ class _Sending:
         if seq >= len(self._items):
             return
         self._error, self._errors = False, 0
-        self._silence.heard(went_on=seq > self._base or not self._begun)
+        self._silence.received(went_on=seq > self._base or not self._begun)
         if seq > self._base or not self._begun:
             self._go_on(seq)
         elif seq == self._base:
@@ -177,7 +177,7 @@ class _Sending:
         return time.monotonic() - self._sent_s.get(seq, 0.0) >= self._pace.soonest_s
 
     def _take_ack(self, result: int) -> TransferEnd | None:
-        self._silence.heard(went_on=False)
+        self._silence.received(went_on=False)
         if result == MissionResult.ACCEPTED:
             return TransferEnd("accepted", len(self._items)) if self._all_sent else None
         if result in HINTS:

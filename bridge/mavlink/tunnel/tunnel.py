@@ -96,7 +96,7 @@ class Echoes:
 
 
 class Tunnel:
-    """One end: `tells` and `hears` are key expressions of the link, out and in.
+    """One end: `publishes` and `receives` are key expressions of the link, out and in.
 
     `sees` is called with each message from the MAVLink side, `wrote` with each message written there.
     `passes` judges a message for that side, and `refused` gives the frame that is sent back for a blocked
@@ -109,8 +109,8 @@ class Tunnel:
         link: Link,
         transport: Transport,
         *,
-        tells: str | None,
-        hears: str,
+        publishes: str | None,
+        receives: str,
         sees: Callable[[Message], None] = lambda message: None,
         passes: Callable[[Message], bool] = lambda message: True,
         wrote: Callable[[Message], None] = lambda message: None,
@@ -129,11 +129,11 @@ class Tunnel:
         self._out = Waiting(self.dropped, "to the link")
         self._in = Waiting(self.dropped, "from the link")
         self._read_frames = Frames(self.dropped)
-        self._heard = Frames(self.dropped)
+        self._received_frames = Frames(self.dropped)
         self._ended = threading.Event()
         self._error: Exception | None = None
-        self._publish = None if tells is None else link.publisher(tells, bulk=bulk)
-        link.hear(hears, self._hear)
+        self._publish = None if publishes is None else link.publisher(publishes, bulk=bulk)
+        link.hear(receives, self._receive)
         works = (self._read, self._publish_frames, self._write)
         self._threads = [threading.Thread(target=self._watched, args=(work,), daemon=True) for work in works]
         for thread in self._threads:
@@ -191,7 +191,7 @@ class Tunnel:
 
     def _write(self) -> None:
         while not self._ended.is_set():
-            for frame, message in self._heard.whole(self._in.sample(), datagram=True):
+            for frame, message in self._received_frames.whole(self._in.sample(), datagram=True):
                 if self._passes(message):
                     self._echoes.wrote(frame)
                     self._transport.write(frame)
@@ -201,7 +201,7 @@ class Tunnel:
                     self.dropped["refused"] += 1
                     self._send_back(self._refused(message))
 
-    def _hear(self, key: str, payload: bytes) -> None:
+    def _receive(self, key: str, payload: bytes) -> None:
         if len(payload) <= SAMPLE_BYTES:
             self._in.put(payload)
         else:

@@ -28,6 +28,6 @@ def _stop(number: int, autopilot: str, east: int) -> tuple[Placed, Placed]:
 
 
 def held(sent: ItemList) -> list[Message]:
-    """What a vehicle holds after an upload of the list."""
+    """Items that a vehicle holds after an upload of the list."""
     keep = autopilot_named(sent.autopilot).kept
     return [item_message(keep(item), seq, VEHICLE) for seq, item in enumerate(upload_of(sent))]

@@ -17,7 +17,7 @@ WAIT_S = 0.05
 
 @dataclass(frozen=True)
 class Roughness:
-    """What happens to a datagram, in each direction."""
+    """Faults of a datagram's transport, in each direction."""
 
     delay_s: float = 0.0
     loss: float = 0.0

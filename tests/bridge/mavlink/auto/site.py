@@ -125,7 +125,7 @@ ALL = [
     *(f"{word} {name}" for name in ("S1", "S2", "S3") for word in ("Arrived", "Settled", "Scanned")),
     "Finished",
 ]
-"""What is told of a run of the tour in which all goes well."""
+"""Reports of a run of the tour without faults."""
 
 
 @contextmanager

@@ -69,7 +69,7 @@ def items_of(log: list[Any]) -> list[Item]:
 
 
 def as_messages(entry: Any) -> Iterator[Any]:
-    """What the Rover told stations at that moment."""
+    """Reports of the Rover to stations at that moment."""
     ms = entry.TimeUS // 1000
     if entry.get_type() == "MISE" and entry.CId in NAV:
         yield dialect.MAVLink_mission_current_message(entry.CNum, 15, dialect.MISSION_STATE_ACTIVE, 1)

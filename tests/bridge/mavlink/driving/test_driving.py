@@ -188,7 +188,7 @@ def _refusal(station: Any) -> str:
 
 
 def _retried(station: Any) -> bool:
-    """Whether the robot has heard by now that it is handed over."""
+    """True once the robot knows that the vehicle is handed over."""
     try:
         return bool(station.command("retry").outcome == "ok")
     except NegativeResult:

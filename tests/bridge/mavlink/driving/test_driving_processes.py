@@ -63,7 +63,7 @@ def driving(url: Url) -> tuple[str, ...]:
 
 
 def scans_begun(operator: Operator) -> int:
-    """How many the vehicle has begun, whoever has heard of them."""
+    """Number of scans that the vehicle has begun, whoever knows of them."""
     last = operator.peer.ask(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
     assert last is not None
     return int(last.image_index) + 1

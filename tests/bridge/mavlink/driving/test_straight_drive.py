@@ -1,4 +1,4 @@
-"""How one straight of a leg is steered and ends, by numbers that can be checked on paper."""
+"""Steering along one straight of a leg, and its end, by numbers that can be checked on paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the gateway makes of a vehicle that drives as a real one: in time, on its way, on after a mishap."""
+"""The gateway with a vehicle that drives realistically: in time, on its path, and on after a fault."""
 
 from __future__ import annotations
 

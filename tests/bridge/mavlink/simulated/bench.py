@@ -71,7 +71,7 @@ class Bench:
         self.all += self._own.parse_buffer(message.pack(self._own)) or []
 
     def say(self, message: Message, who: Who = STATION) -> list[Message]:
-        """What the vehicle says to a message, telemetry aside."""
+        """Answers of the vehicle to a message, without telemetry."""
         before = len(self.all)
         wire = self._wires[who]
         for parsed in wire.parse_buffer(message.pack(wire)) or []:

@@ -17,7 +17,7 @@ LOG = Path(__file__).parents[4].parent / "shared" / "data" / "logs" / "rover-sto
 CORNERS = [(3.0, 0.0), (3.0, 3.0), (6.0, 3.0), (6.0, 0.0), (9.0, 0.0)]
 """East and north of the origin: the stops of the log."""
 MEASURED_MM = [202, 218, 218, 201, 217]
-"""How far beside each of them the Rover of the log truly stood while it waited there."""
+"""True position errors of the Rover of the log while it waited at each of them."""
 MEASURED_S = 12.5
 """From one stop to the next."""
 START = Pose(x=-0.083, y=0.0, heading=0.0)

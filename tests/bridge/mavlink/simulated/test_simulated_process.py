@@ -247,7 +247,7 @@ class Loop:
     """A transport that gives back what is written."""
 
     datagrams = True
-    gone = ""
+    disconnected = ""
 
     def __init__(self) -> None:
         self.written: list[bytes] = []

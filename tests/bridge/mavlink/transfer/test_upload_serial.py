@@ -98,7 +98,7 @@ def test_what_is_written_while_a_lost_line_is_closed_is_lost_and_no_more(line: N
         descriptor, end._port.fd = end._port.fd, None
         end.write(b"heartbeat")
         assert end.read(0.0) == []
-        assert "serial port is disconnected" in end.gone
+        assert "serial port is disconnected" in end.disconnected
     finally:
         os.close(descriptor)
         end.close()
