@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.table import put, table, versions
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import upload
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.console.ports import free_port
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.mavlink.items import ItemList

@@ -31,8 +31,8 @@ from typing import Any
 import pytest
 
 import stopgo.bridge
-from stopgo.bridge.mavlink.line import transport
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link import transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.errors import InputError
 
 NET_S = 120.0

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from stopgo.bridge.link.clock import WallClock
-from stopgo.bridge.mavlink.line.transport import open_transport
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from tests.own_time import World, stepped_into
 
 HOUR_S = 3600.0

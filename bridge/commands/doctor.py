@@ -43,7 +43,7 @@ from stopgo.mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
     from stopgo.bridge.link.protocol import Info
-    from stopgo.bridge.mavlink.line.url import Url
+    from stopgo.bridge.mavlink.vehicle_link.url import Url
 
 Satellites = Annotated[
     bool, typer.Option("--any-origin", help="With --mavlink: it finds its place by satellites, not indoors.")
@@ -91,7 +91,7 @@ def doctor(
     if told["keys"] is not None:
         checks += _checked("keys", lambda: _keys(told["keys"]))
     if mavlink is not None:
-        from stopgo.bridge.mavlink.line.wire import read_link
+        from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 
         alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
         url, key = read_link(mavlink, signing_key, insecure=insecure)
@@ -116,7 +116,7 @@ def _vehicle(
     url: Url, vehicle: int | None, key: bytes | None, *, timeout_s: float, any_origin: bool
 ) -> Iterator[Check]:
     from stopgo.bridge.commands.vehicle_checks import vehicle_checks
-    from stopgo.bridge.mavlink.line.peer import reached as vehicle_at
+    from stopgo.bridge.mavlink.vehicle_link.peer import reached as vehicle_at
 
     with vehicle_at(url, vehicle=vehicle, signing_key=key, timeout_s=timeout_s) as peer:
         yield from vehicle_checks(peer, any_origin=any_origin)
@@ -125,7 +125,7 @@ def _vehicle(
 def _unasked(told: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
     """What can be told of where to connect while nobody says to which robot."""
     if told["mavlink"] is not None:
-        from stopgo.bridge.mavlink.line.url import read_url
+        from stopgo.bridge.mavlink.vehicle_link.url import read_url
 
         yield Check("port", True, f"{read_url(told['mavlink'])} is a MAVLink URL; nobody was asked there")
     elif told["connect"] != DEFAULT_ENDPOINT:

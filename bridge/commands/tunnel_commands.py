@@ -21,8 +21,8 @@ from stopgo.bridge.commands.connection import (
 from stopgo.bridge.console import say
 
 if TYPE_CHECKING:
-    from stopgo.bridge.mavlink.line.transport import Transport
     from stopgo.bridge.mavlink.tunnel.tunnel import Tunnel
+    from stopgo.bridge.mavlink.vehicle_link.transport import Transport
     from stopgo.mission.mavlink.telemetry import Message
 
 MOST_KINDS = 100
@@ -72,9 +72,9 @@ def tunnel_robot(
     from stopgo.bridge.link.access import access_control
     from stopgo.bridge.link.protocol import KeyExpressions
     from stopgo.bridge.link.zenoh_link import Guard, joining, listening
-    from stopgo.bridge.mavlink.line.url import read_url
     from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
     from stopgo.bridge.mavlink.tunnel.tunnel import answer_greetings, open_tunnel
+    from stopgo.bridge.mavlink.vehicle_link.url import read_url
     from stopgo.bridge.robot.controller import new_boot_id
     from stopgo.bridge.robot.program import robots_keys
 
@@ -144,8 +144,8 @@ class Refusals:
 
     def told(self, message: Message) -> bytes:
         """A STATUSTEXT that tells of it, or nothing if that was told a moment ago."""
-        from stopgo.bridge.mavlink.line.messages import warning
         from stopgo.bridge.mavlink.tunnel.message_filter import described
+        from stopgo.bridge.mavlink.vehicle_link.messages import warning
 
         what, now = described(message), time.monotonic()
         if now - self._said.get(what, -SAY_EVERY_S) < SAY_EVERY_S:
@@ -178,8 +178,8 @@ class RefusalsHeard:
 
 def _transport(mavlink: str, insecure: bool) -> Transport:
     """The MAVLink side: on this machine, or elsewhere if that is wanted, for nothing is signed here."""
-    from stopgo.bridge.mavlink.line.transport import open_transport
-    from stopgo.bridge.mavlink.line.url import check_guarded, read_url
+    from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+    from stopgo.bridge.mavlink.vehicle_link.url import check_guarded, read_url
 
     url = read_url(mavlink)
     check_guarded(url, signed=False, insecure=insecure)

@@ -13,11 +13,6 @@ from typing import Any, TypeVar, get_args
 from stopgo.bridge.console import Bar, print_json, say, tell, tell_lines
 from stopgo.bridge.mavlink.auto.logbook import forget, logbook, remember
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
-from stopgo.bridge.mavlink.line.origin import check_origin
-from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import read_link
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import (
     NOTHING_SENT,
@@ -28,6 +23,11 @@ from stopgo.bridge.mavlink.transfer.upload import (
     upload,
 )
 from stopgo.bridge.mavlink.transfer.upload_recovery import own_items
+from stopgo.bridge.mavlink.vehicle_link.origin import check_origin
+from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 from stopgo.mission.console.table import table
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError

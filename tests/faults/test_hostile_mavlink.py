@@ -7,12 +7,12 @@ import socket
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import Wire, wire
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import Wire, wire
 from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.simulated.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint

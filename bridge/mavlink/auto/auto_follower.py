@@ -45,7 +45,7 @@ from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
 from stopgo.bridge.mavlink.auto.external_changes import ExternalChanges
 from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.auto.pending_commands import PendingCommands
-from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.following.listed_mission import ListedMission

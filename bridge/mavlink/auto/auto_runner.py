@@ -14,8 +14,8 @@ from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
 from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.wire import MessageQueue
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
 from stopgo.bridge.robot.runner import Position
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import RobotUnreachable

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.line.messages import interval, set_current
-from stopgo.bridge.mavlink.line.peer import Ack, Peer
+from stopgo.bridge.mavlink.vehicle_link.messages import interval, set_current
+from stopgo.bridge.mavlink.vehicle_link.peer import Ack, Peer
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
 from stopgo.mission.mavlink.enums import CommandResult, MessageId

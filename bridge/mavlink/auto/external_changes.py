@@ -6,8 +6,8 @@ import uuid
 from contextlib import suppress
 
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
-from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission

@@ -21,7 +21,7 @@ import msgspec
 
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.journal import Journal, shared_journal
 from stopgo.mission.document import Mission
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from stopgo.bridge.mavlink.auto.logbook import Logbook
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.tolerance import told_outside
 

@@ -15,8 +15,8 @@ import msgspec
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
-from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
 from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
 from stopgo.mission.mavlink.following import steps as progress

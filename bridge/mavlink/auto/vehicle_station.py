@@ -18,9 +18,9 @@ from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.mavlink.auto.auto_runner import AutoRunner
 from stopgo.bridge.mavlink.auto.logbook import logbook
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
-from stopgo.bridge.mavlink.line.peer import found
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import GROUND_STATION, Who, wire
+from stopgo.bridge.mavlink.vehicle_link.peer import found
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import GROUND_STATION, Who, wire
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.station.station import Station, whoami
 

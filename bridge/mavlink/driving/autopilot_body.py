@@ -11,7 +11,7 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.mavlink_base import MavlinkBase
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
 from stopgo.bridge.mavlink.driving.onboard_autopilot import on_board
-from stopgo.bridge.mavlink.line.wire import read_link
+from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 from stopgo.bridge.robot.robot_hardware import Body
 from stopgo.mission.document import Mission
 

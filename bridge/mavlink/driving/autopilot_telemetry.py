@@ -6,9 +6,9 @@ import math
 import time
 from collections import Counter
 
-from stopgo.bridge.mavlink.line.messages import interval
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.wire import MessageQueue, Who
+from stopgo.bridge.mavlink.vehicle_link.messages import interval
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who
 from stopgo.mission.document import Point
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.local_frame import VehicleOrigin

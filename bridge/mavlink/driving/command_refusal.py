@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.wire import MessageQueue
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.mavlink.telemetry import complains
 

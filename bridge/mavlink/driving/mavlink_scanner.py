@@ -12,8 +12,8 @@ from typing import Literal
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
 from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
-from stopgo.bridge.mavlink.line.messages import request
-from stopgo.bridge.mavlink.line.wire import MessageQueue
+from stopgo.bridge.mavlink.vehicle_link.messages import request
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.file_name import file_name

@@ -11,8 +11,8 @@ import time
 
 from stopgo.bridge.mavlink.driving.autopilot_telemetry import NewestMessages
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
-from stopgo.bridge.mavlink.line.messages import command_long
-from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.messages import command_long
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.autopilots.kind import Mode
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.items import Command

@@ -15,11 +15,11 @@ from stopgo.bridge.mavlink.driving.autopilot_telemetry import ASK_S, POSE, Autop
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S
 from stopgo.bridge.mavlink.driving.mode_control import ModeControl
 from stopgo.bridge.mavlink.driving.setpoints import Setpoints
-from stopgo.bridge.mavlink.line.messages import on_board_beat, set_origin
-from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
-from stopgo.bridge.mavlink.line.peer import Peer, found
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import Who, wire
+from stopgo.bridge.mavlink.vehicle_link.messages import on_board_beat, set_origin
+from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
 from stopgo.mission.errors import InputError, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from stopgo.mission.mavlink.autopilots.kind import why_no_rover

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from stopgo.bridge.mavlink.driving.autopilot_telemetry import AutopilotTelemetry
-from stopgo.bridge.mavlink.line.messages import course_setpoint, position_setpoint, yaw_setpoint
-from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.messages import course_setpoint, position_setpoint, yaw_setpoint
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.document import Point
 
 TURNING_M_S = 0.05

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated import replies
 from stopgo.bridge.mavlink.simulated import vehicle_telemetry as telemetry
 from stopgo.bridge.mavlink.simulated.rover import FAR_M
 from stopgo.bridge.mavlink.simulated.steering import Course
 from stopgo.bridge.mavlink.simulated.vehicle import Handlers, Vehicle
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Mode, ModeName

@@ -8,8 +8,8 @@ import random
 import threading
 import time
 
-from stopgo.bridge.mavlink.line.transport import Address, Transport
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaultKind, VehicleFaults
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, Transport
 
 
 class LossyLine:

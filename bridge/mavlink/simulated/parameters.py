@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated import replies
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.mavlink.autopilots.kind import ProtocolBehaviour
 from stopgo.mission.mavlink.telemetry import Message
 

@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.messages import item_of
-from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import item_of
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.mavlink.fields import PLACED
 from stopgo.mission.mavlink.items import Item

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import msgspec
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated.item_check import ACCEPTED, verdict
 from stopgo.bridge.mavlink.simulated.replies import (
     item_float,
@@ -20,6 +19,7 @@ from stopgo.bridge.mavlink.simulated.replies import (
 )
 from stopgo.bridge.mavlink.simulated.vehicle_faults import Mishaps
 from stopgo.bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, Store, StoredItems
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item

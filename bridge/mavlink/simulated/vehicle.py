@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.line.wire import Who, sender
 from stopgo.bridge.mavlink.simulated import replies
 from stopgo.bridge.mavlink.simulated.auto_mission import AutoEvents, AutoMission
 from stopgo.bridge.mavlink.simulated.camera import Camera
@@ -24,6 +23,7 @@ from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle_clock import VehicleClock
 from stopgo.bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, Mishaps, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_store import MISSION, Store
+from stopgo.bridge.mavlink.vehicle_link.wire import Who, sender
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Autopilot, ModeName
 from stopgo.mission.mavlink.enums import MessageId

@@ -10,9 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from stopgo.bridge.link.clock import WallClock
-from stopgo.bridge.mavlink.line.transport import open_transport
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import Who, Wire, read_link
 from stopgo.bridge.mavlink.simulated.command_handlers import NORTHMOST
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.lossy_line import on_line
@@ -21,6 +18,9 @@ from stopgo.bridge.mavlink.simulated.rover import to_east
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import Who, Wire, read_link
 from stopgo.mission.errors import InputError
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.enums import Component

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.simulated.rover import bearing
 from stopgo.bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.enums import MessageId, MissionState, ModeFlag, SystemState, VehicleType
 from stopgo.mission.mavlink.telemetry import Message
 

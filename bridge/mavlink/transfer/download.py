@@ -8,7 +8,8 @@ from __future__ import annotations
 import time
 
 from stopgo.bridge.console import Progress
-from stopgo.bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
+from stopgo.bridge.mavlink.vehicle_link.messages import (
     ack_message,
     item_of,
     item_request,
@@ -16,8 +17,7 @@ from stopgo.bridge.mavlink.line.messages import (
     of_mission,
     result_name,
 )
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item

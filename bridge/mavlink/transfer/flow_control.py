@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.round_trips import RoundTrips
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.round_trips import RoundTrips
 
 WINDOW = 8
 """Items under way at once: some 400 bytes, as much as a telemetry radio takes at once."""

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from stopgo.bridge.console import Progress
-from stopgo.bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout
+from stopgo.bridge.mavlink.vehicle_link.messages import (
     ack_message,
     count_message,
     item_message,
     list_request,
     of_mission,
 )
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message

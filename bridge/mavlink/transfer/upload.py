@@ -12,8 +12,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from stopgo.bridge.console import Progress
-from stopgo.bridge.mavlink.line.messages import result_name
-from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.flow_control import window_for
 from stopgo.bridge.mavlink.transfer.sending import TransferEnd, send_items
@@ -24,6 +22,8 @@ from stopgo.bridge.mavlink.transfer.upload_recovery import (
     recovered_content,
     unknown_content,
 )
+from stopgo.bridge.mavlink.vehicle_link.messages import result_name
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.enums import MissionResult

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from stopgo.bridge.mavlink.line.messages import ack_message, clear_all
-from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.flow_control import window_for
 from stopgo.bridge.mavlink.transfer.sending import send_items
+from stopgo.bridge.mavlink.vehicle_link.messages import ack_message, clear_all
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item

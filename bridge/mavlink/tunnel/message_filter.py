@@ -6,7 +6,7 @@ commander's lease would count. To stop a vehicle must always be possible.
 
 from __future__ import annotations
 
-from stopgo.bridge.mavlink.line.messages import enum_name
+from stopgo.bridge.mavlink.vehicle_link.messages import enum_name
 from stopgo.mission.mavlink.autopilots import autopilot_of
 from stopgo.mission.mavlink.autopilots.kind import Autopilot, Modes
 from stopgo.mission.mavlink.enums import Component

@@ -17,9 +17,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from stopgo.bridge.link.link import Link, Presence
-from stopgo.bridge.mavlink.line.frames import Frames, dialect
-from stopgo.bridge.mavlink.line.messages import on_board_beat
-from stopgo.bridge.mavlink.line.transport import Transport
+from stopgo.bridge.mavlink.vehicle_link.frames import Frames, dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import on_board_beat
+from stopgo.bridge.mavlink.vehicle_link.transport import Transport
 from stopgo.mission.mavlink.enums import Component
 from stopgo.mission.mavlink.telemetry import Message
 

@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.mavlink.auto.logbook import logbook, remember
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.command_line import main
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.files.imports import qgc_plan, qgc_waypoints

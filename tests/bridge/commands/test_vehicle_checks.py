@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import pytest
 
 from stopgo.bridge.commands.vehicle_checks import knows_its_place, parameter_checks
-from stopgo.bridge.mavlink.line.parameter_reading import value_of
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.parameter_reading import value_of
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.command_line import main
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT

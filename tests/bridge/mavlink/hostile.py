@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stopgo.bridge.mavlink.line.messages import item_message
+from stopgo.bridge.mavlink.vehicle_link.messages import item_message
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed

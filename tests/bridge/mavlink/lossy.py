@@ -8,8 +8,8 @@ import threading
 import time
 from dataclasses import dataclass
 
-from stopgo.bridge.mavlink.line.transport import Transport, open_transport
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.transport import Transport, open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from tests.ports import free_port
 
 WAIT_S = 0.05

@@ -15,12 +15,12 @@ import msgspec
 from stopgo.bridge.mavlink.auto.logbook import Logbook, logbook, remember
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
 from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.frames.transform import SiteOrigin

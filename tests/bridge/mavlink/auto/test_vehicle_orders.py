@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.bridge.robot.answers import answer_to, remember_answer
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable

@@ -11,10 +11,10 @@ import msgspec
 import pytest
 
 from stopgo.bridge.commands.watch_commands import tell_compared
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import read_signing_key
 from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import read_signing_key
 from stopgo.bridge.station.watch import Lines, watch_showing
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Scan, sealed

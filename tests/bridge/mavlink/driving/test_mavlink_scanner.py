@@ -10,9 +10,9 @@ from typing import Any
 
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, stop_of
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import Ack
-from stopgo.bridge.mavlink.line.wire import MessageQueue, Who
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Ack
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.mavlink.telemetry import Message

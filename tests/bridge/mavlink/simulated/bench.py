@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.bridge.link.clock import SimulatedClock
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.telemetry import Message

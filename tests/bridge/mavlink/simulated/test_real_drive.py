@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.run.events import Pose
 from tests.bridge.mavlink.simulated.bench import Bench, delay, waypoint

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import wire
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import wire
 from stopgo.mission.mavlink.items import Item
 from tests.bridge.mavlink.simulated.bench import HOME, ORIGIN, camera, delay, script, waypoint
 from tests.ports import free_port

@@ -15,10 +15,6 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.transport import Address
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import SIGNATURE, Who, Wire, wire
 from stopgo.bridge.mavlink.simulated.lossy_line import on_line
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
@@ -30,6 +26,10 @@ from stopgo.bridge.mavlink.simulated.vehicle_faults import (
 )
 from stopgo.bridge.mavlink.simulated.vehicle_process import VehicleOptions, setup_of, vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.transport import Address
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import SIGNATURE, Who, Wire, wire
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.rover import to_east
 from stopgo.bridge.mavlink.simulated.vehicle_process import read_origin
 from stopgo.bridge.mavlink.simulated.vehicle_telemetry import MAKERS
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.telemetry import Message

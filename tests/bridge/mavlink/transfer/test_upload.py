@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.messages import item_message, item_of
-from stopgo.bridge.mavlink.line.origin import check_origin
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.transfer import upload as uploads
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, clear, upload
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import item_message, item_of
+from stopgo.bridge.mavlink.vehicle_link.origin import check_origin
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import Item

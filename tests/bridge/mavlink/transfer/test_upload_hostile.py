@@ -7,14 +7,14 @@ import threading
 
 import pytest
 
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import clear, upload
 from stopgo.bridge.mavlink.transfer.upload_recovery import own_items
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.lists import stops
 from tests.ports import free_port

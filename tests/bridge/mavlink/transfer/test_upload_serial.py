@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line import transport
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, upload
+from stopgo.bridge.mavlink.vehicle_link import transport
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.errors import OutcomeUnknown
 from tests.bridge.mavlink.lists import stops
 

@@ -18,13 +18,13 @@ from stopgo.bridge.link.keys import now_utc, read_keys
 from stopgo.bridge.link.memory_link import MemoryLink, Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.zenoh_link import Guard, connecting
-from stopgo.bridge.mavlink.line.frames import Frames, dialect
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.transport import Address, open_transport
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.tunnel import tunnel as tunnels
 from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
 from stopgo.bridge.mavlink.tunnel.tunnel import QUEUE, Tunnel, open_tunnel
+from stopgo.bridge.mavlink.vehicle_link.frames import Frames, dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.driving.world import rover
 from tests.bridge.mavlink.scripted import Scripted

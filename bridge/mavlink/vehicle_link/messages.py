@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.document import Point
 from stopgo.mission.frames.geodesy import to_steps
 from stopgo.mission.mavlink.enums import Firmware, VehicleType

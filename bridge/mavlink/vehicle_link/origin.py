@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.local_frame import VehicleOrigin, how_far_off

@@ -6,8 +6,8 @@ import struct
 import time
 from collections.abc import Collection
 
-from stopgo.bridge.mavlink.line.messages import parameter_request
-from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.messages import parameter_request
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.telemetry import Message
 
 ROUNDS = 4

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from stopgo.bridge.mavlink.line.url import Url, UrlKind
+from stopgo.bridge.mavlink.vehicle_link.url import Url, UrlKind
 from stopgo.mission.errors import InputError, RobotUnreachable
 
 Address = Any

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from stopgo.bridge.console import say
-from stopgo.bridge.mavlink.line.frames import UNREADABLE, Frames, dialect
-from stopgo.bridge.mavlink.line.transport import Address, Transport, open_transport
-from stopgo.bridge.mavlink.line.url import Url, check_guarded, read_url
+from stopgo.bridge.mavlink.vehicle_link.frames import UNREADABLE, Frames, dialect
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, Transport, open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url, check_guarded, read_url
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.telemetry import Message

@@ -11,7 +11,7 @@ from typing import Any
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from stopgo.bridge.mavlink.line.transport import Address
+from stopgo.bridge.mavlink.vehicle_link.transport import Address
 from stopgo.mission.mavlink.telemetry import Message
 
 MAX_SENDERS = 64

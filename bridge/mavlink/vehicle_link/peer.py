@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
-from stopgo.bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.vehicle_link.messages import (
     command_int,
     command_long,
     enum_name,
@@ -24,9 +24,9 @@ from stopgo.bridge.mavlink.line.messages import (
     set_origin,
     station_beat,
 )
-from stopgo.bridge.mavlink.line.round_trips import RoundTrips
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
+from stopgo.bridge.mavlink.vehicle_link.round_trips import RoundTrips
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_of
 from stopgo.mission.mavlink.autopilots.kind import Autopilot

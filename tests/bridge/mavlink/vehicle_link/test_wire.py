@@ -18,10 +18,10 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.transport import open_transport
-from stopgo.bridge.mavlink.line.url import Url, read_url
-from stopgo.bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, read_signing_key, wire
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url, read_url
+from stopgo.bridge.mavlink.vehicle_link.wire import SIGNATURE, MessageQueue, Who, Wire, read_signing_key, wire
 from stopgo.mission.errors import InputError, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
