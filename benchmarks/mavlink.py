@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.table import put, table, versions
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import upload
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.console.ports import free_port
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.mavlink.items import ItemList
@@ -118,7 +118,7 @@ def line(profile: str, rate: float, seed: int) -> Iterator[tuple[Url, Url]]:
     """An empty vehicle behind a lossy link, and the same vehicle without the link."""
     port = free_port()
     with (
-        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile])),
+        vehicle_on(Url("udpin", "127.0.0.1", port), VehicleSetup(PROFILES[profile])),
         Lossy(port, Roughness(delay_s=DELAY_S, loss=rate), seed=seed) as rough,
     ):
         yield rough.url, Url("udpout", "127.0.0.1", port)

@@ -31,8 +31,8 @@ from typing import Any
 import pytest
 
 import stopgo.bridge
-from stopgo.bridge.mavlink.line import transport
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link import transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.errors import InputError
 
 NET_S = 120.0
@@ -399,7 +399,7 @@ class UdpIn:
     """Hears everyone on a port of the world, and answers those it has heard."""
 
     datagrams = True
-    gone = ""
+    disconnected = ""
 
     def __init__(self, world: World, url: Url) -> None:
         self._world = world
@@ -440,7 +440,7 @@ class UdpOut:
     _numbers = itertools.count(50_000)
 
     def __init__(self, world: World, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self.address = ("127.0.0.1", next(self._numbers))
         self._world = world
         self._peer = (url.host, url.number)
@@ -456,13 +456,13 @@ class UdpOut:
             data = self._came.get(timeout=max(0.0, timeout_s))
         except queue.Empty:
             return []
-        self.gone = ""
+        self.disconnected = ""
         return [(self._peer, data)]
 
     def write(self, data: bytes, to: Any = None) -> None:
         there = self._world.ports.get(self._peer)
         if there is None:
-            self.gone = "nothing listens there"
+            self.disconnected = "nothing listens there"
         else:
             there.take(self, data)
 

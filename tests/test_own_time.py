@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from stopgo.bridge.link.clock import WallClock
-from stopgo.bridge.mavlink.line.transport import open_transport
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from tests.own_time import World, stepped_into
 
 HOUR_S = 3600.0
@@ -107,12 +107,12 @@ def test_the_bridge_lives_in_it_and_comes_back_out(world: World) -> None:
 def test_datagrams_arrive_at_once_and_are_refused_where_nobody_listens(world: World) -> None:
     near = open_transport(Url("udpout", "127.0.0.1", 9))
     near.write(b"lost")
-    assert near.gone == "nothing listens there"
+    assert near.disconnected == "nothing listens there"
     far = open_transport(Url("udpin", "127.0.0.1", 9))
     near.write(b"asked")
     ((sender, data),) = far.read(HOUR_S)
     assert data == b"asked"
     far.write(b"answered", sender)
     assert near.read(HOUR_S) == [(("127.0.0.1", 9), b"answered")]
-    assert near.gone == ""
+    assert near.disconnected == ""
     assert near.read(HOUR_S) == []

@@ -198,9 +198,9 @@ def reached(connection: Connection) -> AbstractContextManager[Station]:
 def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager[Station]:
     from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
     from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
-    from stopgo.bridge.mavlink.line.wire import read_line
+    from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 
-    url, key = read_line(mavlink.url, mavlink.signing_key, insecure=connection.insecure)
+    url, key = read_link(mavlink.url, mavlink.signing_key, insecure=connection.insecure)
     options = Options(
         vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=connection.timeout_s,
         commander=connection.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),

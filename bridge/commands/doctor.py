@@ -47,7 +47,7 @@ from stopgo.mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
     from stopgo.bridge.link.protocol import Info
-    from stopgo.bridge.mavlink.line.url import Url
+    from stopgo.bridge.mavlink.vehicle_link.url import Url
 
 LEAST_FREE = 500_000_000
 """Free bytes that a long run's recording and the robot's journal need."""
@@ -117,10 +117,10 @@ def _vehicle_checks(
     insecure: bool,
     any_origin: bool,
 ) -> list[Check]:
-    from stopgo.bridge.mavlink.line.wire import read_line
+    from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 
     refuse_options(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
-    url, key = read_line(mavlink, signing_key, insecure=insecure)
+    url, key = read_link(mavlink, signing_key, insecure=insecure)
     return _checked(
         "vehicle", lambda: _vehicle(url, vehicle, key, timeout_s=timeout_s, any_origin=any_origin)
     )
@@ -145,7 +145,7 @@ def _vehicle(
     url: Url, vehicle: int | None, key: bytes | None, *, timeout_s: float, any_origin: bool
 ) -> Iterator[Check]:
     from stopgo.bridge.commands.vehicle_checks import vehicle_checks
-    from stopgo.bridge.mavlink.line.peer import reached as vehicle_at
+    from stopgo.bridge.mavlink.vehicle_link.peer import reached as vehicle_at
 
     with vehicle_at(url, vehicle=vehicle, signing_key=key, timeout_s=timeout_s) as peer:
         yield from vehicle_checks(peer, any_origin=any_origin)
@@ -154,7 +154,7 @@ def _vehicle(
 def _endpoint_only(named: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
     """Check the preset endpoint or URL, without a robot's name."""
     if named["mavlink"] is not None:
-        from stopgo.bridge.mavlink.line.url import read_url
+        from stopgo.bridge.mavlink.vehicle_link.url import read_url
 
         yield Check(
             "port", True, f"{read_url(named['mavlink'])} is a MAVLink URL; the vehicle was not queried"

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from stopgo.bridge.link.link import Link
     from stopgo.bridge.link.protocol import KeyExpressions
     from stopgo.bridge.link.zenoh_link import Guard
-    from stopgo.bridge.mavlink.line.transport import Transport
     from stopgo.bridge.mavlink.tunnel.tunnel import Tunnel
+    from stopgo.bridge.mavlink.vehicle_link.transport import Transport
     from stopgo.mission.mavlink.telemetry import Message
 
 MOST_KINDS = 100
@@ -109,9 +109,9 @@ def _guard(own: KeyExpressions, keys: Path | None, *, insecure: bool, joins: boo
 def _robot_end(
     link: Link, transport: Transport, own: KeyExpressions, mavlink: str, *, raw_orders: bool
 ) -> AbstractContextManager[Tunnel]:
-    from stopgo.bridge.mavlink.line.url import read_url
     from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
     from stopgo.bridge.mavlink.tunnel.tunnel import open_tunnel
+    from stopgo.bridge.mavlink.vehicle_link.url import read_url
 
     messages = MessageFilter()
     return open_tunnel(
@@ -163,8 +163,8 @@ class RefusalSender:
 
     def text_of(self, message: Message) -> bytes:
         """Return the STATUSTEXT for a blocked message; empty if one was sent less than a second ago."""
-        from stopgo.bridge.mavlink.line.messages import warning
         from stopgo.bridge.mavlink.tunnel.message_filter import described
+        from stopgo.bridge.mavlink.vehicle_link.messages import warning
 
         what, now = described(message), time.monotonic()
         if now - self._reported_s.get(what, -SAY_EVERY_S) < SAY_EVERY_S:
@@ -194,8 +194,8 @@ class RefusalListener:
 
 def _transport(mavlink: str, insecure: bool) -> Transport:
     """Open the MAVLink side; beyond this machine it needs --insecure, because nothing is signed here."""
-    from stopgo.bridge.mavlink.line.transport import open_transport
-    from stopgo.bridge.mavlink.line.url import check_guarded, read_url
+    from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+    from stopgo.bridge.mavlink.vehicle_link.url import check_guarded, read_url
 
     url = read_url(mavlink)
     check_guarded(url, signed=False, insecure=insecure)
@@ -204,12 +204,12 @@ def _transport(mavlink: str, insecure: bool) -> Transport:
 
 def _run(tunnel: Tunnel) -> None:
     """Run the tunnel until a signal ends it, then print its statistics."""
-    from stopgo.bridge.mavlink.tunnel.tunnel import told
+    from stopgo.bridge.mavlink.tunnel.tunnel import summary
 
     try:
         tunnel.wait()
     finally:
-        for line in told(tunnel.carried, tunnel.dropped):
+        for line in summary(tunnel.carried, tunnel.dropped):
             say(line)
 
 

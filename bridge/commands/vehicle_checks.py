@@ -6,8 +6,8 @@ import time
 from collections.abc import Iterator, Mapping
 
 from stopgo.bridge.commands.checks import Check
-from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
-from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.accuracy import LEAVES_LEGS
 from stopgo.mission.mavlink.autopilots.kind import Autopilot, ParameterRule, why_no_rover
 from stopgo.mission.mavlink.enums import MessageId

@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
 from stopgo.bridge.mavlink.auto.logbook import forget, logbook, remember
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
-from stopgo.bridge.mavlink.line.origin import check_origin
-from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import read_line
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import (
     NOTHING_SENT,
     Uploaded,
-    check_standing,
+    check_mission_idle,
     clear,
     if_stopped,
     upload,
 )
 from stopgo.bridge.mavlink.transfer.upload_recovery import own_items
+from stopgo.bridge.mavlink.vehicle_link.origin import check_origin
+from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 from stopgo.mission.console.table import table
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
@@ -111,7 +111,7 @@ def push_mission(
         if not consent.while_running:
             with logbook(url, peer.who.system, state) as book:
                 check_run_over(peer, url, book, "a push")
-        check_standing(peer, consent.while_running)
+        check_mission_idle(peer, consent.while_running)
         site = sent.origin
         with if_stopped(say, lambda: NOTHING_SENT):
             origin = None if consent.any_origin else check_origin(peer, site, set_it=consent.set_origin)
@@ -119,7 +119,7 @@ def push_mission(
         if deviation:
             say(deviation)
         with Bar("pushing", ITEMS) as bar:
-            done = upload(peer, sent, while_running=consent.while_running, progress=bar.show, tell=say)
+            done = upload(peer, sent, while_running=consent.while_running, progress=bar.show, report=say)
         _store_sent(url, peer, mission, sent, state, done)
         for note in sent.notes:
             say(f"note: {note}")
@@ -151,7 +151,7 @@ def clear_mission(link: VehicleLink, *, state: Path | None, while_running: bool,
     with _peer(link) as (url, peer), logbook(url, peer.who.system, state) as book:
         if not while_running:
             check_run_over(peer, url, book, "to clear it")
-        had = clear(peer, while_running=while_running, tell=say)
+        had = clear(peer, while_running=while_running, report=say)
         forget(book)
     if as_json:
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot.name, "had": had})
@@ -181,7 +181,7 @@ def _peer(link: VehicleLink) -> Iterator[tuple[Url, Peer]]:
     """Connect to the vehicle."""
     if link.autopilot is not None:
         _choice("--autopilot", link.autopilot, tuple(AUTOPILOTS))
-    url, key = read_line(link.url, link.signing_key, insecure=link.insecure)
+    url, key = read_link(link.url, link.signing_key, insecure=link.insecure)
     with reached(url, vehicle=link.vehicle, signing_key=key, timeout_s=link.timeout_s) as peer:
         peer.autopilot = autopilot_named(link.autopilot) if link.autopilot else peer.autopilot
         yield url, peer

@@ -1,6 +1,6 @@
-"""MAVLink, by what is done over it.
+"""MAVLink, by purpose.
 
-`line` reaches a vehicle; `transfer` puts a mission onto it; `auto` follows and orders the autopilot that runs
-it; `driving` drives an autopilot as a robot's base; `tunnel` carries frames elsewhere; `simulated` is a
-vehicle that exists only as numbers.
+`vehicle_link` connects to a vehicle; `transfer` uploads a mission to it; `auto` follows and commands an
+autopilot that runs the mission by itself; `driving` drives an autopilot as a robot's base; `tunnel` carries
+frames elsewhere; `simulated` is a simulated vehicle.
 """

@@ -7,12 +7,12 @@ import socket
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import Wire, wire
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import Wire, wire
 from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.simulated.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
@@ -65,7 +65,9 @@ def test_a_vehicle_on_the_wire_answers_after_every_burst_of_hostile_datagrams(pr
         1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0
     )
     with (
-        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile], origin=ORIGIN)) as stopped,
+        vehicle_on(
+            Url("udpin", "127.0.0.1", port), VehicleSetup(PROFILES[profile], origin=ORIGIN)
+        ) as stopped,
         wire(Url("udpout", "127.0.0.1", port)) as station,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
     ):
@@ -82,7 +84,7 @@ def test_a_vehicle_on_a_stream_answers_whoever_else_talks_nonsense() -> None:
         1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0
     )
     with (
-        vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"], origin=ORIGIN)),
+        vehicle_on(Url("tcpin", "127.0.0.1", port), VehicleSetup(PROFILES["strict"], origin=ORIGIN)),
         wire(Url("tcp", "127.0.0.1", port)) as station,
     ):
         for _ in range(FRAMES // BURST):
@@ -105,7 +107,7 @@ def answered(station: Wire, message: Message) -> bool:
 def test_a_signing_vehicle_does_nothing_that_a_stranger_says() -> None:
     hostile, port, key = Hostile(3), free_port(), bytes(32)
     with (
-        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES["strict"]), signing_key=key),
+        vehicle_on(Url("udpin", "127.0.0.1", port), VehicleSetup(PROFILES["strict"]), signing_key=key),
         wire(Url("udpout", "127.0.0.1", port), signing_key=key) as station,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
         station.waiting("HEARTBEAT", "MISSION_CURRENT") as waiting,

@@ -1,1 +1,1 @@
-"""A run that an autopilot does by itself in AUTO: followed and ordered in a robot's words."""
+"""A run that an autopilot does by itself in AUTO: followed and commanded as a robot's run."""

@@ -1,6 +1,6 @@
 """A run that an autopilot drives by itself in AUTO, for an agent to serve.
 
-What the vehicle tells moves the run on in the logbook; orders are done by its autopilot.
+The vehicle's telemetry moves the run on in the logbook; its autopilot carries out the commands.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
 from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.wire import MessageQueue
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
 from stopgo.bridge.robot.runner import Position
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import RobotUnreachable
@@ -31,7 +31,7 @@ ASK_AGAIN_S = 2.0
 
 
 class Telemetry(MessageQueue):
-    """What a vehicle tells of a run; of its scans a scanner may tell that is a component of its own."""
+    """Telemetry of a vehicle's run; its scanner may be a component of its own and report the scans."""
 
     def wants(self, message: Message) -> bool:
         assert self.of is not None
@@ -40,7 +40,7 @@ class Telemetry(MessageQueue):
 
 
 class AutoRunner:
-    """The run of one vehicle's mission; `board` is cut while the vehicle is silent."""
+    """The run of one vehicle's mission; `board` is cut while no data come from the vehicle."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class AutoRunner:
         self._orders = VehicleOrders(book, peer, self._observer, self._commands, wall, consent)
         self._follower = AutoFollower(book, peer, self._observer, self._commands, looks_only=looks_only)
         self.works: tuple[Callable[[], None], ...] = (self._look, self._act)
-        self._told_ns = 0
+        self._reported_ns = 0
         self._closing = threading.Event()
         self._observer.take(peer.heartbeat, book.listed, book.clock.now_ns())
 
@@ -71,57 +71,56 @@ class AutoRunner:
         return self._book.boot_id
 
     def snapshot(self) -> tuple[Run, Mission | None]:
-        """The run as seen, if this process only looks; else as stored, by whichever process."""
+        """The run as seen if this process only looks; else as stored by any process."""
         listed, run = self._book.listed, self._follower.run if self._looks_only else self._book.run
         return run_on_vehicle(run, self._observer.items), None if listed is None else listed.mission
 
     def position(self) -> Position | None:
         fix = self._observer.fix
-        if fix is None or fix.ns <= self._told_ns:
+        if fix is None or fix.ns <= self._reported_ns:
             return None
-        self._told_ns = fix.ns
+        self._reported_ns = fix.ns
         return Position(fix.pose, fix.speed, fix.ns)
 
     def battery(self) -> float:
         return self._observer.battery
 
     def execute(self, order: Order) -> Answer:
-        """Raises `OutcomeUnknown` if the vehicle was told and does not show what it does."""
+        """Carry out a command; raises `OutcomeUnknown` if the vehicle does not show its effect."""
         answer = self._orders.execute(order)
         self._follower.run = self._book.run
         self.changed()
         return answer
 
     def on_link_silence(self, silent_s: float) -> None:
-        """The vehicle goes on without a station, as its own failsafes say."""
+        """Do nothing: the vehicle goes on without a station, by its own failsafes."""
 
     def close(self) -> None:
         self._follower.close()
 
     def await_news(self, timeout_s: float, *, compares: bool = False) -> None:
-        """Wait until it is known what the vehicle does; where it stands, as long as that may take.
+        """Wait until the vehicle has reported its state and, if it does in time, its position.
 
         Raises
         ------
         RobotUnreachable
-            If it does not tell.
+            If it does not report its state.
         """
         with self._commands.news:
             listed = self._book.listed
             self._commands.news.wait_for(lambda: self._observer.complete(listed), timeout_s)
         if self._observer.sequence is None and self._book.listed is not None:
             raise RobotUnreachable(
-                f"{self._peer} does not tell which item it works on (MISSION_CURRENT) within {timeout_s:g} s;"
-                " nothing was sent"
+                f"{self._peer}: no current item (MISSION_CURRENT) within {timeout_s:g} s; nothing was sent"
             )
         if compares:
             self._follower.compare()
-        if not self._follower.run.over:  # what was missed: the scan that was made last
+        if not self._follower.run.over:  # its last report may have been missed
             self._peer.ask(MessageId.CAMERA_IMAGE_CAPTURED)
         self._follower.begin()
 
     def _act(self) -> None:
-        """What the end of a run wants of the vehicle is still told, and seen."""
+        """Send pending commands, also the one that the end of a run requires."""
         try:
             self._follower.act()
         finally:
@@ -139,7 +138,7 @@ class AutoRunner:
 
     def _take_next(self, waiting: MessageQueue) -> None:
         message = waiting.get(TICK_S)
-        self._board.cut = is_lost(self._peer.silent_s)  # then it is not answered for
+        self._board.cut = is_lost(self._peer.silent_s)  # then nothing answers for it
         if message is None:
             return
         with self._commands.news:

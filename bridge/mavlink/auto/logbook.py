@@ -1,8 +1,8 @@
-"""What a vehicle cannot remember, in a folder of the station: the mission it was sent, and what became of it.
+"""Logbook of a vehicle, in a folder of the station: the mission that it was sent, and its run.
 
-Every process that talks to the vehicle opens the same folder, one after another or at the same time. What a
-process sees moves the run on only from where the journal says that it is: so two that see the same tell it
-once, and none goes back.
+Every process that communicates with the vehicle opens the same folder, one after another or at the same time.
+A process moves the run on only from the state in the journal. So two that see the same thing store it once,
+and no run goes back.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import msgspec
 
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.journal import Journal, shared_journal
 from stopgo.mission.document import Mission
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
@@ -32,16 +32,16 @@ from stopgo.mission.run.events import Aborted
 from stopgo.mission.run.states import Change, Run
 
 REBOOT_NS = 5 * 10**9
-"""A vehicle whose clock began so much later than it was known to was started anew."""
+"""Shift of the begin of a vehicle's clock that means a restart."""
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True):
-    """The list by which the vehicle was sent its mission."""
+    """The mission that was sent to the vehicle, and the list of items that carried it."""
 
     mission_id: str
     revision: int
     sha256: str
-    """Of the items."""
+    """Digest of the items."""
 
 
 class PackedItems(msgspec.Struct, frozen=True):
@@ -51,26 +51,26 @@ class PackedItems(msgspec.Struct, frozen=True):
 
 
 class Boot(msgspec.Struct, frozen=True, kw_only=True):
-    """Since when the vehicle is on."""
+    """The vehicle's last boot."""
 
     boot_id: str
     began_ns: int
-    """At the latest, on the station's clock."""
+    """Its latest possible time, by the station's clock."""
 
 
 class Ordered(msgspec.Struct, frozen=True, kw_only=True):
-    """An order that a process is carrying out: what the vehicle does meanwhile is not somebody else's."""
+    """A command that a process is carrying out: its effects are not changes by somebody else."""
 
     verb: str
     by: str
     mode: str
-    """The one the vehicle is to end in."""
+    """The mode that the command leads to."""
     until_ns: int
-    """Then nobody is carrying it out any more."""
+    """Time after which no process is carrying it out any more."""
 
 
 class PendingCommand(msgspec.Struct, frozen=True, kw_only=True):
-    """What the vehicle must be told because of what the run has come to."""
+    """A command that the vehicle must get because of the run's progress."""
 
     command: Literal["hold", "jump"]
     place: int
@@ -78,7 +78,7 @@ class PendingCommand(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Used(msgspec.Struct, frozen=True, kw_only=True):
-    """The scan that was taken last; before it, the vehicle's time when the run began."""
+    """The last scan that was used; before the first one, the vehicle's time when the run began."""
 
     boot_id: str
     index: int
@@ -90,14 +90,14 @@ class Moment(msgspec.Struct, frozen=True):
 
 
 class Logbook:
-    """One vehicle's run, as the station's journal has it."""
+    """One vehicle's run in the station's journal."""
 
     def __init__(self, journal: Journal, robot: str, clock: Clock) -> None:
         self.journal = journal
         self.robot = robot
         self.clock = clock
         self.boot_ms = 0
-        """The vehicle's time since it was started, as last told."""
+        """The vehicle's time since its start, as last reported."""
         self._listed: tuple[Sent, ListedMission] | None = None
 
     @property
@@ -106,15 +106,15 @@ class Logbook:
 
     @property
     def listed(self) -> ListedMission | None:
-        """The mission that was sent last, and how; the same object until another was."""
+        """The mission that was sent last, with its items; the same object until another was sent."""
         sent = self.journal.fact("sent", Sent)
         if sent is None:
             return None
         if self._listed is None or self._listed[0] != sent:
-            self._listed = (sent, self._read_course(sent))
+            self._listed = (sent, self._read_listed(sent))
         return self._listed[1]
 
-    def _read_course(self, sent: Sent) -> ListedMission:
+    def _read_listed(self, sent: Sent) -> ListedMission:
         stored = self.journal.mission(sent.mission_id, sent.revision)
         items = self.journal.fact("items", PackedItems)
         assert stored is not None and items is not None
@@ -127,24 +127,24 @@ class Logbook:
         return boot.boot_id if boot else "unknown"
 
     def booted(self, began_ns: int, *, went_back: bool = False) -> bool:
-        """Told when the vehicle's clock began: whether it was started anew since anybody last looked.
+        """Note the begin of the vehicle's clock; true if the vehicle was restarted since the last look.
 
-        A clock that was seen to go back is believed sooner.
+        A clock that went back needs a smaller shift.
         """
         boot, slack_ns = self.journal.fact("boot", Boot), BACK_MS * 10**6 if went_back else REBOOT_NS
         if boot is not None and boot.began_ns <= began_ns <= boot.began_ns + slack_ns:
             return False
         with self.journal.transaction():
             boot = self.journal.fact("boot", Boot)
-            anew = boot is None or began_ns > boot.began_ns + slack_ns
-            boot_id = uuid.uuid4().hex[:12] if boot is None or anew else boot.boot_id
+            restarted = boot is None or began_ns > boot.began_ns + slack_ns
+            boot_id = uuid.uuid4().hex[:12] if boot is None or restarted else boot.boot_id
             self.journal.store_fact("boot", Boot(boot_id=boot_id, began_ns=began_ns))
-        return anew and boot is not None
+        return restarted and boot is not None
 
     def move(self, moved: Callable[[Run], tuple[Change, ...]], pending: PendingAfter | None = None) -> Run:
-        """Store all that has happened to the run; `moved` says what, from the run as it is stored.
+        """Store the changes of the run; `moved` computes them from the stored run.
 
-        `pending` tells what each change wants of the vehicle; it is stored with it.
+        `pending` computes the command that a change requires of the vehicle; it is stored with the change.
         """
         if not moved(self.run):
             return self.run
@@ -168,23 +168,23 @@ class Logbook:
 
     @property
     def used(self) -> tuple[int, int]:
-        """Number and time of the scan that was taken last; none of this boot's if it was before."""
+        """Number and time of the last scan that was used, if that was in this boot; else -1, -1."""
         used = self.journal.fact("used", Used)
         return (used.index, used.boot_ms) if used and used.boot_id == self.boot_id else (-1, -1)
 
     def use(self, index: int, boot_ms: int) -> None:
-        """That scan, or what was before that time, counts no more."""
+        """Count that scan, or all before that time, no more."""
         self.journal.store_fact("used", Used(boot_id=self.boot_id, index=index, boot_ms=boot_ms))
 
     @property
     def changed_ns(self) -> int:
-        """When the run's state last changed."""
+        """Time of the last change of the run's state."""
         moment = self.journal.fact("changed", Moment)
         return moment.at_ns if moment else 0
 
     @property
     def ordered(self) -> Ordered | None:
-        """The order that is being carried out, or was the last."""
+        """The command that is being carried out, or was the last."""
         return self.journal.fact("ordered", Ordered)
 
     @property
@@ -192,7 +192,7 @@ class Logbook:
         return self.journal.fact("pending", PendingCommand)
 
     def clear_pending(self, pending: PendingCommand) -> None:
-        """The vehicle was told; unless something else is pending already."""
+        """Forget a command that was carried out, unless another one is pending already."""
         with self.journal.transaction():
             if self.pending == pending:
                 self.journal.forget_fact("pending")
@@ -202,26 +202,26 @@ PendingAfter = Callable[[Run, Run], PendingCommand | None]
 
 
 def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
-    """The vehicle holds this mission now, as this list; a run of another, or of this, is over with it."""
+    """Store that the vehicle holds this mission as this list; a run that is not over ends."""
     document = msgspec.json.encode(mission)
     manifest = Manifest(
         mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
         sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
     )  # fmt: skip
     packed = msgspec.msgpack.encode(sent)
-    told = Sent(mission_id=mission.id, revision=mission.revision, sha256=hashlib.sha256(packed).hexdigest())
+    record = Sent(mission_id=mission.id, revision=mission.revision, sha256=hashlib.sha256(packed).hexdigest())
     listed_mission(mission, sent)
     with book.journal.transaction():
         book.journal.store_mission(manifest, document)
         book.move(lambda run: () if run.over else (_replaced(run, "a mission was pushed to the vehicle"),))
         book.journal.store_fact("run", runs.installed(book.run, mission))
-        book.journal.store_fact("sent", told)
+        book.journal.store_fact("sent", record)
         book.journal.store_fact("items", PackedItems(packed))
         book.journal.forget_fact("pending")
 
 
 def forget(book: Logbook) -> None:
-    """The vehicle holds no mission any more; a run is over with it."""
+    """Store that the vehicle holds no mission any more; a run that is not over ends."""
     with book.journal.transaction():
         book.move(lambda run: () if run.over else (_replaced(run, "the vehicle's mission was cleared"),))
         book.journal.store_fact("run", Run())
@@ -250,11 +250,11 @@ def logbook(url: Url, vehicle: int, state: Path | None = None) -> Iterator[Logbo
 
 
 def name_of(vehicle: int) -> str:
-    """What the robot with this system id is called."""
+    """Name of the robot with this system id."""
     return f"mavlink-{vehicle}"
 
 
 def usual_folder(url: Url, vehicle: int) -> Path:
-    """`$XDG_STATE_HOME/stopgo/…`, named by URL and vehicle."""
+    """Folder `$XDG_STATE_HOME/stopgo/…`, named by URL and vehicle."""
     home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     return Path(home) / "stopgo" / f"{re.sub(r'[^A-Za-z0-9.-]+', '-', str(url))}-vehicle-{vehicle}"

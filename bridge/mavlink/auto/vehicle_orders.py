@@ -1,7 +1,7 @@
-"""What becomes of an order to a vehicle: decided as a robot decides, done by its autopilot, and then stored.
+"""Commands to a vehicle: decided as a robot decides, carried out by its autopilot, and then stored.
 
-The journal never says what the vehicle has not shown. While an order is carried out the journal says so, and
-whoever watches does not take for somebody else's what the vehicle does meanwhile.
+The journal never contains an effect that the vehicle has not shown. While a command is carried out the
+journal shows that, so that a process that watches does not take its effects for changes by somebody else.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import msgspec
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
-from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
 from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
 from stopgo.mission.mavlink.following import steps as progress
@@ -34,31 +34,31 @@ from stopgo.mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refuse
 from stopgo.mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
-"""One step of an order takes no longer; then what the vehicle does counts as somebody else's again."""
+"""Longest time of one step of a command; after it, changes count as made by somebody else again."""
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
 UNREMEMBERED = (
-    "nothing is remembered of a mission pushed to this vehicle; push one by this very URL,"
+    "no record of a mission pushed to this vehicle; push one by the same URL,"
     " or name the folder of that push with --state"
 )
-CLEARED = "the vehicle says that it holds no mission: somebody has cleared it; push it again"
+CLEARED = "the vehicle reports no mission: somebody has cleared it; push it again"
 HOMEWARD = (
-    "an autopilot in AUTO drives its list forward only, and nobody planned a way back from here; the"
-    " return of a mission is driven at its end. Run by stopgo robot --controller mavlink:URL it can"
+    "an autopilot in AUTO drives its list forward only, and no path back from here is planned; it drives the"
+    " mission's return at its end. With stopgo robot --controller mavlink:URL it can drive home"
 )
 
 
 @dataclass(frozen=True)
 class Consent:
-    """What the order may do, or overlook, only if it says so."""
+    """Actions and exceptions that a command must allow explicitly."""
 
     arm: bool = False
     disarm: bool = False
     any_origin: bool = False
-    """The vehicle finds its place by satellites, whatever its metres count from."""
+    """The vehicle finds its position by satellites, whatever its origin."""
 
 
 class VehicleOrders:
-    """Carries out orders to one vehicle."""
+    """Carries out commands to one vehicle."""
 
     def __init__(
         self,
@@ -77,21 +77,21 @@ class VehicleOrders:
         self._consent = consent
 
     def execute(self, order: Order) -> Answer:
-        """Carry out an order once, and remember what was answered.
+        """Carry out a command once, and store the answer.
 
         Raises
         ------
         OutcomeUnknown
-            If the vehicle was told and does not show what it does; nothing is stored then.
+            If the command was sent and the vehicle does not show its effect; nothing is stored then.
         """
         before = answered(self._book.journal, order, self._book.run)
         if before is not None:
             return before
-        decision = self._in_the_way(order) or self._decided(order)
+        decision = self._conflict(order) or self._decided(order)
         if isinstance(decision, Refused):
             return self._refused(order, decision)
         listed = self._book.listed
-        assert listed is not None  # without a mission nothing is decided
+        assert listed is not None  # `_decided` refuses everything without a mission
         with self._ordering(order):
             try:
                 change = VERBS[order.verb](self, order, listed, decision)
@@ -100,7 +100,7 @@ class VehicleOrders:
             return self._stored(order, change, decision.lease)
 
     def _refused(self, order: Order, refused: Refused) -> Answer:
-        """A pause that the run has no use for still stops a vehicle that drives, whoever started it."""
+        """Answer a refused command; a pause still stops a vehicle that drives, whoever started it."""
         drives = self._observer.mode == AUTO and self._observer.armed
         if order.verb != "pause" or not drives or refused.reason not in ("wrong_state", "no_mission"):
             return self._stored(order, refused, None)
@@ -111,26 +111,26 @@ class VehicleOrders:
                 return self._stored(order, denied.refused, None)
             return self._stored(order, Change(self._book.run), None)
 
-    def _in_the_way(self, order: Order) -> Refused | None:
-        """Only one order at a time, but for those that stop."""
+    def _conflict(self, order: Order) -> Refused | None:
+        """Refuse a second command at a time, except those that stop."""
         other = self._book.ordered
         if other is None or order.verb in FREE_VERBS or other.until_ns <= self._book.clock.now_ns():
             return None
         return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
 
-    def _elsewhere(self, listed: ListedMission) -> Refused | None:
-        """Where the vehicle stands means something only if it counts from the mission's origin."""
+    def _wrong_origin(self, listed: ListedMission) -> Refused | None:
+        """Refuse a vehicle whose local frame has not the mission's origin: its position means nothing."""
         if self._consent.any_origin:
             return None
         origin = self._peer.origin()
         if origin is None:
             return Refused(
                 "wrong_origin",
-                "the vehicle has no origin (GPS_GLOBAL_ORIGIN), so its metres count from nowhere, or does not"
-                " tell it; set it to the mission's (stopgo push --set-origin)",
+                "the vehicle has no origin (GPS_GLOBAL_ORIGIN), or reports none; set it to the mission's"
+                " (stopgo push --set-origin)",
             )
         wrong = apart(listed.sent.origin, origin)
-        satellites = "; or add --any-origin, if it finds its place by satellites"
+        satellites = "; or add --any-origin, if it finds its position by satellites"
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 
     def _decided(self, order: Order) -> Decision | Refused:
@@ -139,13 +139,13 @@ class VehicleOrders:
             return Refused("no_mission", UNREMEMBERED)
         if order.verb in DRIVING and self._observer.items == 0:
             return Refused("no_mission", CLEARED)
-        elsewhere = self._elsewhere(listed) if order.verb in DRIVING else None
-        if elsewhere is not None:
-            return elsewhere
+        wrong_origin = self._wrong_origin(listed) if order.verb in DRIVING else None
+        if wrong_origin is not None:
+            return wrong_origin
         if here is None and order.verb not in FREE_VERBS:
-            return Refused("no_position", "the vehicle does not tell where it is; does its navigation run?")
+            return Refused("no_position", "the vehicle reports no position; does its navigation run?")
         if here is not None and order.verb != "start":
-            here = on_way(run, listed, here)
+            here = on_path(run, listed, here)
         situation = situation_of(
             self._book.journal, listed.mission, run=run, pose=here or NOWHERE,
             now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
@@ -153,7 +153,7 @@ class VehicleOrders:
         )  # fmt: skip
         return decide(order, situation)
 
-    # What each verb does
+    # One function per verb
 
     def _start(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         run = decision.change.run
@@ -167,23 +167,23 @@ class VehicleOrders:
         run = self._book.run
         observed = self._observe(run, listed)
         self._ready(listed)
-        lost = run.stop_state == "SCANNING" and not self._keeps_scan(run, listed, observed)
+        lost = run.stop_state == "SCANNING" and not self._scan_goes_on(run, listed, observed)
         run = runs.changed(run, stop_state="WAITING") if lost else run
         self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
     def _resumed(self, run: Run, order: Order, decision: Decision) -> Change:
-        """The run goes on, under whoever commands it now."""
+        """Let the run go on, under its present commander."""
         before = self._book.journal.fact("lease", Lease)
         change = runs.resumed(run, order.commander)
         return Change(change.run, (*handed_over(before, decision.lease), *change.events))
 
-    def _keeps_scan(self, run: Run, listed: ListedMission, observed: Observation) -> bool:
+    def _scan_goes_on(self, run: Run, listed: ListedMission, observed: Observation) -> bool:
         items = listed.stops[run.at]
         return items.at < observed.place < items.after
 
     def _retry(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
-        """Once more to the stop; the vehicle stands on the way to it, or beside it."""
+        """Drive to the stop again; the vehicle is on the path to it, or next to it."""
         run = runs.changed(self._book.run, stop_state="WAITING", approaches=0)
         observed = self._observe(run, listed)
         self._ready(listed)
@@ -195,16 +195,16 @@ class VehicleOrders:
         return runs.paused(self._book.run, f"pause by {order.commander}")
 
     def _skip(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
-        """The way to the stop is still driven; the vehicle is led past its waits once it is there."""
+        """Skip the stop: the vehicle still drives the path to it, and passes its waits once it is there."""
         before, after = self._book.run, decision.change.run
         observed = self._observe(after, listed)
         beyond = progress.after_skipped(after, listed, observed)
         if after.over:
             self._commands.hold()
         elif before.state == "HELD":
-            elsewhere = self._elsewhere(listed)
-            if elsewhere is not None:
-                raise Denied(elsewhere)
+            wrong_origin = self._wrong_origin(listed)
+            if wrong_origin is not None:
+                raise Denied(wrong_origin)
             self._ready(listed)
             self._go(listed, resume_place(after, listed, observed, self._here()), observed)
         elif before.state == "RUNNING" and beyond is not None:
@@ -220,12 +220,12 @@ class VehicleOrders:
     def _home(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         raise Denied(Refused("unsupported", HOMEWARD))
 
-    # What several of them need
+    # Shared by several verbs
 
     def _observe(self, run: Run, listed: ListedMission) -> Observation:
         observed = self._observer.observe(run, listed)
         if observed is None:
-            raise Denied(Refused("no_position", "the vehicle does not tell which item it works on"))
+            raise Denied(Refused("no_position", "the vehicle does not report its current item"))
         return observed
 
     @property
@@ -236,9 +236,9 @@ class VehicleOrders:
         return self._pose or NOWHERE
 
     def _ready(self, listed: ListedMission) -> None:
-        """Whether the vehicle may drive this mission: it holds it, and is armed.
+        """Make the vehicle ready to drive: check that it holds the mission, put it on hold, and arm it.
 
-        In AUTO it would drive off as soon as it is armed, and a mode that is on is not begun anew.
+        In AUTO it would drive off as soon as it is armed, and a mode that is on does not begin again.
         """
         unfit = why_no_rover(self._peer.heartbeat.type)
         if unfit:
@@ -264,11 +264,11 @@ class VehicleOrders:
             )
 
     def _go(self, listed: ListedMission, place: int, observed: Observation | None) -> None:
-        """AUTO, from an item on; where that leaves the first ones out, at the speed that they would set."""
-        anew = observed is None or observed.place >= listed.end
-        jumps = anew or observed is None or place != observed.place
+        """Change to AUTO from an item on; if that skips the first ones, set the speed that they contain."""
+        restarts = observed is None or observed.place >= listed.end
+        jumps = restarts or observed is None or place != observed.place
         if jumps:
-            self._commands.jump(listed.sequence(place), anew=anew)
+            self._commands.jump(listed.sequence(place), reset=restarts)
         self._commands.auto()
         if jumps and place > 0 and listed.speed is not None:
             self._commands.speed(listed.speed)
@@ -281,7 +281,7 @@ class VehicleOrders:
         return _Ordering(self._book, self._commands, ordered)
 
     def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None) -> Answer:
-        """The answer, stored together with what the order has changed."""
+        """Store the answer together with the changes by the command."""
         refused = outcome if isinstance(outcome, Refused) else None
         journal = self._book.journal
         with journal.transaction():
@@ -296,7 +296,7 @@ class VehicleOrders:
 
 
 class _Ordering:
-    """Shows in the journal that an order is being carried out; one whose outcome is unknown stays there."""
+    """Shows in the journal that a command is being carried out; one with unknown outcome stays there."""
 
     def __init__(self, book: Logbook, commands: ConfirmedCommands, ordered: Ordered) -> None:
         self._book = book
@@ -304,7 +304,7 @@ class _Ordering:
         self._ordered = ordered
 
     def __enter__(self) -> None:
-        self._commands.working = lambda: self._last(ORDERING_NS)
+        self._commands.working = lambda: self._extend(ORDERING_NS)
         self._commands.working()
 
     def __exit__(self, kind: object, *exception: object) -> None:
@@ -312,10 +312,10 @@ class _Ordering:
         if kind is None:
             self._book.journal.forget_fact("ordered")
         else:
-            self._last(0)
+            self._extend(0)
 
-    def _last(self, ns: int) -> None:
-        """It is being carried out for so much longer."""
+    def _extend(self, ns: int) -> None:
+        """Show that it is being carried out for this time from now."""
         until_ns = self._book.clock.now_ns() + ns
         self._book.journal.store_fact("ordered", msgspec.structs.replace(self._ordered, until_ns=until_ns))
 
@@ -331,8 +331,8 @@ VERBS: dict[str, Callable[[VehicleOrders, Order, ListedMission, Decision], Chang
 }
 
 
-def on_way(run: Run, listed: ListedMission, pose: Pose) -> Pose:
-    """The pose, or the nearest point of the way if that is so near that the vehicle is on it."""
+def on_path(run: Run, listed: ListedMission, pose: Pose) -> Pose:
+    """The pose, or the nearest point of the path if the vehicle is within `ON_LINE_M` of it."""
     near = min(route_lines(run, listed), key=lambda piece: piece.away(pose), default=None)
     if near is None or near.away(pose) > ON_LINE_M:
         return pose

@@ -1,7 +1,7 @@
-"""A MAVLink vehicle as a station sees a robot: an agent in this process serves it, on a link in memory.
+"""A MAVLink vehicle as a robot for a station: an agent in this process serves it, on a link in memory.
 
-`Station`, `follow` and `watch` need not know that there is no robot of stopgo at the other end. While the
-vehicle is silent, nobody answers for it.
+`Station`, `follow` and `watch` need not know that no robot of stopgo is at the other end. While no data come
+from the vehicle, nothing answers for it.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.mavlink.auto.auto_runner import AutoRunner
 from stopgo.bridge.mavlink.auto.logbook import logbook
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
-from stopgo.bridge.mavlink.line.peer import found
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import GROUND_STATION, Who, wire
+from stopgo.bridge.mavlink.vehicle_link.peer import found
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import GROUND_STATION, Who, wire
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.station.station import Station, whoami
 
 COMPONENTS = range(25, 100)
-"""Free for users (MAV_COMP_ID_USER1 to 75): by them a vehicle tells processes of one station apart."""
+"""Free for users (MAV_COMP_ID_USER1 to 75): by them a vehicle distinguishes processes of one station."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a vehicle is spoken to."""
+    """Options for the connection to a vehicle."""
 
     vehicle: int | None = None
     signing_key: bytes | None = None
@@ -39,21 +39,21 @@ class Options:
     commander: str | None = None
     consent: Consent = field(default_factory=Consent)
     looks_only: bool = False
-    """Write nothing down and tell the vehicle nothing."""
+    """Store nothing, and send the vehicle no command."""
     compares: bool = False
-    """Find out first whether the vehicle still holds what it was sent."""
+    """Compare first the vehicle's list with the one that was sent."""
 
 
 @contextmanager
 def connect(url: Url, options: Options) -> Iterator[Station]:
-    """The vehicle at `url`, as a station sees a robot.
+    """The vehicle at `url`, as a robot for a station.
 
     Raises
     ------
     RobotUnreachable
-        If no vehicle is heard, or it does not tell what it does; nothing was sent but questions.
+        If no vehicle is found, or it does not report its state; only queries were sent.
     InputError
-        If several are heard and none was named, or the logbook's folder cannot be used.
+        If several are found and none was named, or the logbook's folder cannot be used.
     """
     me = Who(GROUND_STATION.system, COMPONENTS[os.getpid() % len(COMPONENTS)])
     board, wall = Switchboard(), WallClock()

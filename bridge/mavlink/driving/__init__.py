@@ -1,1 +1,1 @@
-"""An autopilot as the base and scanner of a robot of ours, driven leg by leg by its controller."""
+"""An autopilot as the base and scanner of a robot, driven leg by leg by the robot's controller."""

@@ -1,4 +1,4 @@
-"""An autopilot as what a robot's controller drives."""
+"""An autopilot as the base and scanner that a robot's controller drives."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.mavlink_base import MavlinkBase
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
 from stopgo.bridge.mavlink.driving.onboard_autopilot import on_board
-from stopgo.bridge.mavlink.line.wire import read_line
+from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 from stopgo.bridge.robot.robot_hardware import Body
 from stopgo.mission.document import Mission
 
 
 @dataclass(frozen=True)
 class AutopilotBody:
-    """A rover whose autopilot is on the robot's own wire."""
+    """A rover whose autopilot is on the robot's own link."""
 
     url: str
     arm: bool = False
     trigger: ScanTrigger = "camera"
     signing_key: Path | None = None
     vehicle: int | None = None
-    """Its system id, if several are heard."""
+    """Its system id, if several vehicles are found."""
     insecure: bool = False
     patience_s: float = 30.0
-    """How long to wait for it, and for its position."""
+    """Longest wait for the vehicle, and for its position."""
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:
-        url, key = read_line(self.url, self.signing_key, insecure=self.insecure, option="--controller")
+        url, key = read_link(self.url, self.signing_key, insecure=self.insecure, option="--controller")
         with on_board(url, signing_key=key, vehicle=self.vehicle, timeout_s=self.patience_s) as autopilot:
             base = MavlinkBase(autopilot, clock=clock, arm=self.arm)
             scanner = MavlinkScanner(autopilot, clock=clock, trigger=self.trigger)

@@ -1,7 +1,7 @@
-"""A scanner that a MAVLink vehicle triggers: ordered as a camera or by a script, believed only with its file.
+"""A scanner that a MAVLink vehicle triggers as a camera or by a script; a scan counts only with its file.
 
-A scan is confirmed by CAMERA_IMAGE_CAPTURED (`stopgo.mission.mavlink.captures`). What comes with a number
-that was told before is an older scan's, told again.
+CAMERA_IMAGE_CAPTURED confirms a scan (`stopgo.mission.mavlink.captures`). A message with a number that was
+reported before repeats an older scan's result.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from threading import Event
 from typing import Literal
 
 from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
 from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
-from stopgo.bridge.mavlink.line.messages import request
-from stopgo.bridge.mavlink.line.wire import MessageQueue
+from stopgo.bridge.mavlink.vehicle_link.messages import request
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.file_name import file_name
@@ -30,14 +31,13 @@ ScanTrigger = Literal["camera", "script"]
 TRIGGERS: tuple[ScanTrigger, ...] = ("camera", "script")
 
 LOOK_S = 0.2
-"""How often an interruption is looked for."""
+"""Interval at which an interruption is checked."""
 AGAIN_S = 3.0
-"""How often a result is asked for that may have been lost on the way."""
-ORDER_S = 3.0
+"""Interval at which a result is requested again: it may have been lost on the link."""
 COUNT_S = 1.0
-"""How long the camera may take to say what it has taken."""
+"""Time that the camera may take to report its number of pictures."""
 BUSY_S = 1.0
-"""Between two tries of a trigger, while an older scan is under way."""
+"""Interval between two tries of a trigger, while an older scan is under way."""
 
 
 class MavlinkScanner:
@@ -51,72 +51,74 @@ class MavlinkScanner:
         self._clock = clock
         self._trigger = trigger
         self._numbers: dict[str, int] = {}
-        self._told: set[Picture] = set()
-        """Pictures that were told of; each counts once, however often it is told."""
-        self._last = 0
-        """The capture number that was ordered last."""
+        self._reported: set[Picture] = set()
+        """Pictures that were reported; each counts once, however often it is reported."""
+        self._last_number = 0
+        """The capture number of the last trigger."""
 
     def take(self, mission: Mission) -> None:
-        """Trigger with the numbers that this mission's stops have."""
+        """Trigger with the numbers of this mission's stops."""
         ids = (file_name(stop.id) for stop in mission.stops)
         self._numbers = dict(zip(ids, numbers_of(mission), strict=True))
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         until_s = self._now_s() + scan.timeout_s
         with self._autopilot.peer.wire.waiting("CAMERA_IMAGE_CAPTURED") as waiting:
-            taken = self._pictures_taken(waiting)
-            order = self._order(label, scan, taken)
-            refused = self._ordered(order, waiting, until_s, interrupt)
+            next_index = self._next_index(waiting)
+            command = self._trigger_command(label, scan, next_index)
+            refused = self._send_trigger(command, waiting, until_s, interrupt)
             if refused:
                 return ScanFailed(reason=refused)
-            captured = self._captured(waiting, taken, until_s, interrupt)
+            captured = self._await_picture(waiting, next_index, until_s, interrupt)
         if captured is not None:
             return result_of(captured)
         if interrupt.is_set():
             self._break_off()
             return ScanFailed(reason="interrupted")
-        lost = self._autopilot.out_of_reach()
+        lost = self._autopilot.telemetry.why_unknown()
         return ScanFailed(reason=f"no result within {scan.timeout_s:g} s" + (f": {lost}" if lost else ""))
 
     def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
-        """Nobody knows: a camera's last picture does not say which of two triggers it followed."""
+        """Always unknown: a camera's last picture does not show which of two triggers it followed."""
         return None
 
-    def _pictures_taken(self, waiting: MessageQueue) -> int | None:
-        """The least number of the next picture, if the camera tells; all that was told so far is old."""
-        status = self._asked(MessageId.CAMERA_CAPTURE_STATUS)
+    def _next_index(self, waiting: MessageQueue) -> int | None:
+        """Lowest index of the next picture, if the camera reports it; all reports until now are old."""
+        status = self._ask(MessageId.CAMERA_CAPTURE_STATUS)
         if status is not None:
             return int(status.image_count)
-        last = self._asked(MessageId.CAMERA_IMAGE_CAPTURED)
-        self._forget(waiting)
+        last = self._ask(MessageId.CAMERA_IMAGE_CAPTURED)
+        self._discard_old(waiting)
         return None if last is None else int(last.image_index) + 1
 
-    def _asked(self, number: int) -> Message | None:
+    def _ask(self, number: int) -> Message | None:
         try:
             return self._autopilot.peer.ask(number, patience_s=COUNT_S)
         except RobotUnreachable:
             return None
 
-    def _order(self, label: str, scan: Scan, taken: int | None) -> TriggerCommand:
+    def _trigger_command(self, label: str, scan: Scan, next_index: int | None) -> TriggerCommand:
         if self._trigger == "script":
             number = self._numbers.get(stop_of(label), 0)
             return Command.DO_SEND_SCRIPT_MESSAGE, (
                 float(SCAN_MESSAGE), float(number), scan.duration_s, scan.timeout_s,
             )  # fmt: skip
         # All cameras, one picture. The interval means nothing for one, so it can carry how long a scan takes;
-        # the number grows with every order, so that one which is repeated does not take two.
-        self._last = max(self._last, taken or 0) + 1
-        return Command.IMAGE_START_CAPTURE, (0.0, scan.duration_s, 1.0, float(self._last))
+        # the number grows with every trigger, so that a repeated one does not take two.
+        self._last_number = max(self._last_number, next_index or 0) + 1
+        return Command.IMAGE_START_CAPTURE, (0.0, scan.duration_s, 1.0, float(self._last_number))
 
-    def _ordered(self, order: TriggerCommand, waiting: MessageQueue, until_s: float, interrupt: Event) -> str:
-        """Why the vehicle does not scan; empty if it does, or may: then the result will tell.
+    def _send_trigger(
+        self, command: TriggerCommand, waiting: MessageQueue, until_s: float, interrupt: Event
+    ) -> str:
+        """Trigger a scan; return why the vehicle does not scan, empty if it does or may.
 
-        One that is busy is busy with a scan that nobody waits for any more, and is waited for.
+        A busy scanner works on a scan that nobody waits for any more; the trigger waits for its end.
         """
-        command, params = order
+        number, params = command
         while True:
             try:
-                ack = self._autopilot.peer.command(command, *params, patience_s=ORDER_S)
+                ack = self._autopilot.peer.command(number, *params, patience_s=COMMAND_S)
             except OutcomeUnknown:
                 return ""
             if ack.result != CommandResult.TEMPORARILY_REJECTED:
@@ -125,41 +127,42 @@ class MavlinkScanner:
                 return "the vehicle's scanner is busy"
             if self._clock.wait(BUSY_S, interrupt):
                 return "interrupted"
-            self._forget(waiting)
+            self._discard_old(waiting)
 
-    def _captured(
-        self, waiting: MessageQueue, taken: int | None, until_s: float, interrupt: Event
+    def _await_picture(
+        self, waiting: MessageQueue, next_index: int | None, until_s: float, interrupt: Event
     ) -> Message | None:
-        """The picture that was told of for the first time; `None` if the time is up or it was interrupted."""
+        """The first report of a new picture; `None` if the time is up or the scan was interrupted."""
         asked_s = self._now_s()
         while not interrupt.is_set() and (left := until_s - self._now_s()) > 0:
             message = waiting.get(min(LOOK_S, left))
-            if message is not None and self._is_new(message, taken):
+            if message is not None and self._is_new(message, next_index):
                 return message
             if self._now_s() - asked_s >= AGAIN_S:
                 asked_s = self._now_s()
-                self._ask_for(0 if taken is None else taken)
+                self._request_picture(0 if next_index is None else next_index)
         return None
 
-    def _is_new(self, message: Message, taken: int | None) -> bool:
-        """Whether it is a picture of this vehicle that was not told of before; it is from now on."""
-        if message.get_srcSystem() != self._autopilot.peer.who.system or picture_of(message) in self._told:
+    def _is_new(self, message: Message, next_index: int | None) -> bool:
+        """True at the first report of a picture of this vehicle; the picture counts as reported then."""
+        picture = picture_of(message)
+        if message.get_srcSystem() != self._autopilot.peer.who.system or picture in self._reported:
             return False
-        self._told.add(picture_of(message))
-        return taken is None or message.image_index >= taken
+        self._reported.add(picture)
+        return next_index is None or message.image_index >= next_index
 
-    def _forget(self, waiting: MessageQueue) -> None:
-        """Whatever has been told so far is of older scans."""
+    def _discard_old(self, waiting: MessageQueue) -> None:
+        """Take all reports so far as reports of older scans."""
         while (message := waiting.get(0.0)) is not None:
-            self._told.add(picture_of(message))
+            self._reported.add(picture_of(message))
 
-    def _ask_for(self, index: int) -> None:
+    def _request_picture(self, index: int) -> None:
         peer = self._autopilot.peer
         peer.send(request(peer.who, MessageId.CAMERA_IMAGE_CAPTURED, index))
 
     def _break_off(self) -> None:
-        """Tell the vehicle to stop scanning; whether it does changes nothing here."""
-        self._autopilot.order(Command.IMAGE_STOP_CAPTURE, what="the end of the scan")
+        """Command the vehicle to stop scanning; its answer changes nothing here."""
+        refusal(self._autopilot.peer, Command.IMAGE_STOP_CAPTURE, what="the end of the scan")
 
     def _now_s(self) -> float:
         return self._clock.now_ns() / 1e9

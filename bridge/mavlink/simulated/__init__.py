@@ -1,7 +1,7 @@
-"""A rover that exists only as numbers and speaks MAVLink as a vehicle, by the habits of one autopilot.
+"""A simulated rover that speaks MAVLink as a vehicle, with the protocol behaviour of one autopilot.
 
-`vehicle` holds the parts together: `transfers` is its end of the mission protocol, `vehicle_store` what it
-keeps, `rover` where it stands, `auto_mission` what it does in AUTO, `guided_target` where a station leads it,
-`command_handlers` what it obeys, `vehicle_telemetry` what it tells, `camera` the scanner on it. All speak in
-messages; sockets are known to `vehicle_process` alone.
+`vehicle` joins the parts: `transfers` is its end of the mission protocol, `vehicle_store` its stored state,
+`vehicle_clock` its time, `rover` its pose, `auto_mission` and `auto_reports` its mission in AUTO,
+`guided_target` its target in the guided mode, `command_handlers` its commands, `vehicle_telemetry` its
+reports, `camera` its scanner. All of them handle messages; `vehicle_process` alone handles sockets.
 """

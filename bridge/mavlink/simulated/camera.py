@@ -1,4 +1,4 @@
-"""The scanner as MAVLink has it: a camera that counts its pictures and tells of each, also again."""
+"""The simulated scanner as a MAVLink camera: it counts its pictures and reports each, also again."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from stopgo.mission.mavlink.telemetry import Message
 
 
 class Camera:
-    """One scan at a time, of a rover that should stand still meanwhile.
+    """One scan at a time, of a rover that should be stationary meanwhile.
 
     Parameters
     ----------
     default_s
-        Seconds of a scan whose trigger says none.
+        Seconds of a scan whose trigger gives none.
     """
 
     def __init__(
@@ -27,57 +27,57 @@ class Camera:
         self._store, self._rover, self._default_s = store, rover, default_s
         self._scanner = VehicleScanner(mishaps)
         self.last = 0
-        """The number that the trigger of the newest scan carried."""
-        self.told: dict[int, Message] = {}
-        """What was said of each scan since the boot, by its index."""
+        """Number in the trigger of the newest scan."""
+        self.reports: dict[int, Message] = {}
+        """Report of each scan since the boot, by its index."""
 
     @property
     def due_ns(self) -> int | None:
-        """When the scan under way ends."""
+        """End of the scan under way."""
         return None if self._scanner.scan is None else self._scanner.scan.ends_ns
 
     @property
     def under_way(self) -> int | None:
-        """The number that its trigger carried."""
+        """Number in the trigger of the scan under way."""
         return None if self._scanner.scan is None else self._scanner.scan.number
 
     @property
     def count(self) -> int:
         """Scans that were begun, ever."""
-        return self._store.kept.images
+        return self._store.stored.images
 
     @property
     def newest(self) -> Message | None:
-        """What was said of the scan that ended last."""
-        return next(reversed(self.told.values()), None)
+        """Report of the scan that ended last."""
+        return next(reversed(self.reports.values()), None)
 
     def begin(self, number: int, seconds: float, now_ns: int) -> bool:
-        """Begin a scan; false if one is under way. 0 seconds: not said."""
+        """Begin a scan; false if one is under way. 0 seconds: not given."""
         lasts, pose = seconds if seconds > 0 else self._default_s(), self._rover.at(now_ns)[0]
         if not self._scanner.begin(number, lasts, index=self.count, pose=pose, now_ns=now_ns):
             return False
-        self._store.keep(images=self.count + 1)
+        self._store.update(images=self.count + 1)
         self.last = number
         return True
 
     def end(self, now_ns: int, boot_ms: int) -> tuple[Message, str]:
-        """What is to be said of the scan that is due, and why it failed, if it did."""
+        """Report of the scan that is due, and the reason if it failed."""
         done = self._scanner.end(self._rover.at(now_ns)[0])
-        message = self.told[done.index] = self._message(done, now_ns, boot_ms)
+        message = self.reports[done.index] = self._message(done, now_ns, boot_ms)
         return message, f"Scan {done.number}: {done.why}" if done.why else ""
 
     def stop(self) -> None:
-        """Break the scan off; nothing is said of it."""
+        """Break the scan off without a report."""
         self._scanner.stop()
 
     def reset(self) -> None:
-        """Forget what was told, as a reboot does; not how many there were."""
+        """Forget the reports, as a reboot does, but not their number."""
         self._scanner.stop()
-        self.told.clear()
+        self.reports.clear()
 
     def _message(self, done: ScanEnd, now_ns: int, boot_ms: int) -> Message:
-        """With the place where the autopilot believes it is, as it knows no other."""
-        pose = self._rover.told(now_ns).pose
+        """Report with the estimated position: the autopilot knows no other."""
+        pose = self._rover.estimate(now_ns).pose
         return picture(
             done.index, boot_ms=boot_ms, now_ns=now_ns, place=self._rover.place((pose.x, pose.y)),
             alt_mm=self._rover.alt_mm, heading=pose.heading, file_url=done.file_url,

@@ -1,4 +1,4 @@
-"""What the wheels make of throttle and steering: a differential drive that nothing moves at once."""
+"""Motion of the simulated wheels by throttle and steering: a differential drive with lag."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from stopgo.mission.document import Point
 from stopgo.mission.run.events import Pose
 
 COASTS_M_S = 0.01
-"""Slower than this, wheels that stick stand."""
+"""Speed below which wheels that stick do not move."""
 
 
 class Chassis:
-    """Where it truly is, and how fast; x to the east, y to the north.
+    """True pose and speed; x to the east, y to the north.
 
     The model of ArduPilot's simulator (SIM_Rover, skid steering), with a lag of the turn and wheels that
     stick: the speed tends to throttle times the top speed, the turn rate to steering times the top rate.
@@ -25,21 +25,21 @@ class Chassis:
         self.speed = self.turning = 0.0
         """Metres and radians per second; the latter counter-clockwise."""
         self.wall: tuple[Point, Point] | None = None
-        """A straight that it cannot get over."""
+        """A straight that it cannot cross."""
 
     @property
     def pose(self) -> Pose:
         return Pose(x=self.x, y=self.y, heading=self.heading)
 
     def move(self, throttle: float, steering: float, dt: float) -> None:
-        """A moment; both inputs within ±1, steering to the left positive."""
+        """Move for a moment; both inputs within ±1, steering to the left positive."""
         tuning = self._tuning
         throttle, steering = max(-1.0, min(1.0, throttle)), max(-1.0, min(1.0, steering))
         if abs(self.speed) < COASTS_M_S and abs(throttle) < tuning["SIM_STICTION"]:
             throttle, self.speed = 0.0, 0.0
-        self.speed += (throttle * tuning["SIM_TOP_SPEED"] - self.speed) * _share(dt, tuning["SIM_LAG"])
+        self.speed += (throttle * tuning["SIM_TOP_SPEED"] - self.speed) * _response(dt, tuning["SIM_LAG"])
         top = math.radians(tuning["SIM_TURN_TOP"])
-        self.turning += (steering * top - self.turning) * _share(dt, tuning["SIM_TURN_LAG"])
+        self.turning += (steering * top - self.turning) * _response(dt, tuning["SIM_TURN_LAG"])
         if not tuning.pivots:
             most = abs(self.speed) / tuning["SIM_TURN_RADIUS"]
             self.turning = max(-most, min(most, self.turning))
@@ -52,8 +52,8 @@ class Chassis:
             self.x, self.y = x, y
 
 
-def _share(dt: float, lag_s: float) -> float:
-    """How much of a change comes to pass in `dt`."""
+def _response(dt: float, lag_s: float) -> float:
+    """Fraction of a change that happens within `dt`."""
     return 1.0 if lag_s <= 0 else 1.0 - math.exp(-dt / lag_s)
 
 

@@ -1,4 +1,4 @@
-"""What the vehicle obeys: COMMAND_LONG and COMMAND_INT, and the messages that are orders themselves."""
+"""Commands that the simulated vehicle carries out: COMMAND_LONG, COMMAND_INT and other messages."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated import replies
 from stopgo.bridge.mavlink.simulated import vehicle_telemetry as telemetry
 from stopgo.bridge.mavlink.simulated.rover import FAR_M
 from stopgo.bridge.mavlink.simulated.steering import Course
 from stopgo.bridge.mavlink.simulated.vehicle import Handlers, Vehicle
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Mode, ModeName
@@ -32,16 +32,16 @@ CHANGE_MODE = 1
 
 @dataclass(frozen=True)
 class ReceivedCommand:
-    """A command with its numbers; `x` and `y` are steps of 1e-7 degrees where it has a place."""
+    """A command with its numbers; `x` and `y` are steps of 1e-7 degrees where it has a position."""
 
     command: int
     params: tuple[float, float, float, float]
     x: int
     y: int
     exact: bool
-    """Its place is good to a centimetre: it came in a COMMAND_INT."""
+    """Its position is good to a centimetre: it came in a COMMAND_INT."""
     again: bool
-    """Sent again by a station that has heard no answer."""
+    """Sent again by a station that received no answer."""
 
     def whole(self, index: int, default: int = -1) -> int:
         """A param as a whole number; `default` if it is none."""
@@ -50,7 +50,7 @@ class ReceivedCommand:
 
 
 def handlers(vehicle: Vehicle) -> Handlers:
-    """What to do with each message that is an order."""
+    """Handler of each message that commands the vehicle."""
     return {
         "COMMAND_LONG": lambda who, message: _answer(vehicle, who, _long(message)),
         "COMMAND_INT": lambda who, message: _answer(vehicle, who, _int(message)),
@@ -77,46 +77,54 @@ def _steps(degrees: float) -> int:
     return round(degrees * STEPS_PER_DEGREE) if math.isfinite(degrees) and abs(degrees) < 200 else 2**31 - 1
 
 
-def _answer(vehicle: Vehicle, who: Who, order: ReceivedCommand) -> None:
-    """Obey and acknowledge; an order that makes the vehicle silent is acknowledged first."""
-    if order.command == Command.PREFLIGHT_REBOOT_SHUTDOWN:
-        return _reboot(vehicle, who, order)
-    if order.command == Command.COMPONENT_ARM_DISARM and order.params[0] == 1 and vehicle.refuses_arming:
-        _acknowledge(vehicle, who, order.command, _no(vehicle))
-        return vehicle.text(vehicle.refuses_arming)  # a real one says why after it has answered
-    execute = OBEYED.get(order.command)
-    _acknowledge(vehicle, who, order.command, UNSUPPORTED if execute is None else execute(vehicle, order))
-    if order.command == Command.REQUEST_MESSAGE:
-        vehicle.requested(order.whole(0), order.whole(1))
+def _answer(vehicle: Vehicle, who: Who, command: ReceivedCommand) -> None:
+    """Carry out and acknowledge a command; one that makes the vehicle silent is acknowledged first."""
+    if command.command == Command.PREFLIGHT_REBOOT_SHUTDOWN:
+        return _reboot(vehicle, who, command)
+    if command.command == Command.COMPONENT_ARM_DISARM and command.params[0] == 1 and vehicle.refuses_arming:
+        _acknowledge(vehicle, who, command.command, _no(vehicle))
+        return vehicle.text(vehicle.refuses_arming)  # a real one explains after it has answered
+    execute = EXECUTED.get(command.command)
+    _acknowledge(vehicle, who, command.command, UNSUPPORTED if execute is None else execute(vehicle, command))
+    if command.command == Command.REQUEST_MESSAGE:
+        _send_requested(vehicle, command.whole(0), command.whole(1))
+
+
+def _send_requested(vehicle: Vehicle, number: int, index: int) -> None:
+    """Send a requested message, if there is something to report; an older scan's report by its number."""
+    if number == MessageId.CAMERA_IMAGE_CAPTURED and index > 0 and index in vehicle.camera.reports:
+        vehicle.send(vehicle.camera.reports[index])
+    elif number in telemetry.MAKERS:
+        vehicle.report(number)
 
 
 def _acknowledge(vehicle: Vehicle, who: Who, command: int, result: int) -> None:
-    vehicle.say(replies.command_ack(who, command, result))
+    vehicle.send(replies.command_ack(who, command, result))
 
 
-def _reboot(vehicle: Vehicle, who: Who, order: ReceivedCommand) -> None:
-    refused = vehicle.armed or order.whole(0) != 1
-    _acknowledge(vehicle, who, order.command, _no(vehicle) if refused else ACCEPTED)
+def _reboot(vehicle: Vehicle, who: Who, command: ReceivedCommand) -> None:
+    refused = vehicle.armed or command.whole(0) != 1
+    _acknowledge(vehicle, who, command.command, _no(vehicle) if refused else ACCEPTED)
     if not refused:
         vehicle.reboot()
 
 
 def _no(vehicle: Vehicle) -> int:
-    """How the autopilot says no to what it could do at other times."""
+    """Result by which the autopilot refuses what it could do at other times."""
     return int(vehicle.autopilot.behaviour.says_no)
 
 
-def _arm(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    wanted = order.params[0]
+def _arm(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    wanted = command.params[0]
     if wanted not in (0.0, 1.0):
         return int(DENIED)
     (vehicle.arm if wanted else vehicle.disarm)()
     return int(ACCEPTED)
 
 
-def _set_mode(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    main, sub = order.whole(1), order.whole(2)
-    return _change_mode(vehicle, order.whole(0, 0), vehicle.autopilot.modes.custom(Mode(main, sub)))
+def _set_mode(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    main, sub = command.whole(1), command.whole(2)
+    return _change_mode(vehicle, command.whole(0, 0), vehicle.autopilot.modes.custom(Mode(main, sub)))
 
 
 def _change_mode(vehicle: Vehicle, flags: int, custom: int) -> int:
@@ -127,7 +135,7 @@ def _change_mode(vehicle: Vehicle, flags: int, custom: int) -> int:
 
 
 def _mode_of(vehicle: Vehicle, flags: int, custom: int) -> ModeName | None:
-    """By its custom number; without one by the flags alone, which only the specification's vehicle knows."""
+    """Mode by its custom number; without one by the flags, which only the specification's vehicle knows."""
     modes = vehicle.autopilot.modes
     if flags & ModeFlag.CUSTOM_MODE_ENABLED:
         return next((name for name, mode in modes.numbers.items() if modes.custom(mode) == custom), None)
@@ -144,11 +152,11 @@ def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
         _acknowledge(vehicle, who, MessageId.SET_MODE, result)
 
 
-def _set_current(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    """-1 means: stay; param2 1 means: count everything anew."""
+def _set_current(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    """Make an item the current one; -1 means the present one, param2 1 resets all counts."""
     if not vehicle.autopilot.behaviour.jumps_by_command:
         return int(UNSUPPORTED)
-    number = order.whole(0, -2)
+    number = command.whole(0, -2)
     if number == -1:
         number = vehicle.auto.current
     return int(ACCEPTED if vehicle.auto.jump(number, vehicle.now_ns) else DENIED)
@@ -159,8 +167,8 @@ def _set_current_message(vehicle: Vehicle, message: Message) -> None:
         vehicle.text(f"Item {message.seq}: not in the mission")
 
 
-def _start(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    first, habits = order.whole(0, 0), vehicle.autopilot.behaviour
+def _start(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    first, habits = command.whole(0, 0), vehicle.autopilot.behaviour
     if first > 0 and not (habits.start_takes_item and vehicle.auto.jump(first, vehicle.now_ns)):
         return int(DENIED)
     if not vehicle.set_mode("auto"):
@@ -170,95 +178,96 @@ def _start(vehicle: Vehicle, order: ReceivedCommand) -> int:
     return int(ACCEPTED)
 
 
-def _pause(vehicle: Vehicle, order: ReceivedCommand) -> int:
+def _pause(vehicle: Vehicle, command: ReceivedCommand) -> int:
     if not vehicle.autopilot.behaviour.pauses_by_command:
         return int(UNSUPPORTED)
-    return int(ACCEPTED) if vehicle.set_mode("auto" if order.params[0] == 1 else "hold") else int(DENIED)
+    return int(ACCEPTED) if vehicle.set_mode("auto" if command.params[0] == 1 else "hold") else int(DENIED)
 
 
-def _reposition(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    """param1 is a speed (-1: as it is), param2 1 allows the change of mode, param4 is radians from north."""
-    if not order.exact:
+def _reposition(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    """Drive to a position: param1 speed (-1: unchanged), param2 1 may change the mode, param4 yaw in rad."""
+    if not command.exact:
         return int(CommandResult.COMMAND_INT_ONLY)
-    point, mode = vehicle.rover.point(order.x, order.y), vehicle.autopilot.driving.reposition_mode
-    allowed = vehicle.mode == mode or order.whole(1, 0) & CHANGE_MODE
+    point, mode = vehicle.rover.point(command.x, command.y), vehicle.autopilot.driving.reposition_mode
+    allowed = vehicle.mode == mode or command.whole(1, 0) & CHANGE_MODE
     if point is None or not vehicle.armed or not allowed:
         return int(DENIED)
     vehicle.set_mode(mode)
-    vehicle.rover.set_speed(order.params[0])
-    vehicle.target.go(point, _heading(vehicle, order.params[3]), vehicle.now_ns)
+    vehicle.rover.set_speed(command.params[0])
+    vehicle.target.go(point, _heading(vehicle, command.params[3]), vehicle.now_ns)
     return int(ACCEPTED)
 
 
 def _heading(vehicle: Vehicle, yaw: float) -> float | None:
-    """Counter-clockwise from east, of radians from north; None if it is none, or none that it turns to."""
+    """Heading counter-clockwise from east of a yaw from north; None if the vehicle does not turn to it."""
     turns = vehicle.autopilot.turns and math.isfinite(yaw) and abs(yaw) < 100
     return math.pi / 2 - yaw if turns else None
 
 
-def _change_speed(vehicle: Vehicle, order: ReceivedCommand) -> int:
+def _change_speed(vehicle: Vehicle, command: ReceivedCommand) -> int:
     drives = vehicle.auto.state == "active" or vehicle.target.goes_somewhere
     if vehicle.autopilot.behaviour.speed_while_driving and not drives:
         return int(FAILED)
-    if not vehicle.rover.set_speed(order.params[1]):
+    if not vehicle.rover.set_speed(command.params[1]):
         return int(DENIED)
-    vehicle.target.again(vehicle.now_ns)
+    vehicle.target.restart(vehicle.now_ns)
     return int(ACCEPTED)
 
 
-def _interval(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    return int(ACCEPTED) if vehicle.streams.set(order.whole(0), order.params[1]) else _no(vehicle)
+def _interval(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    return int(ACCEPTED) if vehicle.streams.set(command.whole(0), command.params[1]) else _no(vehicle)
 
 
-def _tell_interval(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    number = order.whole(0)
+def _report_interval(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    number = command.whole(0)
     if not 0 <= number < 2**16:
         return int(DENIED)
-    vehicle.say(replies.message_interval(number, vehicle.streams.interval_us(number)))
+    vehicle.send(replies.message_interval(number, vehicle.streams.interval_us(number)))
     return int(ACCEPTED)
 
 
-def _request(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    maker = telemetry.MAKERS.get(order.whole(0))
+def _request(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    maker = telemetry.MAKERS.get(command.whole(0))
     return int(UNSUPPORTED) if maker is None else int(DENIED if maker(vehicle) is None else ACCEPTED)
 
 
-def _tell_version(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    vehicle.tell(MessageId.AUTOPILOT_VERSION)
+def _report_version(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    vehicle.report(MessageId.AUTOPILOT_VERSION)
     return int(ACCEPTED)
 
 
-def _tell_home(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    return int(ACCEPTED) if vehicle.tell(MessageId.HOME_POSITION) else _no(vehicle)
+def _report_home(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    return int(ACCEPTED) if vehicle.report(MessageId.HOME_POSITION) else _no(vehicle)
 
 
-def _capture(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    """IMAGE_START_CAPTURE: param4 is the number; param2, the interval, which one picture has not, seconds."""
-    return _scan(vehicle, order, order.whole(3, 0), order.params[1])
+def _capture(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    """IMAGE_START_CAPTURE: param4 is the number; param2, the interval (unused for one picture), seconds."""
+    return _scan(vehicle, command, command.whole(3, 0), command.params[1])
 
 
-def _script_message(vehicle: Vehicle, order: ReceivedCommand) -> int:
+def _script_message(vehicle: Vehicle, command: ReceivedCommand) -> int:
     """DO_SEND_SCRIPT_MESSAGE: param2 is the number, param3 the seconds."""
     if Command.DO_SEND_SCRIPT_MESSAGE not in vehicle.autopilot.commands:
         return int(UNSUPPORTED)
-    return _scan(vehicle, order, order.whole(1, 0), order.params[2])
+    return _scan(vehicle, command, command.whole(1, 0), command.params[2])
 
 
-def _stop_capture(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    """The scan under way is broken off; nothing is said of it."""
-    vehicle.break_off()
+def _stop_capture(vehicle: Vehicle, command: ReceivedCommand) -> int:
+    """Break off the scan under way, without a report."""
+    vehicle.camera.stop()
+    vehicle.auto.scan_over(vehicle.now_ns)
     return int(ACCEPTED)
 
 
-def _scan(vehicle: Vehicle, order: ReceivedCommand, number: int, seconds: float) -> int:
-    """A trigger that comes again for the scan it began does not begin another."""
-    same = number == vehicle.camera.under_way or (order.again and number == vehicle.camera.last)
+def _scan(vehicle: Vehicle, command: ReceivedCommand, number: int, seconds: float) -> int:
+    """Begin a scan; a repeated trigger of the scan under way does not begin another."""
+    same = number == vehicle.camera.under_way or (command.again and number == vehicle.camera.last)
     if number > 0 and same:
         return int(ACCEPTED)
     return int(ACCEPTED if vehicle.camera.begin(max(0, number), seconds, vehicle.now_ns) else REJECTED)
 
 
-OBEYED: dict[int, Callable[[Vehicle, ReceivedCommand], int]] = {
+EXECUTED: dict[int, Callable[[Vehicle, ReceivedCommand], int]] = {
     Command.COMPONENT_ARM_DISARM: _arm,
     Command.DO_SET_MODE: _set_mode,
     Command.DO_SET_MISSION_CURRENT: _set_current,
@@ -267,26 +276,26 @@ OBEYED: dict[int, Callable[[Vehicle, ReceivedCommand], int]] = {
     Command.DO_REPOSITION: _reposition,
     Command.DO_CHANGE_SPEED: _change_speed,
     Command.SET_MESSAGE_INTERVAL: _interval,
-    Command.GET_MESSAGE_INTERVAL: _tell_interval,
+    Command.GET_MESSAGE_INTERVAL: _report_interval,
     Command.REQUEST_MESSAGE: _request,
-    Command.REQUEST_AUTOPILOT_CAPABILITIES: _tell_version,
-    Command.GET_HOME_POSITION: _tell_home,
+    Command.REQUEST_AUTOPILOT_CAPABILITIES: _report_version,
+    Command.GET_HOME_POSITION: _report_home,
     Command.IMAGE_START_CAPTURE: _capture,
     Command.IMAGE_STOP_CAPTURE: _stop_capture,
     Command.DO_SEND_SCRIPT_MESSAGE: _script_message,
 }
-"""Each gives the MAV_RESULT with which it is acknowledged."""
+"""Functions by command; each returns the MAV_RESULT with which it is acknowledged."""
 
 
 def _set_origin(vehicle: Vehicle, message: Message) -> None:
-    """What is no place on the earth is ignored."""
+    """Set the origin; a position that is not on the earth is ignored."""
     lat, lon = message.latitude / STEPS_PER_DEGREE, message.longitude / STEPS_PER_DEGREE
     if abs(lat) <= NORTHMOST and abs(lon) <= 180:
         vehicle.set_origin(SiteOrigin(lat=lat, lon=lon, alt=message.altitude / 1000, heading_deg=0.0))
 
 
 def _target_local(vehicle: Vehicle, message: Message) -> None:
-    vehicle.target.hear()
+    vehicle.target.note_setpoint()
     if message.type_mask & IGNORE_X_Y == IGNORE_X_Y:
         return _turn(vehicle, message)
     east, north = message.y, message.x
@@ -300,14 +309,14 @@ def _target_local(vehicle: Vehicle, message: Message) -> None:
 
 
 def _target_global(vehicle: Vehicle, message: Message) -> None:
-    vehicle.target.hear()
+    vehicle.target.note_setpoint()
     point = vehicle.rover.point(message.lat_int, message.lon_int)
     if point is not None:
         _guide(vehicle, message, point)
 
 
 def _turn(vehicle: Vehicle, message: Message) -> None:
-    """A course without a place: a yaw, a velocity, or both. Accelerations are not followed."""
+    """Steer by a course without a position: a yaw, a velocity, or both. Accelerations are not followed."""
     if vehicle.mode != "guided" or not vehicle.armed:
         return
     course = COURSES[vehicle.autopilot.driving.courses](message)
@@ -316,7 +325,7 @@ def _turn(vehicle: Vehicle, message: Message) -> None:
 
 
 def _by_heading(message: Message) -> Course | None:
-    """ArduPilot: the yaw is kept; the sign of vx says which way, in any frame (GCS_MAVLink_Rover)."""
+    """ArduPilot: it holds the yaw; the sign of vx is the direction, in any frame (GCS_MAVLink_Rover)."""
     speed = 0.0 if message.type_mask & IGNORE_VELOCITY else math.hypot(message.vx, message.vy)
     if message.type_mask & IGNORE_YAW:
         return None if speed == 0 else Course(math.atan2(message.vx, message.vy), speed)
@@ -324,7 +333,7 @@ def _by_heading(message: Message) -> Course | None:
 
 
 def _by_vector(message: Message) -> Course | None:
-    """PX4: drives where the velocity points; a yaw is of no account (DifferentialOffboardMode)."""
+    """PX4: it drives where the velocity points and ignores a yaw (DifferentialOffboardMode)."""
     if message.type_mask & IGNORE_VELOCITY:
         return None
     return Course(math.atan2(message.vx, message.vy), math.hypot(message.vx, message.vy))

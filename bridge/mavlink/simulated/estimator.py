@@ -1,4 +1,4 @@
-"""What the vehicle believes of where it is: late, noisy, wandering, and now and then jumping."""
+"""Estimated pose of the simulated vehicle: late and noisy, with drift and occasional jumps."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.mission.run.events import Pose
 
 WANDERS_S = 20.0
-"""How long an estimate's error stays about the same."""
+"""Time for which an estimate's error stays about the same."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Pose and motion as the autopilot knows them."""
+    """Pose and motion as the autopilot estimates them."""
 
     pose: Pose
     speed_x: float = 0.0
@@ -31,9 +31,9 @@ class Estimate:
 
 
 class Estimator:
-    """Errors as of an EKF on external navigation: a slow wander (first-order Gauss-Markov) and white noise.
+    """Errors as of an EKF on external navigation: a slow drift (first-order Gauss-Markov) and white noise.
 
-    The standard deviations are those of a real log's standing stretches and their means, see
+    The standard deviations are those of a real log's standstills and their means, see
     docs/background/reliability.md.
     """
 
@@ -41,23 +41,23 @@ class Estimator:
         self._chassis, self._tuning = chassis, tuning
         self._chance = random.Random(seed)
         self._off = [self._chance.gauss(0.0, 1.0) for _ in range(3)]
-        """Wander of x, y and heading, in standard deviations."""
+        """Drift of x, y and heading, in standard deviations."""
         self._jumped = [0.0, 0.0]
         self.now = Estimate(chassis.pose)
         self.look(0.0)
 
     def jump(self, metres: float) -> None:
-        """The estimate is somewhere else at once, and stays beside the truth."""
+        """Shift the estimate at once; it stays off the truth."""
         angle = self._chance.uniform(-math.pi, math.pi)
         self._jumped[0] += metres * math.cos(angle)
         self._jumped[1] += metres * math.sin(angle)
 
     def settle(self) -> None:
-        """The error of the jumps is gone, at once."""
+        """Remove the error of the jumps, at once."""
         self._jumped = [0.0, 0.0]
 
     def look(self, dt: float) -> None:
-        """What is believed now, a moment later."""
+        """Estimate the pose a moment later."""
         tuning, chance, body = self._tuning, self._chance, self._chassis
         keep = math.exp(-dt / WANDERS_S)
         fresh = math.sqrt(1.0 - keep * keep)

@@ -1,4 +1,4 @@
-"""The rover driven exactly: it stands at each point to the last digit, as no real one does."""
+"""Exact driving of the simulated rover: it reaches each point to the last digit, as no real one does."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LIMITS = RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5)
 
 
 class ExactDrive:
-    """For what is counted on paper: the protocol, and the mission's order of events."""
+    """Driving for tests on paper: of the protocol, and of the sequence of a mission's events."""
 
     def __init__(self, pose: Pose) -> None:
         self.speed = LIMITS.speed
@@ -24,18 +24,18 @@ class ExactDrive:
     def at(self, now_ns: int) -> tuple[Pose, float]:
         return self._motion.at((now_ns - self._began_ns) / 1e9)
 
-    def told(self, now_ns: int) -> Estimate:
+    def estimate(self, now_ns: int) -> Estimate:
         pose, speed = self.at(now_ns)
         return Estimate(pose, speed * math.cos(pose.heading), speed * math.sin(pose.heading))
 
     def set_out(
         self, to: Point, now_ns: int, *, heading: float | None, to_spare: float, keeps: bool = False
     ) -> int:
-        """When it will be there."""
+        """Set out for a point; return when it will be there."""
         start = self.at(now_ns)[0]
         away = math.hypot(to[0] - start.x, to[1] - start.y)
-        share = max(0.0, 1.0 - to_spare / away) if away > 0 else 0.0
-        end = (start.x + (to[0] - start.x) * share, start.y + (to[1] - start.y) * share)
+        fraction = max(0.0, 1.0 - to_spare / away) if away > 0 else 0.0
+        end = (start.x + (to[0] - start.x) * fraction, start.y + (to[1] - start.y) * fraction)
         self._motion = along(
             start, [end], heading,
             speed=self.speed, turn_rate=LIMITS.turn_rate, acceleration=LIMITS.acceleration,
@@ -48,7 +48,7 @@ class ExactDrive:
         return None if ends_ns <= now_ns else ends_ns
 
     def course(self, course: Course, now_ns: int) -> None:
-        """It turns to a heading; a speed without a place it does not follow."""
+        """Turn to a heading; a speed without a position is not followed."""
         here = self.at(now_ns)[0]
         self.set_out((here.x, here.y), now_ns, heading=course.heading, to_spare=0.0)
 
@@ -58,4 +58,4 @@ class ExactDrive:
         self._began_ns = now_ns
 
     def jump(self, metres: float, now_ns: int) -> None:
-        """Its estimate is the truth."""
+        """Do nothing: the estimate is the truth."""

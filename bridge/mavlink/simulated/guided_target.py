@@ -1,4 +1,4 @@
-"""The vehicle led from outside: to places and headings that a station tells, one after another."""
+"""Target of the guided mode: positions, headings and courses that a station commands, one after another."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ LONG_AGO_NS = 10**18
 
 
 class GuidedTarget:
-    """Where a station wants the vehicle, or how it wants it to drive.
+    """Position or course that a station commands.
 
     Parameters
     ----------
     patience_s
-        How long a course counts that is not told again, and any setpoint of an autopilot that wants a stream
-        of them, seconds of the wall's clock.
+        Time for which a course counts that is not sent again, seconds of the wall's clock. It holds for any
+        setpoint of an autopilot that needs a stream of them.
     """
 
     def __init__(self, rover: Rover, wall: Clock, *, patience_s: Callable[[], float]) -> None:
         self._rover, self._wall, self._patience_s = rover, wall, patience_s
-        self._heard_ns = self._course_ns = -LONG_AGO_NS
+        self._setpoint_ns = self._course_ns = -LONG_AGO_NS
         self._to: tuple[Point, float | None] | None = None
         self._course: Course | None = None
 
@@ -34,18 +34,18 @@ class GuidedTarget:
 
     @property
     def fresh(self) -> bool:
-        """Whether a setpoint came just now."""
-        return self._wall.now_ns() - self._heard_ns <= self._patience_s() * 1e9
+        """True if a setpoint came just now."""
+        return self._wall.now_ns() - self._setpoint_ns <= self._patience_s() * 1e9
 
     @property
     def overdue(self) -> bool:
-        """Whether a course is followed that should have been told again."""
+        """True if the vehicle follows a course that should have been sent again."""
         waited_ns = self._wall.now_ns() - self._course_ns
         return self._course is not None and waited_ns > self._patience_s() * 1e9
 
-    def hear(self) -> None:
-        """A setpoint has come, followed or not."""
-        self._heard_ns = self._wall.now_ns()
+    def note_setpoint(self) -> None:
+        """Note that a setpoint came, followed or not."""
+        self._setpoint_ns = self._wall.now_ns()
 
     def go(self, point: Point, heading: float | None, now_ns: int) -> None:
         """Drive to a point; the same one again changes nothing."""
@@ -55,14 +55,14 @@ class GuidedTarget:
             self._rover.drive(point, now_ns, heading=heading)
 
     def steer(self, course: Course, now_ns: int) -> None:
-        """Keep a heading and a speed for a while."""
+        """Follow a heading and a speed for a while."""
         self._to, self._course_ns = None, self._wall.now_ns()
         if course != self._course:
             self._course = course
             self._rover.course(course, now_ns)
 
-    def again(self, now_ns: int) -> None:
-        """Set out anew, for the speed has changed."""
+    def restart(self, now_ns: int) -> None:
+        """Set out again, because the speed has changed."""
         if self._to is not None:
             self._rover.drive(self._to[0], now_ns, heading=self._to[1])
 

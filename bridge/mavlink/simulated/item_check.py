@@ -1,4 +1,4 @@
-"""Whether a vehicle takes an item: the MAV_MISSION_RESULT with which it refuses one, else ACCEPTED."""
+"""Check of an item by the simulated vehicle: the MAV_MISSION_RESULT of a refusal, else ACCEPTED."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ INVALID_PARAM = (
     MissionResult.INVALID_PARAM3, MissionResult.INVALID_PARAM4,
 )  # fmt: skip
 MAY_BE_NAN = {16: (3,), 17: (3,), 19: (3,), 21: (3,), 22: (3,), 2000: (1, 2, 3), 1000: (0, 1, 2, 3)}
-"""Params that may be NaN, "not said", in a mission's item; nowhere else."""
+"""Params that may be NaN, "not given", in a mission's item; nowhere else."""
 
 
 def verdict(autopilot: Autopilot, kind: int, item: Item) -> int:
@@ -41,7 +41,7 @@ def verdict(autopilot: Autopilot, kind: int, item: Item) -> int:
 
 
 def _frame_first(item: Item, placed: bool) -> int:
-    """The frame is looked at first, and numbers hardly; places off the earth are refused here."""
+    """Check the frame first, and numbers hardly; positions off the earth are refused here."""
     if item.frame not in PX4_FRAMES | {MavFrame.MISSION}:
         return MissionResult.UNSUPPORTED_FRAME
     if placed != (item.frame in PX4_FRAMES):

@@ -1,4 +1,4 @@
-"""A line to the vehicle that loses, doubles and delays frames by chance."""
+"""A link to the simulated vehicle that loses, doubles and delays frames by chance."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import random
 import threading
 import time
 
-from stopgo.bridge.mavlink.line.transport import Address, Transport
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaultKind, VehicleFaults
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, Transport
 
 
 class LossyLine:
@@ -19,11 +19,11 @@ class LossyLine:
     """
 
     def __init__(self, transport: Transport, faults: VehicleFaults) -> None:
-        self.datagrams, self.gone = transport.datagrams, transport.gone
+        self.datagrams, self.disconnected = transport.datagrams, transport.disconnected
         self._transport = transport
-        self._loss = _share(faults, "loss")
-        self._twice = _share(faults, "duplicates")
-        self._late_s = _share(faults, "jitter") / 10
+        self._loss = _fraction(faults, "loss")
+        self._twice = _fraction(faults, "duplicates")
+        self._late_s = _fraction(faults, "jitter") / 10
         seed = sum(int(fault.amount) for fault in faults.all if fault.kind in LINE)
         self._coming, self._going = random.Random(2 * seed), random.Random(2 * seed + 1)
         self._count = itertools.count()
@@ -32,13 +32,13 @@ class LossyLine:
         self._lock = threading.Lock()
 
     def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
-        """What has come and is due; what waits to leave is sent on the way."""
+        """Frames that came and are due; frames that wait to leave are sent as well."""
         pause = timeout_s if not self._late_s else min(timeout_s, 0.01)
         for address, data in self._transport.read(pause):
             for due in self._times(self._coming):
                 heapq.heappush(self._waiting, (due, next(self._count), address, data))
         self._send_due()
-        self.gone = self._transport.gone
+        self.disconnected = self._transport.disconnected
         came = []
         while self._waiting and self._waiting[0][0] <= time.monotonic():
             _, _, address, data = heapq.heappop(self._waiting)
@@ -61,7 +61,7 @@ class LossyLine:
                 self._transport.write(data, to)
 
     def _times(self, chance: random.Random) -> list[float]:
-        """When each copy of a frame arrives; none if it is lost."""
+        """Arrival time of each copy of a frame; none if it is lost."""
         if chance.random() < self._loss:
             return []
         copies = 2 if chance.random() < self._twice else 1
@@ -72,10 +72,10 @@ LINE: frozenset[VehicleFaultKind] = frozenset({"loss", "duplicates", "jitter"})
 
 
 def on_line(transport: Transport, faults: VehicleFaults) -> Transport:
-    """The transport, made rough where the faults say so."""
+    """The transport with the link faults among `faults`, if there are any."""
     return LossyLine(transport, faults) if any(fault.kind in LINE for fault in faults.all) else transport
 
 
-def _share(faults: VehicleFaults, kind: VehicleFaultKind) -> float:
+def _fraction(faults: VehicleFaults, kind: VehicleFaultKind) -> float:
     fault = faults.any(kind)
     return fault.at / 100 if fault else 0.0

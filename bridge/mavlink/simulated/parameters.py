@@ -1,22 +1,22 @@
-"""The parameters a ground station can read and set: most of them are how it drives (`tuning`)."""
+"""Parameters that a ground station can read and set: most of them are for driving (`tuning`)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated import replies
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.mavlink.autopilots.kind import ProtocolBehaviour
 from stopgo.mission.mavlink.telemetry import Message
 
 SCAN_TIME = "SIM_SCAN_TIME"
-"""Seconds that a scan takes if its trigger does not say."""
+"""Duration of a scan in seconds if its trigger gives none."""
 
 
 class Parameters:
-    """Named numbers, float32 on the wire."""
+    """Named numbers, float32 in messages."""
 
     def __init__(
         self, habits: ProtocolBehaviour, tuning: Tuning, *, speed: float, set_speed: Callable[[float], bool]
@@ -37,14 +37,14 @@ class Parameters:
         return [self._value(name) for name in self._values]
 
     def read(self, message: Message) -> Message | None:
-        """The one asked for by index or, if that is -1, by name."""
+        """The parameter requested by index or, if that is -1, by name."""
         names = list(self._values)
         if message.param_index >= 0:
             return self._value(names[message.param_index]) if message.param_index < len(names) else None
         return self._value(name) if (name := _name(message.param_id)) in self._values else None
 
     def set(self, message: Message) -> Message | None:
-        """What it is afterwards, changed or not."""
+        """Set a parameter; return its value afterwards, changed or not."""
         name, value = _name(message.param_id), message.param_value
         if name not in self._values:
             return None
@@ -71,21 +71,21 @@ def _name(raw: str | bytes) -> str:
     return text.rstrip("\0")
 
 
-def answer(
-    parameters: Parameters, say: Callable[[Message], None]
+def parameter_handlers(
+    parameters: Parameters, send: Callable[[Message], None]
 ) -> dict[str, Callable[[Who, Message], None]]:
-    """What to do with each message about parameters."""
+    """Handler of each message about parameters."""
 
-    def told(value: Message | None) -> None:
+    def send_known(value: Message | None) -> None:
         if value is not None:
-            say(value)
+            send(value)
 
-    def tell_all() -> None:
+    def send_all() -> None:
         for value in parameters.all():
-            say(value)
+            send(value)
 
     return {
-        "PARAM_REQUEST_LIST": lambda who, message: tell_all(),
-        "PARAM_REQUEST_READ": lambda who, message: told(parameters.read(message)),
-        "PARAM_SET": lambda who, message: told(parameters.set(message)),
+        "PARAM_REQUEST_LIST": lambda who, message: send_all(),
+        "PARAM_REQUEST_READ": lambda who, message: send_known(parameters.read(message)),
+        "PARAM_SET": lambda who, message: send_known(parameters.set(message)),
     }

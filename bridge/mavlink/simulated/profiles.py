@@ -1,4 +1,4 @@
-"""The kinds of autopilot whose habits the simulated vehicle may have."""
+"""The kinds of autopilot whose protocol behaviour the simulated vehicle may have."""
 
 from __future__ import annotations
 

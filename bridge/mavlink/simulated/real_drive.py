@@ -1,4 +1,4 @@
-"""The rover driven as a real one is: an autopilot's loops on wheels with lag, by an estimate of its place."""
+"""Realistic driving of the simulated rover: an autopilot's loops on wheels with lag, by an estimated pose."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from stopgo.mission.document import Point
 from stopgo.mission.run.events import Pose
 
 STEP_NS = 20_000_000
-"""Fifty times a second, as ArduPilot Rover runs its loops."""
+"""Step of fifty times a second, as ArduPilot Rover runs its loops."""
 LONGEST_NS = 60_000_000_000
-"""After a longer absence it has stood meanwhile."""
+"""Longest time that is simulated at once: after a longer one it was stationary meanwhile."""
 
 
 class RealDrive:
     """Wheels, estimator and loops of one vehicle, by its own clock.
 
-    Times are nanoseconds of the vehicle's clock; what happened until then is worked out when somebody asks.
+    Times are nanoseconds of the vehicle's clock; a question for a time simulates the steps until then.
     """
 
     def __init__(self, kind: str, tuning: Tuning, pose: Pose, *, seed: int) -> None:
@@ -29,55 +29,55 @@ class RealDrive:
         self.speed = tuning["WP_SPEED" if kind == "ardupilot" else "RO_SPEED_LIM"]
         self._law = LAWS[kind](tuning)
         self._now_ns = 0
-        self._order: RunningStraight | Course | None = None
+        self._task: RunningStraight | Course | None = None
         self._heading: float | None = None
 
     def at(self, now_ns: int) -> tuple[Pose, float]:
-        self._go_on(now_ns)
+        self._simulate_until(now_ns)
         return self.chassis.pose, abs(self.chassis.speed)
 
-    def told(self, now_ns: int) -> Estimate:
-        self._go_on(now_ns)
+    def estimate(self, now_ns: int) -> Estimate:
+        self._simulate_until(now_ns)
         return self.estimator.now
 
     def set_out(self, to: Point, now_ns: int, *, heading: float | None, to_spare: float, keeps: bool) -> int:
-        """When to look whether it has arrived."""
-        self._go_on(now_ns)
+        """Set out for a point; return when to check the arrival."""
+        self._simulate_until(now_ns)
         here = self.estimator.now
-        place, away = (here.pose.x, here.pose.y), math.dist((here.pose.x, here.pose.y), to)
-        share = max(0.0, 1.0 - to_spare / away) if away > 0 else 0.0
-        end = (place[0] + (to[0] - place[0]) * share, place[1] + (to[1] - place[1]) * share)
-        if isinstance(self._order, RunningStraight) and self._order.end == end and not self._order.reached:
+        start, away = (here.pose.x, here.pose.y), math.dist((here.pose.x, here.pose.y), to)
+        fraction = max(0.0, 1.0 - to_spare / away) if away > 0 else 0.0
+        end = (start[0] + (to[0] - start[0]) * fraction, start[1] + (to[1] - start[1]) * fraction)
+        if isinstance(self._task, RunningStraight) and self._task.end == end and not self._task.reached:
             return now_ns + STEP_NS
-        if self._order is None:
+        if self._task is None:
             self._law.reset()
-        self._order, self._heading = RunningStraight(place, end, keeps=keeps), heading
-        self._law.set_out(self._order, here)
+        self._task, self._heading = RunningStraight(start, end, keeps=keeps), heading
+        self._law.set_out(self._task, here)
         return now_ns + STEP_NS
 
     def arrival_ns(self, now_ns: int) -> int | None:
-        """When to look again; `None` once it has arrived."""
-        self._go_on(now_ns)
-        arrived = isinstance(self._order, RunningStraight) and self._order.reached
+        """Time of the next check; `None` once it has arrived."""
+        self._simulate_until(now_ns)
+        arrived = isinstance(self._task, RunningStraight) and self._task.reached
         return None if arrived else now_ns + STEP_NS
 
     def course(self, course: Course, now_ns: int) -> None:
-        """Keep a heading and a speed, until told otherwise."""
-        self._go_on(now_ns)
-        if self._order is None:
+        """Follow a heading and a speed, until another command."""
+        self._simulate_until(now_ns)
+        if self._task is None:
             self._law.reset()
-        self._order = course
+        self._task = course
 
     def brake(self, now_ns: int) -> None:
-        self._go_on(now_ns)
-        self._order = None
+        self._simulate_until(now_ns)
+        self._task = None
 
     def jump(self, metres: float, now_ns: int) -> None:
-        """The estimate jumps."""
-        self._go_on(now_ns)
+        """Let the estimate jump."""
+        self._simulate_until(now_ns)
         self.estimator.jump(metres)
 
-    def _go_on(self, now_ns: int) -> None:
+    def _simulate_until(self, now_ns: int) -> None:
         if now_ns - self._now_ns > LONGEST_NS:
             self._now_ns = now_ns
         while self._now_ns + STEP_NS <= now_ns:
@@ -92,9 +92,9 @@ class RealDrive:
 
     def _wanted(self, here: Estimate, dt: float) -> tuple[float, float]:
         """Speed ahead and turn rate; at the end of a straight it turns to its heading if it has one."""
-        order = self._order
-        if isinstance(order, RunningStraight) and (order.keeps or not order.reached):
-            return self._law.follow(order, here, self.speed, dt)
-        if isinstance(order, RunningStraight) and self._heading is not None:
+        task = self._task
+        if isinstance(task, RunningStraight) and (task.keeps or not task.reached):
+            return self._law.follow(task, here, self.speed, dt)
+        if isinstance(task, RunningStraight) and self._heading is not None:
             return 0.0, self._law.steer(Course(self._heading, 0.0), here)[1]
-        return self._law.steer(order, here) if isinstance(order, Course) else (0.0, 0.0)
+        return self._law.steer(task, here) if isinstance(task, Course) else (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""What the vehicle says to one station, or to people, as messages."""
+"""Messages of the simulated vehicle to one station, or to people."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.messages import item_of
-from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import item_of
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.mavlink.fields import PLACED
 from stopgo.mission.mavlink.items import Item
@@ -29,9 +29,9 @@ def message_interval(number: int, interval_us: int) -> Message:
     return dialect.MAVLink_message_interval_message(number, interval_us)
 
 
-def text(words: str) -> Message:
-    """For people; at most 50 letters arrive."""
-    return dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_NOTICE, words.encode()[:50])
+def text(content: str) -> Message:
+    """A text for people; at most 50 letters arrive."""
+    return dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_NOTICE, content.encode()[:50])
 
 
 def parameter(name: str, value: float, *, index: int, count: int) -> Message:
@@ -41,7 +41,7 @@ def parameter(name: str, value: float, *, index: int, count: int) -> Message:
 
 
 def item_wanted(to: Who, kind: int, number: int, *, as_int: bool) -> Message:
-    """Asks for an item of an upload."""
+    """A request for an item of an upload."""
     asking = (
         dialect.MAVLink_mission_request_int_message if as_int else dialect.MAVLink_mission_request_message
     )
@@ -61,7 +61,7 @@ def item_int(to: Who, kind: int, number: int, item: Item) -> Message:
 
 
 def item_float(to: Who, kind: int, number: int, item: Item) -> Message:
-    """The old MISSION_ITEM: x and y are degrees where the command has a place."""
+    """The old MISSION_ITEM: x and y are degrees where the command has a position."""
     scale = STEPS_PER_DEGREE if item.command in STEPPED else 1
     return _item(dialect.MAVLink_mission_item_message, to, kind, number, item, item.x / scale, item.y / scale)
 
@@ -83,7 +83,7 @@ def received_item(message: Message) -> Item:
 
 
 def _whole(value: float) -> int:
-    """The nearest int32; what is no place is as far off the earth as it can be."""
+    """The nearest int32; a value that is no position becomes the one farthest off the earth."""
     return round(value) if math.isfinite(value) and abs(value) <= INT32 else INT32
 
 
@@ -97,7 +97,7 @@ def picture(
     heading: float,
     file_url: str,
 ) -> Message:
-    """What a camera tells of one; `heading` is counter-clockwise from east. Without a file it has failed."""
+    """A camera's report of a picture; `heading` is counter-clockwise from east. No file means a failure."""
     half = math.pi / 4 - heading / 2
     facing = (math.cos(half), 0.0, 0.0, math.sin(half))
     return dialect.MAVLink_camera_image_captured_message(

@@ -1,4 +1,4 @@
-"""Where the rover stands and how it moves, in metres; and the place on the earth that this is."""
+"""The simulated rover's pose and motion in metres, and its position on the earth."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import Pose
 
 STANDING = Pose(x=0.0, y=0.0, heading=math.pi / 2)
-"""Where a vehicle is that was never driven: at the origin, to the north."""
+"""Pose of a vehicle that was never driven: at the origin, to the north."""
 FAR_M = 100_000.0
-"""Beyond this from the origin it does not set out."""
+"""Largest distance from the origin to which it sets out."""
 SLOWEST, FASTEST = 0.05, 5.0
 STEPS_PER_M = 90
 """Steps of 1e-7 degrees of latitude in a metre, rounded up."""
@@ -26,8 +26,8 @@ STEPS_PER_M = 90
 class Rover:
     """A differential drive on an empty floor, x to the east and y to the north of the global origin.
 
-    Times are nanoseconds of the vehicle's clock and are told by the caller, so that one motion begins where
-    another ended, however seldom anybody looks.
+    Times are nanoseconds of the vehicle's clock, given by the caller. So one motion begins where another
+    ended, however seldom the pose is read.
     """
 
     def __init__(
@@ -41,9 +41,9 @@ class Rover:
         """True pose and speed."""
         return self.motion.at(now_ns)
 
-    def told(self, now_ns: int) -> Estimate:
-        """Pose and speed as the autopilot knows them."""
-        return self.motion.told(now_ns)
+    def estimate(self, now_ns: int) -> Estimate:
+        """Pose and speed as the autopilot estimates them."""
+        return self.motion.estimate(now_ns)
 
     def drive(
         self,
@@ -54,31 +54,31 @@ class Rover:
         to_spare: float = 0.0,
         keeps: bool = False,
     ) -> int:
-        """Set out for a point; when to look whether it is there.
+        """Set out for a point; return when to check the arrival.
 
-        `to_spare` metres before the point the drive ends; if it `keeps`, the place is held until it brakes.
+        The drive ends `to_spare` metres before the point. With `keeps` the position is held until it brakes.
         """
         return self.motion.set_out(to, now_ns, heading=heading, to_spare=to_spare, keeps=keeps)
 
     def arrival_ns(self, now_ns: int) -> int | None:
-        """When to look again; `None` once it has arrived."""
+        """Time of the next check; `None` once it has arrived."""
         return self.motion.arrival_ns(now_ns)
 
     def course(self, course: Course, now_ns: int) -> None:
-        """Keep a heading and a speed."""
+        """Follow a heading and a speed."""
         self.motion.course(course, now_ns)
 
     def brake(self, now_ns: int) -> None:
         self.motion.brake(now_ns)
 
-    def keep(self, now_ns: int) -> None:
-        """Write down where it stands, if it has moved."""
+    def save_pose(self, now_ns: int) -> None:
+        """Save the pose, if it has changed."""
         pose = self.at(now_ns)[0]
-        if pose != self._store.kept.pose:
-            self._store.keep(pose=pose)
+        if pose != self._store.stored.pose:
+            self._store.update(pose=pose)
 
     def set_speed(self, speed: float) -> bool:
-        """Metres per second from the next drive on; false if that is none."""
+        """Set the speed in metres per second from the next drive on; false if it is not allowed."""
         if not SLOWEST <= speed <= FASTEST:
             return False
         self.motion.speed = speed

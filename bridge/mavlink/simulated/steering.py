@@ -1,8 +1,8 @@
-"""An autopilot's loops: from where it should go to throttle and steering, as ArduPilot Rover and PX4 do it.
+"""Control loops of an autopilot: from target to throttle and steering, as ArduPilot Rover and PX4 do it.
 
 ArduPilot's: AR_AttitudeControl (speed and turn rate loops, stop), AR_PivotTurn, AR_PosControl and AR_WPNav
 (a target that runs ahead on the straight and is followed). PX4's: DifferentialVelControl (turn on the spot
-or drive), DifferentialPosControl (pure pursuit). Written anew from what these do.
+or drive), DifferentialPosControl (pure pursuit). Written from scratch after their behaviour.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from stopgo.mission.document import Point
 
 PIVOTED_RAD = math.radians(5.0)
 STEER_SPEED = 1.0
-"""ArduPilot turns a sideways acceleration into a turn rate as if it drove at least so fast."""
+"""Least speed by which ArduPilot converts a sideways acceleration into a turn rate."""
 REACHED_M = 0.01
-"""So near its end ArduPilot's running target counts as arrived."""
+"""Distance to its end at which ArduPilot's running target counts as arrived."""
 PARTS = 8
-"""Of a mean over time."""
+"""Parts of a mean over time."""
 STARTS_M_S = 0.05
 """PX4's speed at the very beginning of a straight."""
 
 
 @dataclass
 class RunningStraight:
-    """From a place to another, and how far the target on it has run."""
+    """A straight between two positions, and the progress of the target that runs along it."""
 
     start: Point
     end: Point
@@ -40,7 +40,7 @@ class RunningStraight:
     """Turning on the spot, before it drives."""
     reached: bool = False
     keeps: bool = False
-    """It is followed on when its end is reached: ArduPilot does so while it holds in AUTO."""
+    """The vehicle goes on following it at its end: ArduPilot does so while it holds in AUTO."""
 
     @property
     def length(self) -> float:
@@ -48,7 +48,7 @@ class RunningStraight:
 
     @property
     def along(self) -> Point:
-        """Its direction."""
+        """Unit vector of its direction."""
         length = self.length
         return (
             ((self.end[0] - self.start[0]) / length, (self.end[1] - self.start[1]) / length)
@@ -59,7 +59,7 @@ class RunningStraight:
 
 @dataclass(frozen=True)
 class Course:
-    """A heading and a speed that were ordered; backwards if it is negative."""
+    """A commanded heading and speed; backwards if the speed is negative."""
 
     heading: float
     speed: float
@@ -70,25 +70,25 @@ Want = tuple[float, float]
 
 
 class Law(Protocol):
-    """How one kind of autopilot drives."""
+    """Control law of one kind of autopilot."""
 
     def set_out(self, straight: RunningStraight, here: Estimate) -> None:
-        """At the beginning of a straight."""
+        """Begin a straight."""
 
     def follow(self, straight: RunningStraight, here: Estimate, speed: float, dt: float) -> Want:
-        """On the way to its end; sets `reached`."""
+        """Follow a straight to its end; sets `reached`."""
 
     def steer(self, course: Course, here: Estimate) -> Want: ...
 
     def reset(self) -> None:
-        """Forget the loops' past: they are begun anew."""
+        """Forget the loops' past: they begin again."""
 
     def output(self, want: Want, here: Estimate, dt: float) -> tuple[float, float]:
         """Throttle and steering, within ±1 or beyond."""
 
 
 class ArduPilotLaw:
-    """Of ArduPilot Rover with skid steering."""
+    """Control law of ArduPilot Rover with skid steering."""
 
     def __init__(self, tuning: Tuning) -> None:
         self._p = tuning
@@ -111,13 +111,13 @@ class ArduPilotLaw:
         to_x, to_y = target[0] - here.pose.x, target[1] - here.pose.y
         gain = self._p["PSC_POS_P"]
         want = _within((velocity[0] + gain * to_x, velocity[1] + gain * to_y), speed)
-        self._look_for_the_end(straight, here, math.hypot(to_x, to_y))
+        self._check_end(straight, here)
         return self._ahead_and_turn(want, push, here)
 
     def _run(
         self, straight: RunningStraight, here: Estimate, speed: float, dt: float
     ) -> tuple[Point, Point, Point]:
-        """The running target: its place, velocity and acceleration."""
+        """Position, velocity and acceleration of the running target."""
         p, (ux, uy) = self._p, straight.along
         accel = p["WP_ACCEL"] or p["ATC_ACCEL_MAX"] or 20.0
         smooth_s = accel / (p["WP_JERK"] or accel)
@@ -129,8 +129,8 @@ class ArduPilotLaw:
         push = (straight.run_speed - before) / dt
         return at, (ux * straight.run_speed, uy * straight.run_speed), (ux * push, uy * push)
 
-    def _scale(self, straight: RunningStraight, here: Estimate, share: float) -> None:
-        """The target's time runs slower for a vehicle that does not keep up with it."""
+    def _scale(self, straight: RunningStraight, here: Estimate, weight: float) -> None:
+        """Slow the target's time for a vehicle that does not keep up with it."""
         if straight.run_speed <= 0:
             return
         ux, uy = straight.along
@@ -138,10 +138,10 @@ class ArduPilotLaw:
             straight.run_m - (here.pose.x - straight.start[0]) * ux - (here.pose.y - straight.start[1]) * uy
         )
         keeps_up = (here.speed_x * ux + here.speed_y * uy - self._p["PSC_POS_P"] * ahead) / straight.run_speed
-        straight.scale += (max(0.0, min(1.0, 0.05 + keeps_up)) - straight.scale) * share
+        straight.scale += (max(0.0, min(1.0, 0.05 + keeps_up)) - straight.scale) * weight
 
-    def _look_for_the_end(self, straight: RunningStraight, here: Estimate, away: float) -> None:
-        """Reached within the radius or past the finish line, once the target is there."""
+    def _check_end(self, straight: RunningStraight, here: Estimate) -> None:
+        """Set `reached` within the radius or past the finish line, once the target is there."""
         if straight.length - straight.run_m <= REACHED_M:
             ux, uy = straight.along
             past = (here.pose.x - straight.end[0]) * ux + (here.pose.y - straight.end[1]) * uy
@@ -196,7 +196,7 @@ class ArduPilotLaw:
 
 
 class Px4Law:
-    """Of PX4's differential rover."""
+    """Control law of PX4's differential rover."""
 
     def __init__(self, tuning: Tuning) -> None:
         self._p = tuning
@@ -207,28 +207,28 @@ class Px4Law:
         self._speed = self._turn = self._sum = 0.0
 
     def set_out(self, straight: RunningStraight, here: Estimate) -> None:
-        """Nothing: whether it turns on the spot is decided anew at every moment."""
+        """Do nothing: at every moment it decides again if it turns on the spot."""
 
     def follow(self, straight: RunningStraight, here: Estimate, speed: float, dt: float) -> Want:
-        p, place = self._p, (here.pose.x, here.pose.y)
-        away, begun = math.dist(place, straight.end), math.dist(place, straight.start)
+        p, position = self._p, (here.pose.x, here.pose.y)
+        away, begun = math.dist(position, straight.end), math.dist(position, straight.start)
         straight.reached = away <= p["NAV_ACC_RAD"]
         if straight.reached:
             return 0.0, 0.0
         slows = math.sqrt(2 * p["RO_DECEL_LIM"] * away)
         starts = math.sqrt(2 * p["RO_ACCEL_LIM"] * begun) + STARTS_M_S
         speed = min(speed, slows, starts)
-        return self.steer(Course(self._pursued(straight, place, speed), speed), here)
+        return self.steer(Course(self._pursued(straight, position, speed), speed), here)
 
-    def _pursued(self, straight: RunningStraight, place: Point, speed: float) -> float:
+    def _pursued(self, straight: RunningStraight, position: Point, speed: float) -> float:
         """Bearing of the point of the straight that lies a lookahead away (pure pursuit)."""
         p, (ux, uy) = self._p, straight.along
         ahead = max(p["PP_LOOKAHD_MIN"], min(p["PP_LOOKAHD_MAX"], p["PP_LOOKAHD_GAIN"] * speed))
-        along = (place[0] - straight.start[0]) * ux + (place[1] - straight.start[1]) * uy
-        across = (place[1] - straight.start[1]) * ux - (place[0] - straight.start[0]) * uy
+        along = (position[0] - straight.start[0]) * ux + (position[1] - straight.start[1]) * uy
+        across = (position[1] - straight.start[1]) * ux - (position[0] - straight.start[0]) * uy
         reach = min(straight.length, along + math.sqrt(max(0.0, ahead * ahead - across * across)))
         aim = (straight.start[0] + reach * ux, straight.start[1] + reach * uy)
-        return math.atan2(aim[1] - place[1], aim[0] - place[0])
+        return math.atan2(aim[1] - position[1], aim[0] - position[0])
 
     def steer(self, course: Course, here: Estimate) -> Want:
         """Turn on the spot while the bearing is far off, else drive."""
@@ -241,26 +241,25 @@ class Px4Law:
         p = self._p
         self._speed = _toward(self._speed, want[0], p["RO_ACCEL_LIM"] * dt, p["RO_DECEL_LIM"] * dt)
         self._turn += _limit(want[1] - self._turn, math.radians(p["RO_YAW_ACCEL_LIM"]) * dt)
-        felt = here.ahead if abs(here.ahead) > p["RO_SPEED_TH"] else 0.0
-        self._sum = (
-            _limit(self._sum + p["RO_SPEED_I"] * (self._speed - felt) * dt, 1.0) if self._speed else 0.0
-        )
-        throttle = self._speed / p["RO_MAX_THR_SPEED"] + p["RO_SPEED_P"] * (self._speed - felt) + self._sum
-        return (throttle if self._speed or felt else 0.0), self._turn / math.radians(p["SIM_TURN_TOP"])
+        measured = here.ahead if abs(here.ahead) > p["RO_SPEED_TH"] else 0.0
+        off = self._speed - measured
+        self._sum = _limit(self._sum + p["RO_SPEED_I"] * off * dt, 1.0) if self._speed else 0.0
+        throttle = self._speed / p["RO_MAX_THR_SPEED"] + p["RO_SPEED_P"] * off + self._sum
+        return (throttle if self._speed or measured else 0.0), self._turn / math.radians(p["SIM_TURN_TOP"])
 
 
 LAWS: dict[str, type[ArduPilotLaw] | type[Px4Law]] = {"ardupilot": ArduPilotLaw, "px4": Px4Law}
 
 
 def _smooth(length: float, speed: float, accel: float, smooth_s: float, run_s: float) -> tuple[float, float]:
-    """Way and speed from rest to rest with limited acceleration and jerk, after `run_s`.
+    """Distance and speed from rest to rest with limited acceleration and jerk, after `run_s`.
 
-    The mean over `smooth_s` of what an acceleration that sets in at once would do.
+    It is the mean over `smooth_s` of a motion whose acceleration begins at once.
     """
     parts = [
         _run_after(length, speed, accel, run_s - (part + 0.5) / PARTS * smooth_s) for part in range(PARTS)
     ]
-    return sum(way for way, _ in parts) / PARTS, sum(fast for _, fast in parts) / PARTS
+    return sum(run for run, _ in parts) / PARTS, sum(fast for _, fast in parts) / PARTS
 
 
 def _run_after(length: float, speed: float, accel: float, seconds: float) -> tuple[float, float]:

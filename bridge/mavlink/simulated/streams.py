@@ -1,4 +1,4 @@
-"""How often the vehicle sends each message, and which is due."""
+"""Intervals at which the simulated vehicle sends its messages, and the messages that are due."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ DEFAULT_US: dict[int, int] = {
     MessageId.HOME_POSITION: 2_000_000,
     MessageId.EXTENDED_SYS_STATE: 1_000_000,
 }
-"""How often each is sent unless a station asks otherwise; the others only when something happens."""
+"""Interval of each message unless a station requests another; the others are sent only on events."""
 
 
 class Streams:
-    """Which message is due when, on the wall's clock: stations look at their own, however time is sped up."""
+    """Due time of each message, by the wall's clock: stations use their own, however time is sped up."""
 
     def __init__(self, clock: Clock, known: Collection[int]) -> None:
         self._clock = clock
@@ -37,11 +37,11 @@ class Streams:
         self._due_ns = dict.fromkeys(DEFAULT_US, clock.now_ns())
 
     def interval_us(self, number: int) -> int:
-        """0: not known; -1: not sent."""
+        """Interval of a message; 0 if it is not known, -1 if it is not sent."""
         return self._every_us.get(number, -1) if number in self._known else 0
 
     def set(self, number: int, interval_us: float) -> bool:
-        """0: as by default; negative: no more; false if the message is not known."""
+        """Set an interval (0: default, negative: never); false if the message is not known."""
         if number not in self._known or not math.isfinite(interval_us):
             return False
         wanted = DEFAULT_US.get(number, -1) if interval_us == 0 else round(interval_us)

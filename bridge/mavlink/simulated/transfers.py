@@ -1,4 +1,4 @@
-"""The vehicle's end of the mission protocol: lists of items that come and go, by the habits of its kind."""
+"""The simulated vehicle's end of the mission protocol: uploads and downloads, by its kind's behaviour."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import msgspec
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated.item_check import ACCEPTED, verdict
 from stopgo.bridge.mavlink.simulated.replies import (
     item_float,
@@ -19,7 +18,8 @@ from stopgo.bridge.mavlink.simulated.replies import (
     received_item,
 )
 from stopgo.bridge.mavlink.simulated.vehicle_faults import Mishaps
-from stopgo.bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, KeptItems, Store
+from stopgo.bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, Store, StoredItems
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item
@@ -35,7 +35,7 @@ class Upload:
     station: Who
     kind: int
     count: int
-    heard_ns: int
+    received_ns: int
     asked_ns: int = 0
     items: list[Item] = field(default_factory=list)
     marked: int | None = None
@@ -48,19 +48,19 @@ class Download:
 
     station: Who
     kind: int
-    heard_ns: int
+    received_ns: int
     next: int = 0
 
 
 class Transfers:
-    """Every mission message of every station comes here.
+    """Handles every mission message of every station.
 
     Parameters
     ----------
     stored
         Called with the kind and the item marked as current when a list was replaced or cleared.
     running
-        Whether the mission is being driven.
+        True while the mission is being driven.
     event
         Called with the number of an upload's item that has come, before anything else; false: it is lost.
     """
@@ -71,7 +71,7 @@ class Transfers:
         store: Store,
         clock: Clock,
         *,
-        say: Callable[[Message], None],
+        send: Callable[[Message], None],
         text: Callable[[str], None],
         home: Callable[[], Item],
         stored: Callable[[int, int | None], None],
@@ -82,7 +82,7 @@ class Transfers:
         self._autopilot, self._habits = autopilot, autopilot.behaviour
         self._one_by_one = autopilot.gives_items == "in order"
         self._store, self._clock = store, clock
-        self._say, self._text, self._home, self._stored = say, text, home, stored
+        self._send, self._text, self._home, self._stored = send, text, home, stored
         self._running, self._event, self._mishaps = running, event, mishaps
         self._upload: Upload | None = None
         self._download: Download | None = None
@@ -97,35 +97,35 @@ class Transfers:
             "MISSION_REQUEST_INT": self._request,
             "MISSION_REQUEST": self._request,
             "MISSION_CLEAR_ALL": self._clear_all,
-            "MISSION_ACK": self._ack_came,
+            "MISSION_ACK": self._take_ack,
             "MISSION_REQUEST_PARTIAL_LIST": self._partial,
             "MISSION_WRITE_PARTIAL_LIST": self._partial,
         }
 
     def reset(self) -> None:
-        """Forget what is under way, as a reboot does."""
+        """Forget transfers under way, as a reboot does."""
         self._upload = self._download = self._done = None
 
     def tick(self) -> None:
-        """Ask again, or give up."""
+        """Request again, or give up."""
         now, up, down, habits = self._clock.now_ns(), self._upload, self._download, self._habits
-        if up and now - up.heard_ns > habits.give_up_s * 1e9:
+        if up and now - up.received_ns > habits.give_up_s * 1e9:
             self._upload = None
             if habits.tells_giving_up:
                 self._ack(up.station, MissionResult.OPERATION_CANCELLED, up.kind)
         elif up and now - up.asked_ns >= habits.ask_again_s * 1e9:
             self._ask(up)
-        if down and now - down.heard_ns > habits.give_up_s * 1e9:
+        if down and now - down.received_ns > habits.give_up_s * 1e9:
             self._download = None
 
-    def items(self, kind: int) -> KeptItems:
-        """The list as stations read it: with the vehicle's own home in front where it has one."""
+    def items(self, kind: int) -> StoredItems:
+        """The list as stations read it: with the vehicle's own home as first item where it has one."""
         items = self._store.items(kind)
         if kind == MISSION and self._autopilot.home_first and items:
             return (self._home(), *items[1:])
         return items
 
-    # What comes
+    # Messages in
 
     def _count(self, who: Who, message: Message) -> None:
         up, habits, kind = self._upload, self._habits, message.mission_type
@@ -148,7 +148,7 @@ class Transfers:
             return self._ack(who, ACCEPTED, kind)
         if not self._habits.atomic:
             self._store.put(kind, self._store.items(kind)[:count])
-        self._upload = Upload(who, kind, count, heard_ns=self._clock.now_ns())
+        self._upload = Upload(who, kind, count, received_ns=self._clock.now_ns())
         self._ask(self._upload)
 
     def _item(self, who: Who, message: Message) -> None:
@@ -168,7 +168,7 @@ class Transfers:
         if result != ACCEPTED:
             self._upload = None
             return self._ack(who, result, up.kind)
-        up.heard_ns = self._clock.now_ns()
+        up.received_ns = self._clock.now_ns()
         self._take(up, item, marked=bool(message.current))
 
     def _verdict(self, up: Upload, item: Item) -> int:
@@ -195,16 +195,16 @@ class Transfers:
             self._ack(up.station, ACCEPTED, up.kind)
 
     def _stray(self, up: Upload) -> None:
-        """An item that was not asked for; the station is alive, though ArduPilot does not count it."""
+        """Answer an item that was not requested; it shows a live station, except to ArduPilot."""
         if self._habits.strays != "tell":
-            up.heard_ns = self._clock.now_ns()
+            up.received_ns = self._clock.now_ns()
         if self._habits.strays == "tell":
             self._ack(up.station, MissionResult.INVALID_SEQUENCE, up.kind)
         elif self._habits.strays == "ask":
             self._ask(up)
 
     def _no_upload(self, who: Who, message: Message) -> None:
-        """An item without an upload: a late copy of one that is over, or nonsense."""
+        """Answer an item without an upload: a late copy of one that is over, or nonsense."""
         kind, done = message.mission_type, self._done
         if (who, kind, message.seq) == done:
             return self._ack(who, self._habits.last_again, kind)
@@ -221,8 +221,8 @@ class Transfers:
         if self._one_by_one:
             if self._download and (self._download.station, self._download.kind) != (who, kind):
                 return self._busy(who, kind)
-            self._download = Download(who, kind, heard_ns=self._clock.now_ns())
-        self._say_count(who, kind)
+            self._download = Download(who, kind, received_ns=self._clock.now_ns())
+        self._send_count(who, kind)
 
     def _request(self, who: Who, message: Message) -> None:
         kind, number = message.mission_type, message.seq
@@ -237,14 +237,14 @@ class Transfers:
             items = (self._home(),)  # source: home can always be read
         if number < len(items):
             whole = message.get_type() == "MISSION_REQUEST_INT"
-            return self._say((item_int if whole else item_float)(who, kind, number, items[number]))
+            return self._send((item_int if whole else item_float)(who, kind, number, items[number]))
         if self._habits.counts_again:
-            self._say_count(who, kind)
+            self._send_count(who, kind)
             return self._ack(who, MissionResult.ERROR, kind)
         self._ack(who, MissionResult.INVALID_SEQUENCE, kind)
 
     def _in_order(self, who: Who, kind: int, number: int) -> bool:
-        """Whether the item is given: the next one, or the last one again; anything else ends it (source)."""
+        """True for the next item, or the last one again; anything else ends the download (source)."""
         down = self._download
         if down is None or (down.station, down.kind) != (who, kind):
             return False
@@ -252,7 +252,7 @@ class Transfers:
             self._download = None
             self._ack(who, MissionResult.ERROR, kind)
             return False
-        down.heard_ns, down.next = self._clock.now_ns(), number + 1
+        down.received_ns, down.next = self._clock.now_ns(), number + 1
         return True
 
     def _clear_all(self, who: Who, message: Message) -> None:
@@ -268,7 +268,7 @@ class Transfers:
             self._replace(one, (), None)
         self._ack(who, ACCEPTED, kind)
 
-    def _ack_came(self, who: Who, message: Message) -> None:
+    def _take_ack(self, who: Who, message: Message) -> None:
         up, down = self._upload, self._download
         if down and (down.station, down.kind) == (who, message.mission_type):
             self._download = None
@@ -277,7 +277,7 @@ class Transfers:
             self._upload = None
 
     def _busy(self, who: Who, kind: int) -> None:
-        """Somebody's upload is under way: PX4 says so to people only (source)."""
+        """Refuse during an upload by somebody else: PX4 does so in a text for people only (source)."""
         if self._habits.busy_in_words:
             self._text("Busy with a mission transfer")
         else:
@@ -286,10 +286,10 @@ class Transfers:
     def _partial(self, who: Who, message: Message) -> None:
         self._ack(who, MissionResult.UNSUPPORTED, message.mission_type)
 
-    # What is said
+    # Messages out
 
-    def _replace(self, kind: int, items: KeptItems, marked: int | None) -> None:
-        """The same list again changes nothing on PX4 (source: it compares a checksum)."""
+    def _replace(self, kind: int, items: StoredItems, marked: int | None) -> None:
+        """Store a list; the same list again changes nothing on PX4 (source: it compares a checksum)."""
         same = _same(self._store.items(kind), items)
         self._store.put(kind, items)
         if not (same and self._habits.same_is_nothing):
@@ -297,16 +297,16 @@ class Transfers:
 
     def _ask(self, up: Upload) -> None:
         up.asked_ns = self._clock.now_ns()
-        self._say(item_wanted(up.station, up.kind, len(up.items), as_int=self._habits.asks_int))
+        self._send(item_wanted(up.station, up.kind, len(up.items), as_int=self._habits.asks_int))
 
     def _ack(self, who: Who, result: int, kind: int) -> None:
-        self._say(mission_ack(who, kind, result))
+        self._send(mission_ack(who, kind, result))
 
-    def _say_count(self, who: Who, kind: int) -> None:
+    def _send_count(self, who: Who, kind: int) -> None:
         count = len(self.items(kind))
-        self._say(mission_count(who, kind, count))
+        self._send(mission_count(who, kind, count))
 
 
-def _same(one: KeptItems, other: KeptItems) -> bool:
-    """Bit by bit, for a NaN is not equal to itself."""
+def _same(one: StoredItems, other: StoredItems) -> bool:
+    """True if two lists are equal bit by bit, as a NaN is not equal to itself."""
     return msgspec.msgpack.encode(one) == msgspec.msgpack.encode(other)

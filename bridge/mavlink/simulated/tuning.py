@@ -1,8 +1,9 @@
-"""The numbers by which the vehicle drives: an autopilot's parameters, and what its chassis is like.
+"""Numbers by which the simulated vehicle drives: an autopilot's parameters, and those of its chassis.
 
 The autopilots' names are those of their sources (ArduPilot Rover 4.7: AR_WPNav, AR_PivotTurn,
 AR_AttitudeControl, AR_PosControl; PX4: RoverControl, rover_differential). ArduPilot's values are those of the
-Rover whose log of five stops the vehicle was compared with. SIM_ is what is simulated: no autopilot has it.
+Rover whose log of five stops the vehicle was compared with. No autopilot has those with SIM_: they describe
+the simulation.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ SERVOS = {
     "SERVO1_FUNCTION": 73.0,
     "SERVO3_FUNCTION": 74.0,
 }
-"""Outputs for each side, so that it turns on the spot."""
+"""Separate outputs for each side, so that it turns on the spot."""
 STRICT = {"WP_RADIUS": 0.1}
 OF_KIND: Mapping[str, Mapping[str, float]] = {
     "ardupilot": {**ARDUPILOT_ROVER, **SERVOS, **CHASSIS},
@@ -69,7 +70,7 @@ HIGHEST = 10_000.0
 
 
 class Tuning:
-    """The parameters of one vehicle, as they are now."""
+    """Present parameters of one vehicle."""
 
     def __init__(self, kind: str, **changed: float) -> None:
         self._kind = AUTOPILOTS[kind]
@@ -81,7 +82,7 @@ class Tuning:
         return self.values[name]
 
     def set(self, name: str, value: float) -> bool:
-        """Change one; false if it cannot be that."""
+        """Change a parameter; false if the value is not allowed."""
         least = 1e-3 if name in MUST_BE_MORE else 0.0
         if name not in self.values or not (math.isfinite(value) and least <= value <= HIGHEST):
             return False

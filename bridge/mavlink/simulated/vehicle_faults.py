@@ -1,4 +1,4 @@
-"""What is to go wrong with the simulated vehicle."""
+"""Faults that the simulated vehicle is to have."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RESULTS = range(15)
 
 @dataclass(frozen=True)
 class VehicleFault:
-    """Something that goes wrong; what `at` and `amount` mean is in `FAULTS`."""
+    """One fault; `FAULTS` explains `at` and `amount`."""
 
     kind: VehicleFaultKind
     at: int
@@ -30,23 +30,23 @@ class VehicleFault:
 
 
 FAULTS: dict[VehicleFaultKind, str] = {
-    "loss": "N percent of the frames are lost, each way; AMOUNT is the seed",
-    "duplicates": "N percent of the frames come twice, each way; AMOUNT is the seed",
-    "jitter": "frames are late by up to N ms, each way, and overtake each other; AMOUNT is the seed",
+    "loss": "N percent of the frames are lost in each direction; AMOUNT is the seed",
+    "duplicates": "N percent of the frames come twice in each direction; AMOUNT is the seed",
+    "jitter": "frames are late by up to N ms in each direction, and overtake each other; AMOUNT is the seed",
     "lostack": "the last ACK of upload N is not sent",
     "nack": "item N of an upload is refused once, with MAV_MISSION_RESULT AMOUNT (0: ERROR)",
-    "silent": "once, from item N of an upload on, nothing is said or heard, for AMOUNT seconds (0: for good)",
+    "silent": "once, from item N of an upload on, nothing is sent or received for AMOUNT s (0: for good)",
     "reboot-upload": "the vehicle reboots once, when item N of an upload has come",
-    "reboot-mission": "the vehicle reboots once, on the way to item N",
-    "beside": "the vehicle stands AMOUNT metres to the left of item N's waypoint, and says it is reached",
-    "finish": "item N's waypoint is said to be reached AMOUNT metres before it, in passing",
+    "reboot-mission": "the vehicle reboots once, on the path to item N",
+    "beside": "the vehicle stops AMOUNT metres to the left of item N's waypoint, and reports it as reached",
+    "finish": "item N's waypoint is reported as reached AMOUNT metres before it, in passing",
     "scanner": "scan N fails",
-    "jump": "N seconds after it was switched on, where it believes it is jumps by AMOUNT metres, for good",
-    "gap": "N seconds after it was switched on, nothing is said or heard for AMOUNT seconds",
+    "jump": "N seconds after it was switched on, its estimated position jumps by AMOUNT metres, for good",
+    "gap": "N seconds after it was switched on, nothing is sent or received for AMOUNT seconds",
     "restart": "N seconds after it was switched on, it reboots, and takes AMOUNT seconds more for that",
-    "unplaced": "its origin came too soon: it is told, but no place on earth is (N means nothing)",
-    "camera": "its scanner tells of scans as a component of its own, 100 (N means nothing)",
-    "unsigned": "nothing is signed, though there is a key; only what is signed is heard (N means nothing)",
+    "unplaced": "its origin came too soon: it reports it, but no position on earth (N means nothing)",
+    "camera": "its scanner reports scans as a component of its own, 100 (N means nothing)",
+    "unsigned": "it signs nothing, though it has a key; it accepts only signed messages (N means nothing)",
 }
 
 
@@ -58,7 +58,7 @@ class VehicleFaults:
         return next((fault for fault in self.all if (fault.kind, fault.at) == (kind, at)), None)
 
     def any(self, kind: VehicleFaultKind) -> VehicleFault | None:
-        """The first fault of a kind, wherever it is due."""
+        """The first fault of a kind, whenever it is due."""
         return next((fault for fault in self.all if fault.kind == kind), None)
 
 
@@ -108,7 +108,7 @@ def read_vehicle_fault(text: str) -> VehicleFault:
 
 
 def _nonsense(fault: VehicleFault) -> str | None:
-    """What a fault must be that could not happen as it is."""
+    """Rule that a fault breaks, as it could not happen; `None` if it breaks none."""
     kind, at, amount = fault.kind, fault.at, fault.amount
     percent = at > 100, f"N is a percentage, 0 to 100, such as {kind}@20"
     counted = at == 0, f"N counts from 1: {kind}@1 is the first"

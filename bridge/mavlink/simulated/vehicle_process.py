@@ -1,4 +1,4 @@
-"""The simulated vehicle on a wire: one thread that hears, lets time pass, and speaks."""
+"""The simulated vehicle on a link: one thread receives, lets time pass, and sends."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from stopgo.bridge.link.clock import WallClock
-from stopgo.bridge.mavlink.line.transport import open_transport
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import Who, Wire, read_line
 from stopgo.bridge.mavlink.simulated.command_handlers import NORTHMOST
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.lossy_line import on_line
 from stopgo.bridge.mavlink.simulated.profiles import profile_named
 from stopgo.bridge.mavlink.simulated.rover import to_east
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
-from stopgo.bridge.mavlink.simulated.vehicle import Setting, Vehicle
+from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import Who, Wire, read_link
 from stopgo.mission.errors import InputError
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.enums import Component
@@ -30,12 +30,12 @@ from stopgo.mission.run.events import Pose
 OPTION = "--mavlink"
 VEHICLE = Who(1, 1)
 STEP_S = 0.02
-"""How often the time is looked at while nothing comes in."""
+"""Interval at which time passes while no message comes in."""
 
 
 @dataclass(frozen=True)
 class VehicleOptions:
-    """What the command line says."""
+    """Options of the command line."""
 
     url: str
     profile: str = "strict"
@@ -45,54 +45,54 @@ class VehicleOptions:
     insecure: bool = False
     origin: str | None = None
     at: Pose | None = None
-    """In the site's frame, whose +y bears what the origin says."""
+    """In the site's frame, whose +y has the bearing that the origin gives."""
     faults: tuple[str, ...] = field(default=())
     seed: int | None = 1
-    """As in `Setting`."""
+    """As in `VehicleSetup`."""
     parameters: tuple[str, ...] = field(default=())
     """NAME=VALUE each."""
 
 
 def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
-    """Be a vehicle until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
+    """Run a vehicle until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
     signal.signal(signal.SIGTERM, _leave)
-    url, key = read_line(options.url, options.signing_key, insecure=options.insecure, option=OPTION)
-    with vehicle_on(url, setting_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
+    url, key = read_link(options.url, options.signing_key, insecure=options.insecure, option=OPTION)
+    with vehicle_on(url, setup_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
         ready(url)
         stopped.wait()
     if stopped.error is not None:
         raise stopped.error
-    raise SystemExit(1)  # its thread has told why
+    raise SystemExit(1)  # its thread has printed why
 
 
 class Stopped(threading.Event):
-    """Set when a vehicle has stopped, by itself or because it was to."""
+    """Set when a vehicle has stopped, by itself or on command."""
 
     error: OSError | None = None
-    """What the disk said when its state could not be kept."""
+    """Error of the disk when the vehicle's state could not be saved."""
 
 
 @contextmanager
 def vehicle_on(
-    url: Url, setting: Setting, *, speed_up: float = 1.0, signing_key: bytes | None = None
+    url: Url, setup: VehicleSetup, *, speed_up: float = 1.0, signing_key: bytes | None = None
 ) -> Iterator[Stopped]:
-    """A vehicle at `url` while the block runs; the event tells that it has stopped by itself.
+    """A vehicle at `url` while the block runs; the event is set when it has stopped by itself.
 
     Raises
     ------
     InputError
         If it cannot be opened there.
     """
-    signs = setting.faults.any("unsigned") is None
-    line = on_line(open_transport(url), setting.faults)
+    signs = setup.faults.any("unsigned") is None
+    line = on_line(open_transport(url), setup.faults)
     with closing(Wire(line, me=VEHICLE, signing_key=signing_key, signs=signs)) as wire:
-        apart = setting.faults.any("camera") is not None
+        apart = setup.faults.any("camera") is not None
 
-        def say(message: Message) -> None:
+        def send(message: Message) -> None:
             of_camera = apart and message.get_type() == "CAMERA_IMAGE_CAPTURED"
             wire.send(message, component=Component.CAMERA if of_camera else None)
 
-        vehicle = complete_vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=say)
+        vehicle = complete_vehicle(setup, clock=WallClock(speed_up=speed_up), wall=WallClock(), send=send)
         stop, stopped = threading.Event(), Stopped()
         thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
         thread.start()
@@ -112,15 +112,15 @@ def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: Stopped)
                     vehicle.advance()
                 else:
                     vehicle.receive(message)
-        vehicle.rest()
+        vehicle.save_pose()
     except OSError as error:
         stopped.error = error
     finally:
         stopped.set()
 
 
-def setting_of(options: VehicleOptions) -> Setting:
-    """What the options mean.
+def setup_of(options: VehicleOptions) -> VehicleSetup:
+    """Setup of the vehicle by these options.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def setting_of(options: VehicleOptions) -> Setting:
         None if origin is None else SiteOrigin(lat=origin.lat, lon=origin.lon, alt=origin.alt, heading_deg=0)
     )
     autopilot = profile_named(options.profile)
-    return Setting(
+    return VehicleSetup(
         autopilot=autopilot,
         state=options.state,
         origin=level,
@@ -152,7 +152,7 @@ def _read_parameter(kind: str, text: str) -> tuple[str, float]:
         raise InputError(f"--param {text}: write NAME=VALUE, as WP_RADIUS=0.1") from None
     if not Tuning(kind).set(name, number):
         known = ", ".join(sorted(Tuning(kind).values))
-        raise InputError(f"--param {text}: no value that it can have; its parameters are {known}")
+        raise InputError(f"--param {text}: not an allowed value; its parameters are {known}")
     return name, number
 
 

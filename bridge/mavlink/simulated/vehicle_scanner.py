@@ -1,6 +1,6 @@
-"""The scanner on the vehicle: takes its time, needs the rover to stand, names a file that was never written.
+"""The simulated scanner on the vehicle: it needs time and a standstill, and names a file that never exists.
 
-How a scanner on a MAVLink vehicle confirms a scan (read by the gateway): CAMERA_IMAGE_CAPTURED with the
+A scanner on a MAVLink vehicle confirms a scan thus (read by the gateway): CAMERA_IMAGE_CAPTURED with the
 running number of the scan (from 0), capture_result 1, and a file_url `NAME.e57?size=N&points=N&sha256=HEX`.
 """
 
@@ -25,9 +25,9 @@ class RunningScan:
     """A scan under way."""
 
     number: int
-    """What the trigger carried; 0 if nothing."""
+    """Number in the trigger; 0 if none."""
     index: int
-    """How many scans the vehicle has begun before."""
+    """Number of scans that the vehicle began before."""
     began_ns: int
     ends_ns: int
     began_at: Pose
@@ -35,14 +35,14 @@ class RunningScan:
 
 @dataclass(frozen=True)
 class ScanEnd:
-    """How a scan ended."""
+    """End of a scan."""
 
     index: int
     number: int
     file_url: str
     """Empty if the scan failed."""
     why: str = ""
-    """Why it failed."""
+    """Reason of a failure."""
 
 
 class VehicleScanner:
@@ -54,7 +54,7 @@ class VehicleScanner:
         self.scan: RunningScan | None = None
 
     def begin(self, number: int, seconds: float, *, index: int, pose: Pose, now_ns: int) -> bool:
-        """Begin a scan that takes so long; false if one is under way."""
+        """Begin a scan of this duration; false if one is under way."""
         if self.scan is not None:
             return False
         self._begun += 1
@@ -63,7 +63,7 @@ class VehicleScanner:
         return True
 
     def end(self, pose: Pose) -> ScanEnd:
-        """What became of the scan that is due."""
+        """End the scan that is due."""
         scan = self.scan
         assert scan is not None
         self.scan = None

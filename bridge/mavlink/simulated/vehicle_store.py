@@ -1,4 +1,4 @@
-"""What the vehicle keeps when switched off: its items, and where it stands; one file, replaced whole."""
+"""State that outlives the simulated vehicle: its items and its pose; one file, replaced whole."""
 
 from __future__ import annotations
 
@@ -11,45 +11,45 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.run.events import Pose
 
-KeptItems = tuple[Item, ...]
+StoredItems = tuple[Item, ...]
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 """MAV_MISSION_TYPE."""
 
 
-class Kept(msgspec.Struct, frozen=True, kw_only=True):
+class StoredState(msgspec.Struct, frozen=True, kw_only=True):
     """All that outlives the vehicle's process."""
 
-    mission: KeptItems = ()
+    mission: StoredItems = ()
     """Numbered as on the vehicle: item 0 is home where the autopilot has it so."""
-    fence: KeptItems = ()
-    rally: KeptItems = ()
+    fence: StoredItems = ()
+    rally: StoredItems = ()
     pose: Pose | None = None
     """Metres east and north of the origin, radians counter-clockwise from east."""
     images: int = 0
-    """How many scans were taken, ever."""
+    """Number of scans taken, ever."""
 
 
 class Store:
-    """What is kept, in a file if there is one."""
+    """The stored state, in a file if a folder is given."""
 
     def __init__(self, folder: Path | None) -> None:
         self._path = None if folder is None else folder / "vehicle.msgpack"
         if folder is not None:
             _make(folder)
-        self.kept = _read(self._path)
+        self.stored = _read(self._path)
 
-    def items(self, kind: int) -> KeptItems:
-        return {MISSION: self.kept.mission, FENCE: self.kept.fence, RALLY: self.kept.rally}[kind]
+    def items(self, kind: int) -> StoredItems:
+        return {MISSION: self.stored.mission, FENCE: self.stored.fence, RALLY: self.stored.rally}[kind]
 
-    def put(self, kind: int, items: KeptItems) -> None:
-        self.keep(**{{MISSION: "mission", FENCE: "fence", RALLY: "rally"}[kind]: items})
+    def put(self, kind: int, items: StoredItems) -> None:
+        self.update(**{{MISSION: "mission", FENCE: "fence", RALLY: "rally"}[kind]: items})
 
-    def keep(self, **changed: object) -> None:
-        self.kept = msgspec.structs.replace(self.kept, **changed)
+    def update(self, **changed: object) -> None:
+        self.stored = msgspec.structs.replace(self.stored, **changed)
         if self._path is not None:
-            beside = self._path.with_suffix(".new")
-            beside.write_bytes(msgspec.msgpack.encode(self.kept))
-            os.replace(beside, self._path)
+            new = self._path.with_suffix(".new")
+            new.write_bytes(msgspec.msgpack.encode(self.stored))
+            os.replace(new, self._path)
 
 
 def _make(folder: Path) -> None:
@@ -59,12 +59,12 @@ def _make(folder: Path) -> None:
         raise InputError(f"--state {folder}: cannot be made ({error.strerror})") from None
 
 
-def _read(path: Path | None) -> Kept:
+def _read(path: Path | None) -> StoredState:
     if path is None or not path.exists():
-        return Kept()
+        return StoredState()
     try:
-        return msgspec.msgpack.decode(path.read_bytes(), type=Kept)
+        return msgspec.msgpack.decode(path.read_bytes(), type=StoredState)
     except (OSError, msgspec.DecodeError) as error:
         raise InputError(
-            f"{path}: is not what a simulated vehicle keeps ({error}); remove it to begin anew"
+            f"{path}: not a simulated vehicle's state ({error}); remove it to begin again"
         ) from None

@@ -1,12 +1,12 @@
-"""What the vehicle tells of itself: one function per message."""
+"""Telemetry of the simulated vehicle: one function per message."""
 
 from __future__ import annotations
 
 import math
 
-from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.simulated.rover import bearing
 from stopgo.bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.enums import MessageId, MissionState, ModeFlag, SystemState, VehicleType
 from stopgo.mission.mavlink.telemetry import Message
 
@@ -62,7 +62,7 @@ def battery_status(vehicle: Vehicle) -> Message:
 def attitude(vehicle: Vehicle) -> Message:
     now = vehicle.motion()
     return dialect.MAVLink_attitude_message(
-        vehicle.boot_ms, 0.0, 0.0, bearing(now.pose.heading), 0.0, 0.0, -now.turning
+        vehicle.time.boot_ms, 0.0, 0.0, bearing(now.pose.heading), 0.0, 0.0, -now.turning
     )
 
 
@@ -74,14 +74,14 @@ def global_position(vehicle: Vehicle) -> Message:
     north, east = 100 * now.speed_y, 100 * now.speed_x
     heading = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
     return dialect.MAVLink_global_position_int_message(
-        vehicle.boot_ms, lat, lon, vehicle.rover.alt_mm, 0, round(north), round(east), 0, heading
+        vehicle.time.boot_ms, lat, lon, vehicle.rover.alt_mm, 0, round(north), round(east), 0, heading
     )
 
 
 def local_position(vehicle: Vehicle) -> Message:
     now = vehicle.motion()
     return dialect.MAVLink_local_position_ned_message(
-        vehicle.boot_ms, now.pose.y, now.pose.x, 0.0, now.speed_y, now.speed_x, 0.0
+        vehicle.time.boot_ms, now.pose.y, now.pose.x, 0.0, now.speed_y, now.speed_x, 0.0
     )
 
 
@@ -92,7 +92,7 @@ def gps_raw(vehicle: Vehicle) -> Message:
     fix = dialect.GPS_FIX_TYPE_3D_FIX if vehicle.rover.origin else dialect.GPS_FIX_TYPE_NO_FIX
     auto = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
     return dialect.MAVLink_gps_raw_int_message(
-        vehicle.boot_ms * 1000, fix, lat, lon, vehicle.rover.alt_mm, 50, 50, round(100 * speed), auto, 12
+        vehicle.time.boot_ms * 1000, fix, lat, lon, vehicle.rover.alt_mm, 50, 50, round(100 * speed), auto, 12
     )
 
 
@@ -107,7 +107,9 @@ def origin(vehicle: Vehicle) -> Message | None:
     if vehicle.rover.origin is None:
         return None
     lat, lon = vehicle.rover.place((0.0, 0.0))
-    return dialect.MAVLink_gps_global_origin_message(lat, lon, vehicle.rover.alt_mm, vehicle.boot_ms * 1000)
+    return dialect.MAVLink_gps_global_origin_message(
+        lat, lon, vehicle.rover.alt_mm, vehicle.time.boot_ms * 1000
+    )
 
 
 def home(vehicle: Vehicle) -> Message | None:
@@ -116,7 +118,7 @@ def home(vehicle: Vehicle) -> Message | None:
         return None
     lat, lon = vehicle.rover.place((0.0, 0.0))
     return dialect.MAVLink_home_position_message(
-        lat, lon, vehicle.rover.alt_mm, 0.0, 0.0, 0.0, UPRIGHT, 0.0, 0.0, 0.0, vehicle.boot_ms * 1000
+        lat, lon, vehicle.rover.alt_mm, 0.0, 0.0, 0.0, UPRIGHT, 0.0, 0.0, 0.0, vehicle.time.boot_ms * 1000
     )
 
 
@@ -149,13 +151,13 @@ def item_reached(vehicle: Vehicle) -> Message | None:
 
 
 def image_captured(vehicle: Vehicle) -> Message | None:
-    """Of the scan that ended last."""
+    """Report of the scan that ended last."""
     return vehicle.camera.newest
 
 
 def capture_status(vehicle: Vehicle) -> Message:
     scans, count = int(vehicle.camera.under_way is not None), vehicle.camera.count
-    return dialect.MAVLink_camera_capture_status_message(vehicle.boot_ms, scans, 0, 0.0, 0, 0.0, count)
+    return dialect.MAVLink_camera_capture_status_message(vehicle.time.boot_ms, scans, 0, 0.0, 0, 0.0, count)
 
 
 def autopilot_version(vehicle: Vehicle) -> Message:

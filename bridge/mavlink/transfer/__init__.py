@@ -1,1 +1,1 @@
-"""The mission protocol: lists of items onto a vehicle, and back to be compared."""
+"""The mission protocol: lists of items sent to a vehicle, and read back for comparison."""

@@ -1,6 +1,6 @@
-"""What a vehicle holds: its mission's items, read one by one until every one has come.
+"""Download of the items that a vehicle holds, each requested until it has come.
 
-Several are asked for at once where the vehicle answers in any order; each is asked for again until it came.
+Several are requested at once where the vehicle answers in any order.
 """
 
 from __future__ import annotations
@@ -8,7 +8,8 @@ from __future__ import annotations
 import time
 
 from stopgo.bridge.console import Progress
-from stopgo.bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
+from stopgo.bridge.mavlink.vehicle_link.messages import (
     ack_message,
     item_of,
     item_request,
@@ -16,30 +17,29 @@ from stopgo.bridge.mavlink.line.messages import (
     of_mission,
     result_name,
 )
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message
 
 STUCK = 12
-"""After so many tries without an item others are asked one by one, in order: MAVSDK's vehicle wants it so."""
+"""Tries without a new item, after which items are requested one by one: MAVSDK's vehicle needs that."""
 REFUSALS = 3
-"""So many tries that end with one are meant; fewer may have met late answers to something else."""
-LAST_WORDS = 3
-"""The end of a transfer is not answered, so it is said so often: until it hears, PX4 takes no other."""
+"""Refused tries that make a refusal certain; fewer may be late answers to something else."""
+END_REPEATS = 3
+"""The end of a transfer is not answered, so it is sent this often: until it comes, PX4 takes no other."""
 
 
 def download(
     peer: Peer, *, patience_s: float | None = None, progress: Progress | None = None
 ) -> tuple[Item, ...]:
-    """All that the vehicle holds, its home included where it keeps one.
+    """All items that the vehicle holds, its home included where it has one.
 
     Raises
     ------
     RobotUnreachable
-        If it falls silent.
+        If no data come from it any more.
     AnswerIsNo
         If it refuses, which it does while another station uploads.
     """
@@ -53,7 +53,7 @@ def download(
     if refused is not None:
         raise NegativeResult(
             f"{peer}: reading its mission was answered {result_name(refused)}; "
-            "another station may be at work on it: try again"
+            "another station may be using it: try again"
         )
     return tuple(reading.items[seq] for seq in sorted(reading.items))
 
@@ -70,24 +70,24 @@ class _Reading:
         self._count: int | None = None
         self._next = 0
         self._lists = 0
-        """How often the list was asked for."""
+        """Number of requests for the list."""
         self._listed_s = self._moved_s = time.monotonic()
-        """When the last item came that was not there."""
+        """Time of the last new item."""
         self._asked_s: dict[int, float] = {}
-        """When each item that is under way was asked for last."""
+        """Time of the last request for each item that has not come."""
         self._asked_again: set[int] = set()
         self._refused = False
-        """Whether something was refused since the last try, or, if items may be wanted in order, item."""
+        """True after a refusal since the last try, or since the last item if their order may matter."""
         self._refusals = 0
         self._result = MissionResult.ACCEPTED
 
     def run(self) -> int | None:
-        """Read everything; what the vehicle refuses with, or `None`."""
+        """Read all items; return the result by which the vehicle refuses, or `None`."""
         with self._peer.waiting("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK") as waiting:
             self._ask_count()
             while self._count is None or len(self.items) < self._count:
                 if self._silence.over:
-                    raise RobotUnreachable(f"{self._peer} did not tell its mission{self._peer.why_silent()}")
+                    raise RobotUnreachable(f"{self._peer} did not send its mission{self._peer.why_silent()}")
                 message = waiting.get(self._pace.again_s if self._count is None else self._due_s())
                 if message is None:
                     self._again()
@@ -95,13 +95,13 @@ class _Reading:
                     self._take(message)
                 if self._refusals >= REFUSALS or self._stuck:
                     return self._result
-        for _ in range(LAST_WORDS):
+        for _ in range(END_REPEATS):
             self._peer.send(ack_message(MissionResult.ACCEPTED, self._peer.who))
         return None
 
     @property
     def _stuck(self) -> bool:
-        """Whether a vehicle that wants its items asked for in order seems to wait for another one."""
+        """True if the vehicle seems to wait for a request of another item, in order."""
         late = time.monotonic() - self._moved_s > STUCK * self._pace.again_s
         return late and self._may_want_order
 
@@ -113,7 +113,7 @@ class _Reading:
     def _take(self, message: Message) -> None:
         name = message.get_type()
         if name == "MISSION_ACK":
-            self._silence.heard(went_on=False)
+            self._silence.received(went_on=False)
             if message.type != MissionResult.ACCEPTED:
                 self._refused, self._result = True, message.type
             return
@@ -126,7 +126,7 @@ class _Reading:
     def _take_count(self, count: int) -> None:
         if self._count == count:
             return
-        self._silence.heard(went_on=True)
+        self._silence.received(went_on=True)
         if self._count is None:
             see = self._pace.saw if self._lists == 1 else self._pace.guessed
             see(time.monotonic() - self._listed_s)
@@ -138,9 +138,9 @@ class _Reading:
         self._ask_more()
 
     def _take_item(self, message: Message) -> None:
-        anew = message.seq not in self.items
-        self._silence.heard(went_on=anew)
-        self._moved_s = time.monotonic() if anew else self._moved_s
+        is_new = message.seq not in self.items
+        self._silence.received(went_on=is_new)
+        self._moved_s = time.monotonic() if is_new else self._moved_s
         asked_s = self._asked_s.pop(message.seq, None)
         if asked_s is not None and message.seq not in self._asked_again:
             self._pace.saw(time.monotonic() - asked_s)
@@ -156,7 +156,7 @@ class _Reading:
         self._peer.send(list_request(self._peer.who))
 
     def _ask_more(self) -> None:
-        """Fill the window with the next items that were not asked for."""
+        """Fill the window with requests for the next items."""
         while len(self._asked_s) < self._pace.window and self._next < (self._count or 0):
             self._next += 1
             if self._next - 1 not in self.items:
@@ -167,7 +167,7 @@ class _Reading:
         self._peer.send(item_request(seq, self._peer.who))
 
     def _due_s(self) -> float:
-        """Seconds until the first item has to be asked for again."""
+        """Seconds until the first item has to be requested again."""
         return min(self._asked_s.values()) + self._pace.again_s - time.monotonic()
 
     def _again(self) -> None:

@@ -1,8 +1,8 @@
-"""One transfer of items to a vehicle, until it says how that ended, or falls silent.
+"""One transfer of items to a vehicle, until the vehicle reports its end, or sends no data any more.
 
-Items are pushed ahead of the vehicle's requests, a few at a time: a lost request then costs nothing, and a
-lost item a round trip. What the vehicle says is a hint of how far it is; what it holds in the end is for
-`download` to see.
+Items are sent ahead of the vehicle's requests, a few at a time: so a lost request costs nothing, and a lost
+item costs a round trip. The vehicle's messages only hint at its progress; `download` shows what it holds in
+the end.
 """
 
 from __future__ import annotations
@@ -13,44 +13,44 @@ from dataclasses import dataclass
 from typing import Literal
 
 from stopgo.bridge.console import Progress
-from stopgo.bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout
+from stopgo.bridge.mavlink.vehicle_link.messages import (
     ack_message,
     count_message,
     item_message,
     list_request,
     of_mission,
 )
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message
 
 How = Literal["accepted", "unsure", "refused", "busy", "dropped", "silent", "rebooted"]
-"""How a transfer ended, as far as the vehicle says.
+"""End of a transfer, as far as the vehicle reports it.
 
 unsure: the last item was sent, and no ACCEPTED came · refused: an item, or their number · busy: it never
-began · dropped: the vehicle ended it · silent: nothing came any more · rebooted: the vehicle started again.
+began · dropped: the vehicle ended it · silent: no data came any more · rebooted: the vehicle restarted.
 """
 
-MEANT = 3
-"""So many tries that end with an error are meant; fewer may have met late answers to what was sent before."""
+CERTAIN_ERRORS = 3
+"""Tries with an error that make it certain; fewer may be late answers to what was sent before."""
 PROBE_S = 1.0
 PROBE_AFTER = 4
-"""After so long, or sending so often, without an answer to the last item, ask for what the vehicle holds."""
+"""Time or number of windows without an answer to the last item, after which the list is requested."""
 TIME_EACH = 5
-"""After so many windows without an answer the vehicle's clock is asked for again."""
+"""Number of windows without an answer after which the vehicle's clock is requested again."""
 HINTS = frozenset({MissionResult.INVALID_SEQUENCE})
 ENDINGS = frozenset({MissionResult.ERROR, MissionResult.DENIED, MissionResult.OPERATION_CANCELLED})
-"""These say that there is no transfer, not that an item is wrong."""
-HEARD = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT")
+"""Results that report that there is no transfer, not that an item is wrong."""
+RECEIVED = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT")
 
 
 @dataclass(frozen=True)
 class TransferEnd:
     how: How
     at: int
-    """How many items are known to have arrived; where one was refused, its number."""
+    """Number of items known to have arrived; for a refusal, the number of the refused one."""
     result: int = MissionResult.ACCEPTED
     """MAV_MISSION_RESULT that ended it."""
 
@@ -81,26 +81,26 @@ class _Sending:
         self._progress = progress
         self._boots = peer.boots
         self._begun = False
-        """Whether the vehicle has asked for an item."""
+        """True once the vehicle has requested an item."""
         self._base = 0
-        """All before this one have arrived."""
+        """All items before this one have arrived."""
         self._top = 0
-        """All before this one were sent."""
+        """All items before this one were sent."""
         self._sent_s: dict[int, float] = {}
-        """When each item was sent last; -1 is the count."""
+        """Time when each item was sent last; -1 is the count."""
         self._sent_again: set[int] = set()
         self._moved_s = time.monotonic()
         self._error = False
-        """Whether the vehicle has said that no transfer is under way, since it asked for an item."""
+        """True if the vehicle has reported that no transfer is under way, since its last request."""
         self._errors = 0
         self._result: int = MissionResult.ACCEPTED
         self._unanswered = 0
-        """How often in a row the window was sent without an answer."""
+        """Number of windows in a row without an answer."""
         self._probed = False
-        """Whether the vehicle was asked for its mission, which it does not tell while it receives one."""
+        """True once the list was requested, which the vehicle does not send while it receives one."""
 
     def run(self) -> TransferEnd:
-        with self._peer.waiting(*HEARD) as waiting:
+        with self._peer.waiting(*RECEIVED) as waiting:
             self._send_count()
             while (ended := self._over()) is None:
                 message = waiting.get(self._moved_s + self._pace.again_s - time.monotonic())
@@ -111,10 +111,10 @@ class _Sending:
             return ended
 
     def _over(self) -> TransferEnd | None:
-        """Whether there is nothing more to wait for."""
+        """End of the transfer, if there is nothing more to wait for."""
         if self._peer.boots != self._boots:
             return TransferEnd("rebooted", self._base)
-        if self._errors >= MEANT:
+        if self._errors >= CERTAIN_ERRORS:
             return TransferEnd("dropped" if self._begun else "busy", self._base, self._result)
         if self._silence.over:
             return TransferEnd("unsure" if self._all_sent else "silent", self._base)
@@ -133,14 +133,14 @@ class _Sending:
         return self._top == len(self._items) and (self._begun or not self._items)
 
     def _take_count(self, count: int) -> TransferEnd | None:
-        """A vehicle that tells a mission of our length has finished receiving, or had one of that length."""
+        """End a transfer whose count the vehicle reports: it has all items, or had as many before."""
         return TransferEnd("unsure", self._base) if self._probed and count == len(self._items) else None
 
     def _take_request(self, seq: int) -> None:
         if seq >= len(self._items):
             return
         self._error, self._errors = False, 0
-        self._silence.heard(went_on=seq > self._base or not self._begun)
+        self._silence.received(went_on=seq > self._base or not self._begun)
         if seq > self._base or not self._begun:
             self._go_on(seq)
         elif seq == self._base:
@@ -149,7 +149,7 @@ class _Sending:
             self._send(seq)
 
     def _go_on(self, seq: int) -> None:
-        """The vehicle has all items before `seq`."""
+        """Go on: the vehicle has all items before `seq`."""
         self._see_round_trip(seq - 1)
         self._begun = True
         self._base = seq
@@ -167,7 +167,7 @@ class _Sending:
             see(time.monotonic() - self._sent_s[seq])
 
     def _lacks_base(self) -> None:
-        """The vehicle says what it waits for: a hint that this was lost, if it can have arrived."""
+        """Send again the item that the vehicle waits for, if it can have arrived by now."""
         if self._old_enough(self._base):
             self._send_window()
         else:
@@ -177,7 +177,7 @@ class _Sending:
         return time.monotonic() - self._sent_s.get(seq, 0.0) >= self._pace.soonest_s
 
     def _take_ack(self, result: int) -> TransferEnd | None:
-        self._silence.heard(went_on=False)
+        self._silence.received(went_on=False)
         if result == MissionResult.ACCEPTED:
             return TransferEnd("accepted", len(self._items)) if self._all_sent else None
         if result in HINTS:
@@ -189,26 +189,26 @@ class _Sending:
         return TransferEnd("refused", self._base, result)
 
     def _take_ending(self, result: int) -> TransferEnd | None:
-        """The vehicle says that no transfer is under way: it is over, or it never began."""
+        """Note that the vehicle reports no transfer: it is over, or it never began."""
         self._error, self._result = True, result
         if self._all_sent and result != MissionResult.DENIED:
             return TransferEnd("unsure", self._base, result)
         return None
 
     def _again(self) -> None:
-        """Nothing has come in time: send again what may be lost."""
+        """Send again what may be lost, as nothing came in time."""
         self._pace.waited()
         self._moved_s = time.monotonic()
         self._errors += self._error
         if not self._begun:
             self._error = False
-            if self._silence.seconds > PROBE_S:  # the last word of a download may have been lost
+            if self._silence.seconds > PROBE_S:  # the end of a download may have been lost
                 self._peer.send(ack_message(MissionResult.ACCEPTED, self._peer.who))
             self._send_count()
             return
         self._unanswered += 1
         if self._unanswered % TIME_EACH == 0:
-            self._peer.ask_clock()  # was it started again?
+            self._peer.ask_clock()  # was it restarted?
         self._send_window()
         if self._all_sent and (self._silence.seconds > PROBE_S or self._unanswered >= PROBE_AFTER):
             self._probed = True
@@ -219,7 +219,7 @@ class _Sending:
         self._peer.send(count_message(len(self._items), self._peer.who))
 
     def _push(self) -> None:
-        """Send what has room in the window and was not sent."""
+        """Send the items in the window that were not sent before."""
         for seq in range(self._top, self._end):
             self._send(seq)
         self._top = max(self._top, self._end)
@@ -232,7 +232,7 @@ class _Sending:
 
     @property
     def _end(self) -> int:
-        """Where the window ends: further each time nothing came, or a vehicle that has it all would wait."""
+        """End of the window: later each time nothing came, else a vehicle that has them all would wait."""
         further = min(self._unanswered, self._pace.window) if self._pace.window > 1 else 0
         return min(len(self._items), self._base + self._pace.window + further)
 

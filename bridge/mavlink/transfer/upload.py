@@ -1,8 +1,8 @@
-"""A mission onto a vehicle: sent, read back and compared; or what is on the vehicle instead, and why.
+"""Upload of a mission to a vehicle: sent, read back and compared; a failure says what the vehicle holds.
 
-No acknowledgement counts as success, and no silence as failure: what the vehicle reads back does. Where an
-upload ends half-way, nothing half-uploaded stays that could be started: the mission that was there before
-is put back, or the vehicle emptied.
+An acknowledgement is no proof of success, and silence none of failure: only the list that is read back
+counts. After a failure no part of an upload remains that could be started. The mission from before is put
+back, or the vehicle's mission is cleared.
 """
 
 from __future__ import annotations
@@ -12,12 +12,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from stopgo.bridge.console import Progress
-from stopgo.bridge.mavlink.line.messages import result_name
-from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.flow_control import window_for
 from stopgo.bridge.mavlink.transfer.sending import TransferEnd, send_items
-from stopgo.bridge.mavlink.transfer.upload_recovery import cancel, emptied, left_on, own_items, unknown
+from stopgo.bridge.mavlink.transfer.upload_recovery import (
+    cancel,
+    clear_items,
+    own_items,
+    recovered_content,
+    unknown_content,
+)
+from stopgo.bridge.mavlink.vehicle_link.messages import result_name
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.enums import MissionResult
@@ -27,12 +33,12 @@ from stopgo.mission.mavlink.read_back import differences, upload_of
 ATTEMPTS = 4
 """Whole transfers, where the vehicle ended one or the read-back was not what was sent."""
 CLOCK_S = 2.0
-"""For the vehicle's clock after an upload."""
+"""Longest wait for the vehicle's clock after an upload."""
 NOTHING_SENT = "nothing was sent of the mission; the vehicle holds what it held"
 SHOWN = 3
 """Differences that an error names."""
-Tell = Callable[[str], None]
-"""Takes a line for the person."""
+LineReport = Callable[[str], None]
+"""Takes a line for the user."""
 
 
 @dataclass(frozen=True)
@@ -40,18 +46,18 @@ class Uploaded:
     """A mission that was seen on the vehicle, item by item."""
 
     items: int
-    """How many it holds, its home not counted."""
+    """Number of items that it holds, without its home."""
     already: bool
     """It held them before, and nothing was sent."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a mission is not on the vehicle."""
+    """Reason why a mission is not on the vehicle."""
 
     why: str
     touched: bool = True
-    """Whether what the vehicle held may have changed."""
+    """True if the vehicle's content may have changed."""
 
 
 def upload(
@@ -60,9 +66,9 @@ def upload(
     *,
     while_running: bool = False,
     progress: Progress | None = None,
-    tell: Tell = lambda line: None,
+    report: LineReport = lambda line: None,
 ) -> Uploaded:
-    """Put the items on the vehicle, and see them there as its kind of autopilot keeps them.
+    """Put the items on the vehicle, and see them there as its kind of autopilot stores them.
 
     Parameters
     ----------
@@ -70,9 +76,9 @@ def upload(
         Upload though the vehicle follows a mission; it begins its current item again.
     progress
         Called with items done and to do: those sent, then those read back.
-    tell
-        Takes the one line that says what is on the vehicle when a Ctrl-C has ended the upload; a second
-        Ctrl-C does not wait until that was seen, and the line says that it is unknown.
+    report
+        Takes the one line that says what is on the vehicle when a Ctrl-C has ended the upload. A second
+        Ctrl-C does not wait until that was read, and the line says that it is unknown.
 
     Raises
     ------
@@ -83,70 +89,84 @@ def upload(
     OutcomeUnknown
         If what it holds is not known.
     """
-    check_standing(peer, while_running)
-    with if_stopped(tell, lambda: NOTHING_SENT):
+    check_mission_idle(peer, while_running)
+    with if_stopped(report, lambda: NOTHING_SENT):
         peer.ask_clock()
         boots = peer.boots
         before = download(peer)
     if not differences(sent, before):
         return Uploaded(len(sent.items), already=True)
-    with if_stopped(tell, lambda: _cancelled(peer, before, tell)):
-        failure = _attempted(peer, sent, progress or (lambda done, total: None))
-    if failure is not None:
-        with if_stopped(tell, lambda: f"{failure.why}; {unknown(peer).words}"):
-            raise _error(peer, failure, before)
-    with if_stopped(tell, lambda: "all was sent and read back as it should be"):
-        peer.clock_seen(patience_s=CLOCK_S)
-    if peer.boots != boots:
-        raise NegativeResult(
-            f"{peer} was started again during the upload, and may have lost its origin; it holds the "
-            "mission: push it again to have the origin checked"
-        )
+    _replace(peer, sent, before, progress or (lambda done, total: None), report)
+    _check_no_restart(peer, boots, report)
     return Uploaded(len(sent.items), already=False)
 
 
+def _replace(
+    peer: Peer, sent: ItemList, before: Sequence[Item], progress: Progress, report: LineReport
+) -> None:
+    """Replace the list that was read before, or raise with what the vehicle holds instead."""
+    with if_stopped(report, lambda: _cancelled(peer, before, report)):
+        failure = _attempted(peer, sent, progress)
+    if failure is not None:
+        with if_stopped(report, lambda: f"{failure.why}; {unknown_content(peer).text}"):
+            raise _error(peer, failure, before)
+
+
+def _check_no_restart(peer: Peer, boots: int, report: LineReport) -> None:
+    """Refuse to call an upload complete during which the vehicle restarted."""
+    with if_stopped(report, lambda: "all was sent and read back as it should be"):
+        peer.clock_seen(patience_s=CLOCK_S)
+    if peer.boots != boots:
+        raise NegativeResult(
+            f"{peer} was restarted during the upload, and may have lost its origin; it holds the "
+            "mission: push it again to have the origin checked"
+        )
+
+
 @contextmanager
-def if_stopped(tell: Tell, words: Callable[[], str]) -> Iterator[None]:
-    """Whoever stops the block, by Ctrl-C or SIGTERM, is told in a line how things stand."""
+def if_stopped(report: LineReport, text: Callable[[], str]) -> Iterator[None]:
+    """Report a line on the state of things to whoever stops the block by Ctrl-C or SIGTERM."""
     try:
         yield
     except (KeyboardInterrupt, SystemExit):
-        tell(words())
+        report(text())
         raise
 
 
-def _cancelled(peer: Peer, before: Sequence[Item], tell: Tell) -> str:
-    """What a cancelled upload left; that it is unknown, if seeing it is stopped too."""
-    with if_stopped(tell, lambda: f"the upload was cancelled twice; {unknown(peer).words}"):
+def _cancelled(peer: Peer, before: Sequence[Item], report: LineReport) -> str:
+    """Line on the content after a cancelled upload; it is unknown if a second stop ends the reading."""
+    with if_stopped(report, lambda: f"the upload was cancelled twice; {unknown_content(peer).text}"):
         cancel(peer)
-        return f"the upload was cancelled; {left_on(peer, before).words}"
+        return f"the upload was cancelled; {recovered_content(peer, before).text}"
 
 
-def clear(peer: Peer, *, while_running: bool = False, tell: Tell = lambda line: None) -> int:
-    """Take the mission off the vehicle, and see that it is gone; gives the number of items it had.
+def clear(peer: Peer, *, while_running: bool = False, report: LineReport = lambda line: None) -> int:
+    """Clear the vehicle's mission, and check that; return the number of items it had.
 
-    `tell` takes the line that says how things stand when a Ctrl-C has ended it.
+    `report` takes the line that says what is on the vehicle when a Ctrl-C has ended it.
 
     Raises
     ------
     RobotUnreachable, AnswerIsNo, OutcomeUnknown
         As `upload`.
     """
-    check_standing(peer, while_running, "would be left without one")
-    with if_stopped(tell, lambda: NOTHING_SENT):
+    check_mission_idle(peer, while_running, "would be left without one")
+    with if_stopped(report, lambda: NOTHING_SENT):
         before = own_items(peer, download(peer))
-    with if_stopped(tell, lambda: unknown(peer).words):
-        gone = not before or emptied(peer)
-    if not gone:
+    with if_stopped(report, lambda: unknown_content(peer).text):
+        cleared = not before or clear_items(peer)
+    if not cleared:
         raise OutcomeUnknown(
-            f"{peer}: told to empty its mission of {len(before)} items, and it was not seen empty"
+            f"{peer}: commanded to clear its mission of {len(before)} items, and does not show that"
             f"{peer.why_silent()}: what it holds is unknown; see stopgo fetch-mission"
         )
     return len(before)
 
 
-def check_standing(peer: Peer, while_running: bool, what: str = "would begin its current item again") -> None:
-    """Refuses to touch the mission that a vehicle is following; `what` is what it would come to."""
+def check_mission_idle(
+    peer: Peer, while_running: bool, what: str = "would begin its current item again"
+) -> None:
+    """Refuse to change the mission that a vehicle is following; `what` would be the effect."""
     if peer.armed and peer.in_auto and not while_running:
         raise NegativeResult(
             f"{peer} is armed and follows its mission, and {what}; "
@@ -176,7 +196,7 @@ def _attempted(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
 
 
 def _read_back(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None:
-    """Compare what the vehicle holds with what it should."""
+    """Compare the vehicle's list with the one that was sent."""
     count = len(upload_of(sent))
     try:
         read = download(peer, progress=lambda done, total: progress(count + done, count + total))
@@ -190,7 +210,7 @@ def _read_back(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
 
 
 def _refusal(sent: ItemList, ended: TransferEnd) -> str:
-    """Which item was refused, by what it is for, and which of its fields."""
+    """Text on a refused item: its purpose, and the field that was refused."""
     name = result_name(ended.result)
     if ended.result == MissionResult.NO_SPACE:
         return f"it refused {len(upload_of(sent))} items ({name}): plan fewer stops at once"
@@ -230,14 +250,14 @@ def _given_up(peer: Peer, ended: TransferEnd, count: int) -> Failure:
             touched=False,
         )
     if ended.how == "rebooted":
-        return Failure(f"it was started again when {ended.at} of {count} items had arrived")
-    return Failure(f"it fell silent when {ended.at} of {count} items had arrived{peer.why_silent()}")
+        return Failure(f"it was restarted when {ended.at} of {count} items had arrived")
+    return Failure(f"no data after {ended.at} of {count} items had arrived{peer.why_silent()}")
 
 
 def _error(peer: Peer, failure: Failure, before: Sequence[Item]) -> NegativeResult | OutcomeUnknown:
-    """The failure with what is on the vehicle now."""
+    """The failure, with the vehicle's content now."""
     if not failure.touched:
         return NegativeResult(f"{peer}: {failure.why}; nothing of this mission was stored")
-    left = left_on(peer, before)
-    error = NegativeResult if left.known else OutcomeUnknown
-    return error(f"{peer}: {failure.why}; {left.words}")
+    content = recovered_content(peer, before)
+    error = NegativeResult if content.known else OutcomeUnknown
+    return error(f"{peer}: {failure.why}; {content.text}")

@@ -1,8 +1,9 @@
-"""MAVLink frames over a link: what a vehicle says to stations' ground programs, and what those say to it.
+"""Tunnel of MAVLink frames over a link, between a vehicle and ground programs at stations.
 
-Each end reads whole frames at its MAVLink side and tells them on one key, and writes what it hears on the
-other. Both ways go through queues of their own that lose the oldest when they are full: neither a slow link
-nor a stuck listener holds up the robot. Frames pass unchanged, with their signatures, and in their order.
+Each end reads whole frames at its MAVLink side and publishes them on one key expression; it writes the frames
+that it receives on the other. Each direction has a queue that loses the oldest frames when it is full. So
+neither a slow link nor a blocked listener delays the robot. Frames pass unchanged, with their signatures, in
+their order.
 """
 
 from __future__ import annotations
@@ -16,29 +17,29 @@ from contextlib import contextmanager
 from typing import Any
 
 from stopgo.bridge.link.link import Link, Presence
-from stopgo.bridge.mavlink.line.frames import Frames, dialect
-from stopgo.bridge.mavlink.line.messages import on_board_beat
-from stopgo.bridge.mavlink.line.transport import Transport
+from stopgo.bridge.mavlink.vehicle_link.frames import Frames, dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import on_board_beat
+from stopgo.bridge.mavlink.vehicle_link.transport import Transport
 from stopgo.mission.mavlink.enums import Component
 from stopgo.mission.mavlink.telemetry import Message
 
 QUEUE = 500
-"""Frames that wait in one direction: some seconds of a talkative vehicle."""
+"""Frames that wait in one direction: some seconds of a vehicle with many messages."""
 OLDEST_S = 2.0
-"""An order or a place that has waited so long is worth nothing, or worse."""
+"""Age above which a command or a position in the queue is useless, or worse."""
 SAMPLE_BYTES = 1200
-"""Frames go together up to this: fewer samples on a slow link, and no datagram that must be cut."""
+"""Frames share a sample up to this size: fewer samples on a slow link, and no datagram that must be cut."""
 READ_S = 0.1
 GREET_S = 0.5
 GREET_EVERY_S = 5.0
 ECHOES = 512
-"""Frames that were written lately; one that comes back at once is an echo."""
+"""Number of written frames that are remembered; one that comes back soon is an echo."""
 KNOCKING = (252, Component.UDP_BRIDGE)
-"""Who knocks: not the gateway (253), by whose heartbeats a vehicle may tell that it is alive."""
+"""Sender of our heartbeats: not the gateway (253), whose heartbeats show a vehicle that it is alive."""
 
 
 class Waiting:
-    """Frames that wait for their turn; the oldest are dropped if there are too many, or they are too old."""
+    """Queue of frames; the oldest are dropped if there are too many, or they are too old."""
 
     def __init__(self, dropped: Counter[str], what: str) -> None:
         self._dropped, self._what = dropped, what
@@ -55,7 +56,7 @@ class Waiting:
             self._ready.notify()
 
     def sample(self) -> bytes:
-        """The next frames that go together; waits for one, and is empty once closed."""
+        """The next frames for one sample; waits for a frame, and is empty once closed."""
         with self._ready:
             self._ready.wait_for(lambda: self._fresh() or self._closed)
             taken = b""
@@ -77,7 +78,7 @@ class Waiting:
 
 
 class Echoes:
-    """What was written lately: a frame that comes back must not go round for ever."""
+    """Frames that were written lately: one that comes back must not circulate."""
 
     def __init__(self) -> None:
         self._frames: OrderedDict[bytes, float] = OrderedDict()
@@ -95,12 +96,12 @@ class Echoes:
 
 
 class Tunnel:
-    """One end: `tells` and `hears` are keys of the link.
+    """One end: `publishes` and `receives` are key expressions of the link, out and in.
 
-    `sees` looks at what comes from the MAVLink side, `passes` judges what goes there, `wrote` looks at what
-    went there, and `refused` gives the
-    frame, if any, by which those who sent what does not pass are told so. An end that `knocks` sends a
-    heartbeat of its own, for one that listens on UDP answers only whom it has heard.
+    `sees` is called with each message from the MAVLink side, `wrote` with each message written there.
+    `passes` judges a message for that side, and `refused` gives the frame that is sent back for a blocked
+    one, if any. An end that `knocks` sends a heartbeat of its own: a program that listens on UDP answers only
+    known senders.
     """
 
     def __init__(
@@ -108,8 +109,8 @@ class Tunnel:
         link: Link,
         transport: Transport,
         *,
-        tells: str | None,
-        hears: str,
+        publishes: str | None,
+        receives: str,
         sees: Callable[[Message], None] = lambda message: None,
         passes: Callable[[Message], bool] = lambda message: True,
         wrote: Callable[[Message], None] = lambda message: None,
@@ -118,9 +119,9 @@ class Tunnel:
         bulk: bool = False,
     ) -> None:
         self.carried: Counter[str] = Counter()
-        """Frames by direction."""
+        """Number of frames by direction."""
         self.dropped: Counter[str] = Counter()
-        """Frames that did not pass, by reason."""
+        """Number of frames that did not pass, by reason."""
         self._transport = transport
         self._sees, self._passes, self._wrote, self._refused = sees, passes, wrote, refused
         self._knocks = knocks
@@ -128,18 +129,18 @@ class Tunnel:
         self._out = Waiting(self.dropped, "to the link")
         self._in = Waiting(self.dropped, "from the link")
         self._read_frames = Frames(self.dropped)
-        self._heard = Frames(self.dropped)
+        self._received_frames = Frames(self.dropped)
         self._ended = threading.Event()
         self._error: Exception | None = None
-        self._publish = None if tells is None else link.publisher(tells, bulk=bulk)
-        link.hear(hears, self._hear)
-        works = (self._read, self._tell, self._write)
+        self._publish = None if publishes is None else link.publisher(publishes, bulk=bulk)
+        link.hear(receives, self._receive)
+        works = (self._read, self._publish_frames, self._write)
         self._threads = [threading.Thread(target=self._watched, args=(work,), daemon=True) for work in works]
         for thread in self._threads:
             thread.start()
 
     def wait(self) -> None:
-        """Wait until the tunnel ends, which it does only by an error; that is raised here."""
+        """Wait until the tunnel ends, which happens only by an error; that is raised here."""
         self._ended.wait()
         if self._error is not None:
             raise self._error
@@ -181,7 +182,7 @@ class Tunnel:
         else:
             self._out.put(frame)
 
-    def _tell(self) -> None:
+    def _publish_frames(self) -> None:
         while not self._ended.is_set():
             sample = self._out.sample()
             if sample and self._publish is not None:
@@ -190,7 +191,7 @@ class Tunnel:
 
     def _write(self) -> None:
         while not self._ended.is_set():
-            for frame, message in self._heard.whole(self._in.sample(), datagram=True):
+            for frame, message in self._received_frames.whole(self._in.sample(), datagram=True):
                 if self._passes(message):
                     self._echoes.wrote(frame)
                     self._transport.write(frame)
@@ -198,33 +199,33 @@ class Tunnel:
                     self.carried["from the link"] += 1
                 else:
                     self.dropped["refused"] += 1
-                    self._say_back(self._refused(message))
+                    self._send_back(self._refused(message))
 
-    def _hear(self, key: str, payload: bytes) -> None:
+    def _receive(self, key: str, payload: bytes) -> None:
         if len(payload) <= SAMPLE_BYTES:
             self._in.put(payload)
         else:
             self.dropped["too large"] += 1
 
-    def _say_back(self, frame: bytes) -> None:
+    def _send_back(self, frame: bytes) -> None:
         if frame:
             self._out.put(frame)
 
 
 def answer_greetings(link: Link, key: str) -> None:
-    """Let stations know this start of the tunnel's end at the robot: what it says is believed after that."""
+    """Let stations verify this start of the tunnel's end at the robot: then they accept its messages."""
     link.serve(key, lambda request: b"{}")
 
 
 @contextmanager
 def greeting(link: Link, key: str, alive: str, changed: Presence) -> Iterator[None]:
-    """Know the tunnel's end at the robot, anew whenever it comes, until the block ends.
+    """Greet the tunnel's end at the robot, again whenever it connects, until the block ends.
 
-    Where ends hold keys, each believes only what is said of late, and counts from the last greeting.
+    Where ends hold private keys, each accepts only recent messages, and counts from the last greeting.
     """
     ended, due = threading.Event(), threading.Event()
 
-    def noticed(token: str, there: bool) -> None:
+    def on_presence(token: str, there: bool) -> None:
         due.set()
         changed(token, there)
 
@@ -234,7 +235,7 @@ def greeting(link: Link, key: str, alive: str, changed: Presence) -> Iterator[No
             answered = link.ask(key, timeout_s=GREET_S) is not None
             due.wait(GREET_EVERY_S if answered else GREET_S)
 
-    link.watch_presence(alive, noticed)
+    link.watch_presence(alive, on_presence)
     thread = threading.Thread(target=greet, daemon=True)
     thread.start()
     try:
@@ -247,7 +248,7 @@ def greeting(link: Link, key: str, alive: str, changed: Presence) -> Iterator[No
 
 @contextmanager
 def open_tunnel(link: Link, transport: Transport, **details: Any) -> Iterator[Tunnel]:
-    """A tunnel's end at work until the block ends; its transport is closed then."""
+    """A running end of a tunnel until the block ends; its transport is closed then."""
     tunnel = Tunnel(link, transport, **details)
     try:
         yield tunnel
@@ -256,8 +257,8 @@ def open_tunnel(link: Link, transport: Transport, **details: Any) -> Iterator[Tu
         transport.close()
 
 
-def told(carried: Counter[str], dropped: Counter[str]) -> Sequence[str]:
-    """What a tunnel has done, a line for what passed and one for what did not."""
+def summary(carried: Counter[str], dropped: Counter[str]) -> Sequence[str]:
+    """Counts of a tunnel as text: a line for frames that passed, and one for those that did not."""
     passed = ", ".join(f"{number} {what}" for what, number in sorted(carried.items())) or "nothing"
     lost = ", ".join(f"{number} {what}" for what, number in sorted(dropped.items()) if number)
     return (f"carried {passed}", *((f"dropped {lost}",) if lost else ()))

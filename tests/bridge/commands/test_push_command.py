@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.mavlink.auto.logbook import logbook, remember
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.command_line import main
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.files.imports import qgc_plan, qgc_waypoints
@@ -69,8 +69,8 @@ def vehicle(
 ) -> Iterator[Url]:
     port = free_port()
     made = VehicleFaults(tuple(read_vehicle_fault(text) for text in faults))
-    setting = Setting(PROFILES[profile], origin=origin, faults=made)
-    with vehicle_on(Url("udpin", "127.0.0.1", port), setting, signing_key=key):
+    setup = VehicleSetup(PROFILES[profile], origin=origin, faults=made)
+    with vehicle_on(Url("udpin", "127.0.0.1", port), setup, signing_key=key):
         yield Url("udpout", "127.0.0.1", port)
 
 
@@ -188,13 +188,13 @@ def test_a_restart_during_the_upload_is_told(run: Run, mission: Mission) -> None
             while waiting.get(10.0).time_boot_ms < 3000:  # longer than it is away
                 pass
         code, _, said = run("push", "MISSION", "--mavlink", str(url), "--timeout", "2")
-        assert (code, "was started again" in said) == (1, True), said
+        assert (code, "was restarted" in said) == (1, True), said
 
 
 def test_a_vehicle_that_falls_silent_leaves_it_unknown(run: Run, mission: Mission) -> None:
     with at_site(mission, "ardupilot", "silent@5=0") as url:
         code, _, said = run("push", "MISSION", "--mavlink", str(url), "--timeout", "1")
-    assert (code, "fell silent" in said, "do not start it" in said) == (3, True, True)
+    assert (code, "no data after" in said, "do not start it" in said) == (3, True, True)
 
 
 def test_a_key_is_needed_where_the_vehicle_has_one(run: Run, mission: Mission, tmp_path: Path) -> None:

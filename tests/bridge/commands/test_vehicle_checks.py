@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import pytest
 
 from stopgo.bridge.commands.vehicle_checks import has_position, parameter_checks
-from stopgo.bridge.mavlink.line.parameter_reading import value_of
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.parameter_reading import value_of
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.command_line import main
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
@@ -119,8 +119,8 @@ def test_a_vehicle_is_asked_and_not_changed(
     origin: SiteOrigin | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     port = free_port()
-    setting = Setting(PROFILES["ardupilot"], origin=origin)
-    with vehicle_on(Url("udpin", "127.0.0.1", port), setting):
+    setup = VehicleSetup(PROFILES["ardupilot"], origin=origin)
+    with vehicle_on(Url("udpin", "127.0.0.1", port), setup):
         code = main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}", "--json"])
     told = {check["name"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
     assert told["vehicle"]["ok"]
@@ -134,13 +134,13 @@ def test_an_origin_that_is_of_no_use_to_the_vehicle_is_wrong(capsys: pytest.Capt
     origin = SiteOrigin(lat=47.0, lon=8.0, alt=400.0, heading_deg=0.0)
     faults = VehicleFaults((VehicleFault("unplaced", 1),))
     with vehicle_on(
-        Url("udpin", "127.0.0.1", port), Setting(PROFILES["ardupilot"], origin=origin, faults=faults)
+        Url("udpin", "127.0.0.1", port), VehicleSetup(PROFILES["ardupilot"], origin=origin, faults=faults)
     ):
         code = main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}", "--json"])
     told = {check["name"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
     assert (code, told["origin"]["ok"]) == (1, False)
     assert told["origin"]["told"].endswith("in AUTO it would pass over its waypoints")
-    assert told["origin"]["do"].startswith("start it again")
+    assert told["origin"]["do"].startswith("restart it")
 
 
 def test_nobody_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -151,8 +151,8 @@ def test_nobody_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) ->
 
 def test_one_that_steers_like_a_car_is_wrong_for_a_mission(capsys: pytest.CaptureFixture[str]) -> None:
     port = free_port()
-    setting = Setting(PROFILES["px4"], changed={"CA_AIRFRAME": 5.0})
-    with vehicle_on(Url("udpin", "127.0.0.1", port), setting):
+    setup = VehicleSetup(PROFILES["px4"], changed={"CA_AIRFRAME": 5.0})
+    with vehicle_on(Url("udpin", "127.0.0.1", port), setup):
         assert main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}"]) == 1
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("WRONG  steering")]
     assert "CA_AIRFRAME is 5, Ackermann" in line and "two driven sides" in line

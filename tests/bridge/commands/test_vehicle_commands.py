@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.document import Scan
 from stopgo.mission.files.mission_json import write
 from stopgo.mission.run.events import Finished, Scanned, Unconfirmed

@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message
 
@@ -26,7 +26,7 @@ HEARD = (
     "SET_GPS_GLOBAL_ORIGIN", "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "PARAM_SET",
     "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST",
 )  # fmt: skip
-"""What a vehicle acts upon; the rest of the dialect is sent too, but less often."""
+"""Messages that a vehicle acts upon; the rest of the dialect is sent too, but less often."""
 COMMANDS = (
     16, 17, 19, 20, 93, 178, 176, 192, 193, 203, 217, 224, 246, 300, 400, 410, 510, 511, 512, 520, 2000,
 )  # fmt: skip

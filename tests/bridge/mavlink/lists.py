@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stopgo.bridge.mavlink.line.messages import item_message
+from stopgo.bridge.mavlink.vehicle_link.messages import item_message
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed
@@ -28,6 +28,6 @@ def _stop(number: int, autopilot: str, east: int) -> tuple[Placed, Placed]:
 
 
 def held(sent: ItemList) -> list[Message]:
-    """What a vehicle holds after an upload of the list."""
+    """Items that a vehicle holds after an upload of the list."""
     keep = autopilot_named(sent.autopilot).kept
     return [item_message(keep(item), seq, VEHICLE) for seq, item in enumerate(upload_of(sent))]

@@ -8,8 +8,8 @@ import threading
 import time
 from dataclasses import dataclass
 
-from stopgo.bridge.mavlink.line.transport import Transport, open_transport
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.transport import Transport, open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from tests.ports import free_port
 
 WAIT_S = 0.05
@@ -17,7 +17,7 @@ WAIT_S = 0.05
 
 @dataclass(frozen=True)
 class Roughness:
-    """What happens to a datagram, in each direction."""
+    """Faults of a datagram's transport, in each direction."""
 
     delay_s: float = 0.0
     loss: float = 0.0

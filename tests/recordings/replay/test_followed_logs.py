@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.transform import SiteOrigin
@@ -49,7 +49,7 @@ def logged(
     clock, rows = SimulatedClock(), list[tuple[int, int, Any]]()
     sent = translate(plan, "ardupilot", trigger="auto")
     vehicle = complete_vehicle(
-        Setting(
+        VehicleSetup(
             PROFILES["ardupilot"],
             path.parent / "vehicle",
             ORIGIN,
@@ -59,7 +59,7 @@ def logged(
         ),
         clock=clock,
         wall=clock,
-        say=lambda message: rows.append((clock.now_ns(), ROVER, message)),
+        send=lambda message: rows.append((clock.now_ns(), ROVER, message)),
     )
 
     def say(message: Any) -> None:

@@ -15,12 +15,12 @@ import msgspec
 from stopgo.bridge.mavlink.auto.logbook import Logbook, logbook, remember
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
 from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.frames.transform import SiteOrigin
@@ -75,18 +75,18 @@ class Site:
     def load(self, sent: ItemList) -> None:
         """Let the vehicle hold this list."""
         vehicle = autopilot_named(sent.autopilot)
-        Store(self.folder / "vehicle").keep(mission=tuple(vehicle.kept(item) for item in upload_of(sent)))
+        Store(self.folder / "vehicle").update(mission=tuple(vehicle.kept(item) for item in upload_of(sent)))
 
     @contextmanager
     def up(self) -> Iterator[None]:
         """The vehicle is on."""
         made = VehicleFaults(tuple(read_vehicle_fault(text) for text in self.faults))
-        setting = Setting(
+        setup = VehicleSetup(
             PROFILES[self.profile], self.folder / "vehicle", self.origin, self.at, made, self.seed,
             {**TUNED.get(self.profile, {}), **self.changed},
         )  # fmt: skip
         listening = Url("udpin", self.url.host, self.url.number)
-        with vehicle_on(listening, setting, speed_up=self.speed_up, signing_key=self.key):
+        with vehicle_on(listening, setup, speed_up=self.speed_up, signing_key=self.key):
             yield
 
     @contextmanager
@@ -125,7 +125,7 @@ ALL = [
     *(f"{word} {name}" for name in ("S1", "S2", "S3") for word in ("Arrived", "Settled", "Scanned")),
     "Finished",
 ]
-"""What is told of a run of the tour in which all goes well."""
+"""Reports of a run of the tour without faults."""
 
 
 @contextmanager

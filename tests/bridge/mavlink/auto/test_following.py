@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import reached as found_peer
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.mission.document import sealed
 from stopgo.mission.run.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
 from stopgo.recordings.page.reviewed import review

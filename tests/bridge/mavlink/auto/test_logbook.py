@@ -10,7 +10,7 @@ import pytest
 
 from stopgo.bridge.mavlink.auto.logbook import Logbook, forget, logbook, name_of, remember, usual_folder
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.journal import open_journal
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.mavlink.translate import translate

@@ -13,7 +13,7 @@ import pytest
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.logbook import Logbook, remember
-from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.robot.journal import memory_journal
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.transform import SiteOrigin
@@ -69,7 +69,7 @@ def items_of(log: list[Any]) -> list[Item]:
 
 
 def as_messages(entry: Any) -> Iterator[Any]:
-    """What the Rover told stations at that moment."""
+    """Reports of the Rover to stations at that moment."""
     ms = entry.TimeUS // 1000
     if entry.get_type() == "MISE" and entry.CId in NAV:
         yield dialect.MAVLink_mission_current_message(entry.CNum, 15, dialect.MISSION_STATE_ACTIVE, 1)

@@ -11,9 +11,9 @@ import pytest
 from stopgo.bridge.commands.order_commands import state_line
 from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.mavlink.simulated.estimator import Estimator
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.bridge.station.watch import EventLines, watch_with
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Scan

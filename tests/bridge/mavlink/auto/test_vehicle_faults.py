@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.mavlink.auto.logbook import remember
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.peer import reached as found_peer
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.bridge.station.follow import Silence
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.mavlink.translate import translate

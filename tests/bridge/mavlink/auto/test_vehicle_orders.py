@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.bridge.robot.answers import answer_to, remember_answer
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
@@ -114,7 +114,7 @@ def test_another_mission_is_never_started(tmp_path: Path) -> None:
 
 def test_a_mission_that_another_station_has_cleared_is_not_told_or_started(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
-    Store(tmp_path / "vehicle").keep(mission=())
+    Store(tmp_path / "vehicle").update(mission=())
     with site.up(), site.reached() as station:
         assert (station.status().state, station.status().mission_id) == ("IDLE", None)
         with pytest.raises(NegativeResult, match=r"no_mission: .*cleared") as no:
@@ -171,7 +171,7 @@ def test_a_vehicle_that_knows_no_place_on_earth_is_not_started(tmp_path: Path) -
     site = Site(tmp_path, "ardupilot", faults=["unplaced@1"])
     with site.up():
         why = refused(site, "start")
-    assert "no_position" in why and "GLOBAL_POSITION_INT 0, 0" in why and "start it again" in why
+    assert "no_position" in why and "GLOBAL_POSITION_INT 0, 0" in why and "restart it" in why
 
 
 def test_nothing_is_sent_where_no_vehicle_is(tmp_path: Path) -> None:

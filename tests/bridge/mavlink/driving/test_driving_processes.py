@@ -14,9 +14,9 @@ import msgspec
 import pytest
 
 from stopgo.bridge.commands.spawn import end_robot, robot_process, start, start_robot
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.station.station import connect
 from stopgo.mission.document import Mission, Scan, sealed
 from stopgo.mission.run.events import Scanned
@@ -63,7 +63,7 @@ def driving(url: Url) -> tuple[str, ...]:
 
 
 def scans_begun(operator: Operator) -> int:
-    """How many the vehicle has begun, whoever has heard of them."""
+    """Number of scans that the vehicle has begun, whoever knows of them."""
     last = operator.peer.ask(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
     assert last is not None
     return int(last.image_index) + 1

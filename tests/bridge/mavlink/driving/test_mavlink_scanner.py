@@ -1,4 +1,4 @@
-"""What a vehicle must say for a scan to count, and what does not count."""
+"""Reports of a vehicle by which a scan counts, and those by which it does not."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, stop_of
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import Ack
-from stopgo.bridge.mavlink.line.wire import MessageQueue, Who
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Ack
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.mavlink.telemetry import Message
@@ -38,7 +38,7 @@ class Camera:
 
     def __init__(self, *tells: Message, taken: int | None = None, acks: tuple[int, ...] = (0,)) -> None:
         self.who = Who(1, 1)
-        self.peer, self.wire = self, self
+        self.peer, self.wire, self.telemetry = self, self, self
         self.orders: list[tuple[int, tuple[float, ...]]] = []
         self.asked: list[Message] = []
         self.answers: Callable[[Message], Message | None] = lambda request: None
@@ -70,11 +70,7 @@ class Camera:
         if answer is not None:
             self._box.put(answer)
 
-    def order(self, number: int, *params: float, what: str) -> str:
-        self.orders.append((number, params))
-        return ""
-
-    def out_of_reach(self) -> str:
+    def why_unknown(self) -> str:
         return ""
 
     def _tell(self) -> None:

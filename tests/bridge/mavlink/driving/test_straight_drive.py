@@ -1,4 +1,4 @@
-"""How one straight of a leg is steered and ends, by numbers that can be checked on paper."""
+"""Steering along one straight of a leg, and its end, by numbers that can be checked on paper."""
 
 from __future__ import annotations
 
@@ -99,14 +99,14 @@ def test_who_stands_though_told_to_drive_is_pushed_and_then_blocked() -> None:
     verdicts = [seen(drive, part / 10, 2.0) for part in range(1, 102)]
     assert drive.steer.speed > 2 * CREEP_M_S
     assert verdicts[-1] == "blocked"
-    assert drive.why == "the vehicle stands 2.00 m from where it was sent, and does not go on"
+    assert drive.why == "the vehicle stopped 2.00 m from its goal, and does not go on"
 
 
 def test_a_vehicle_that_leaves_the_way_by_more_than_its_radius_is_stopped() -> None:
     drive = straight()
     assert seen(drive, 0.0, 2.0, 0.34) == "going"
     assert seen(drive, 0.1, 2.0, 0.36) == "blocked"
-    assert drive.why == "the vehicle is 0.36 m beside the way; drive it back there by hand"
+    assert drive.why == "the vehicle is 0.36 m off the path; drive it back there by hand"
 
 
 def test_a_vehicle_that_circles_is_stopped_after_half_a_minute() -> None:

@@ -1,4 +1,4 @@
-"""What the gateway makes of a vehicle that drives as a real one: in time, on its way, on after a mishap."""
+"""The gateway with a vehicle that drives realistically: in time, on its path, and on after a fault."""
 
 from __future__ import annotations
 
@@ -170,10 +170,10 @@ def test_a_vehicle_that_was_carried_while_it_restarted_is_not_driven_on(tmp_path
         reports = station.reports()
         until(reports, is_driving(0.5))
         vehicle.off()
-        vehicle.on(replace(vehicle.setting, at=Pose(x=3.0, y=3.0, heading=0.0)))
+        vehicle.on(replace(vehicle.setup, at=Pose(x=3.0, y=3.0, heading=0.0)))
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "the autopilot was started again and tells a place" in held.reason
-        assert "see where it stands" in held.reason
+        assert "the autopilot was restarted and reports a position" in held.reason
+        assert "check where it is" in held.reason
 
 
 def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) -> None:
@@ -189,4 +189,4 @@ def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) 
         vehicle.off()
         vehicle.on()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "started again and is disarmed; arm it, or start stopgo robot with --arm" in held.reason
+        assert "restarted and is disarmed; arm it, or start stopgo robot with --arm" in held.reason

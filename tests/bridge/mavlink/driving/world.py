@@ -14,14 +14,14 @@ import msgspec
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.mavlink.driving.autopilot_body import AutopilotBody
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import profile_named
 from stopgo.bridge.mavlink.simulated.rover import to_east
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.program import RobotOptions, robot_on
 from stopgo.bridge.station.follow import Report
 from stopgo.bridge.station.station import Station
@@ -79,18 +79,18 @@ class Rover:
         level = None if origin is None else msgspec.structs.replace(origin, heading_deg=0.0)
         self.profile = profile
         self.url = Url("udpout", "127.0.0.1", free_port())
-        self._first = Setting(
+        self._first = VehicleSetup(
             autopilot=profile_named(profile), state=state, origin=level, faults=faults,
             at=to_east(pose_of(start), SITE.heading_deg), seed=seed, changed=changed or {},
         )  # fmt: skip
-        self.setting = replace(self._first, at=None, faults=NO_FAULTS)
+        self.setup = replace(self._first, at=None, faults=NO_FAULTS)
         self._life = ExitStack()
         self.on(self._first)
 
-    def on(self, setting: Setting | None = None) -> None:
+    def on(self, setup: VehicleSetup | None = None) -> None:
         """Switch it on; it stands where it stood."""
         url = Url("udpin", self.url.host, self.url.number)
-        self._life.enter_context(vehicle_on(url, setting or self.setting, signing_key=self._key))
+        self._life.enter_context(vehicle_on(url, setup or self.setup, signing_key=self._key))
 
     def off(self) -> None:
         self._life.close()

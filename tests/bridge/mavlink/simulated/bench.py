@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.bridge.link.clock import SimulatedClock
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.telemetry import Message
@@ -60,8 +60,8 @@ class Bench:
         self.clock, self.wall = SimulatedClock(), SimulatedClock()
         self.all: list[Message] = []
         made = tuple(read_vehicle_fault(text) for text in faults)
-        setting = Setting(PROFILES[profile], state, origin, at, VehicleFaults(made), seed, changed)
-        self.vehicle = complete_vehicle(setting, clock=self.clock, wall=self.wall, say=self._hear)
+        setup = VehicleSetup(PROFILES[profile], state, origin, at, VehicleFaults(made), seed, changed)
+        self.vehicle = complete_vehicle(setup, clock=self.clock, wall=self.wall, send=self._hear)
         self.first = 1 if self.vehicle.autopilot.home_first else 0
         self._wires = {who: dialect.MAVLink(None, *vars(who).values()) for who in (STATION, OTHER)}
         self._own = dialect.MAVLink(None, 1, 1)
@@ -71,7 +71,7 @@ class Bench:
         self.all += self._own.parse_buffer(message.pack(self._own)) or []
 
     def say(self, message: Message, who: Who = STATION) -> list[Message]:
-        """What the vehicle says to a message, telemetry aside."""
+        """Answers of the vehicle to a message, without telemetry."""
         before = len(self.all)
         wire = self._wires[who]
         for parsed in wire.parse_buffer(message.pack(wire)) or []:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.run.events import Pose
 from tests.bridge.mavlink.simulated.bench import Bench, delay, waypoint
@@ -17,7 +17,7 @@ LOG = Path(__file__).parents[4].parent / "shared" / "data" / "logs" / "rover-sto
 CORNERS = [(3.0, 0.0), (3.0, 3.0), (6.0, 3.0), (6.0, 0.0), (9.0, 0.0)]
 """East and north of the origin: the stops of the log."""
 MEASURED_MM = [202, 218, 218, 201, 217]
-"""How far beside each of them the Rover of the log truly stood while it waited there."""
+"""True position errors of the Rover of the log while it waited at each of them."""
 MEASURED_S = 12.5
 """From one stop to the next."""
 START = Pose(x=-0.083, y=0.0, heading=0.0)
@@ -178,4 +178,4 @@ def test_all_its_parameters_are_told_and_kept() -> None:
     bench.say(dialect.MAVLink_param_set_message(1, 1, b"ATC_STR_ANG_P", 2.5, 9))
     bench.say(dialect.MAVLink_param_set_message(1, 1, b"ATC_STR_ANG_P", math.nan, 9))
     assert bench.last("PARAM_VALUE").param_value == 2.5
-    assert bench.vehicle.tell(MessageId.HEARTBEAT)
+    assert bench.vehicle.report(MessageId.HEARTBEAT)

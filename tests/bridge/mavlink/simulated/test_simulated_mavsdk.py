@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import wire
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import wire
 from stopgo.mission.mavlink.items import Item
 from tests.bridge.mavlink.simulated.bench import HOME, ORIGIN, camera, delay, script, waypoint
 from tests.ports import free_port
@@ -45,8 +45,8 @@ def vehicle(profile: str, *faults: str) -> Iterator[int]:
     """A vehicle that sends to the port it gives."""
     port = free_port()
     made = VehicleFaults(tuple(read_vehicle_fault(text) for text in faults))
-    setting = Setting(PROFILES[profile], origin=ORIGIN, faults=made)
-    with vehicle_on(Url("udpout", "127.0.0.1", port), setting, speed_up=SPEED_UP):
+    setup = VehicleSetup(PROFILES[profile], origin=ORIGIN, faults=made)
+    with vehicle_on(Url("udpout", "127.0.0.1", port), setup, speed_up=SPEED_UP):
         yield port
 
 
@@ -155,7 +155,7 @@ def test_mavsdk_and_another_station_use_one_vehicle() -> None:
 
     port = free_port()
     with (
-        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
+        vehicle_on(Url("udpin", "127.0.0.1", port), VehicleSetup(PROFILES["strict"])),
         wire(Url("udpout", "127.0.0.1", port)) as other,
         station(port, way="udpout") as system,
         other.waiting("MISSION_REQUEST_INT", "MISSION_ACK") as waiting,

@@ -1,4 +1,4 @@
-"""What `translate` writes for an autopilot, driven by a vehicle with its habits: all scans are in place."""
+"""Lists that `translate` writes, driven by a vehicle of their autopilot: all scans are in place."""
 
 from __future__ import annotations
 

@@ -15,21 +15,21 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.transport import Address
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import SIGNATURE, Who, Wire, wire
 from stopgo.bridge.mavlink.simulated.lossy_line import on_line
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import (
     FAULTS,
     VehicleFault,
     VehicleFaults,
     read_vehicle_fault,
 )
-from stopgo.bridge.mavlink.simulated.vehicle_process import VehicleOptions, setting_of, vehicle_on
+from stopgo.bridge.mavlink.simulated.vehicle_process import VehicleOptions, setup_of, vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.transport import Address
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import SIGNATURE, Who, Wire, wire
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message
@@ -158,7 +158,7 @@ def test_options_that_cannot_be_are_refused_in_one_line(
 
 def test_a_state_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "vehicle.msgpack").write_bytes(b"\xc1")
-    with pytest.raises(InputError, match="remove it to begin anew"):
+    with pytest.raises(InputError, match="remove it to begin again"):
         Store(tmp_path)
     with pytest.raises(InputError, match="cannot be made"):
         Store(tmp_path / "vehicle.msgpack" / "v")
@@ -168,9 +168,9 @@ def test_a_vehicle_that_was_refused_leaves_its_port_free(tmp_path: Path) -> None
     (tmp_path / "vehicle.msgpack").write_bytes(b"\xc1")
     port = free_port()
     threads = threading.active_count()
-    with pytest.raises(InputError), vehicle_on(here(port), Setting(PROFILES["strict"], state=tmp_path)):
+    with pytest.raises(InputError), vehicle_on(here(port), VehicleSetup(PROFILES["strict"], state=tmp_path)):
         pass
-    with vehicle_on(here(port), Setting(PROFILES["strict"])), wire(there(port)) as station:
+    with vehicle_on(here(port), VehicleSetup(PROFILES["strict"])), wire(there(port)) as station:
         assert count_of(station) == 0
     assert threading.active_count() == threads
 
@@ -178,7 +178,7 @@ def test_a_vehicle_that_was_refused_leaves_its_port_free(tmp_path: Path) -> None
 def test_two_stations_on_streams_are_told_the_same() -> None:
     port = free_port()
     with (
-        vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
+        vehicle_on(Url("tcpin", "127.0.0.1", port), VehicleSetup(PROFILES["strict"])),
         wire(Url("tcp", "127.0.0.1", port)) as one,
         wire(Url("tcp", "127.0.0.1", port), me=Who(200, 190)) as other,
     ):
@@ -195,7 +195,7 @@ def test_a_vehicle_outlives_stations_that_hang_up() -> None:
     port = free_port()
     linger = struct.pack("ii", 1, 0)
     with (
-        vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
+        vehicle_on(Url("tcpin", "127.0.0.1", port), VehicleSetup(PROFILES["strict"])),
         wire(Url("tcp", "127.0.0.1", port)) as station,
     ):
         for _ in range(500):
@@ -207,8 +207,8 @@ def test_a_vehicle_outlives_stations_that_hang_up() -> None:
 
 def test_a_signing_vehicle_hears_who_has_the_key_only() -> None:
     port = free_port()
-    setting = Setting(PROFILES["strict"])
-    with vehicle_on(here(port), setting, signing_key=KEY):
+    setup = VehicleSetup(PROFILES["strict"])
+    with vehicle_on(here(port), setup, signing_key=KEY):
         with wire(there(port), signing_key=KEY) as station:
             assert upload(station, [delay(1.0)])
         with wire(there(port)) as stranger, stranger.waiting("MISSION_ACK") as waiting:
@@ -220,8 +220,8 @@ def test_a_signing_vehicle_hears_who_has_the_key_only() -> None:
 
 def test_a_vehicle_that_should_sign_and_does_not() -> None:
     port = free_port()
-    setting = Setting(PROFILES["strict"], faults=VehicleFaults((VehicleFault("unsigned", 0),)))
-    with vehicle_on(here(port), setting, signing_key=KEY):
+    setup = VehicleSetup(PROFILES["strict"], faults=VehicleFaults((VehicleFault("unsigned", 0),)))
+    with vehicle_on(here(port), setup, signing_key=KEY):
         with wire(there(port), signing_key=KEY) as careful, careful.waiting() as waiting:
             careful.send(dialect.MAVLink_mission_request_list_message(1, 1, 0))
             assert waiting.get(0.5) is None
@@ -236,9 +236,9 @@ def test_an_upload_over_a_line_that_loses_doubles_and_delays(profile: str) -> No
     """The station sends COUNT again until it is heard, answers requests, and waits for an ACCEPTED."""
     port = free_port()
     faults = tuple(read_vehicle_fault(text) for text in ("loss@5", "duplicates@20=3", "jitter@20"))
-    setting = Setting(PROFILES[profile], faults=VehicleFaults(faults))
+    setup = VehicleSetup(PROFILES[profile], faults=VehicleFaults(faults))
     items = [delay(float(number)) for number in range(10)]
-    with vehicle_on(here(port), setting), wire(there(port)) as station:
+    with vehicle_on(here(port), setup), wire(there(port)) as station:
         assert upload(station, items, home=profile == "ardupilot")
         assert count_of(station) == len(items) + (profile == "ardupilot")
 
@@ -247,7 +247,7 @@ class Loop:
     """A transport that gives back what is written."""
 
     datagrams = True
-    gone = ""
+    disconnected = ""
 
     def __init__(self) -> None:
         self.written: list[bytes] = []
@@ -306,7 +306,7 @@ def test_a_pose_is_said_in_the_sites_frame() -> None:
     from stopgo.mission.run.events import Pose
 
     options = VehicleOptions("udpin:127.0.0.1:1", origin="47,8,0,90", at=Pose(x=1.0, y=2.0, heading=0.0))
-    setting = setting_of(options)
-    assert setting.at is not None and setting.origin is not None
-    assert (round(setting.at.x, 9), round(setting.at.y, 9)) == (2.0, -1.0)
-    assert setting.origin.heading_deg == 0
+    setup = setup_of(options)
+    assert setup.at is not None and setup.origin is not None
+    assert (round(setup.at.x, 9), round(setup.at.y, 9)) == (2.0, -1.0)
+    assert setup.origin.heading_deg == 0

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from tests.bridge.mavlink.simulated.bench import (
     ACCEPTED,

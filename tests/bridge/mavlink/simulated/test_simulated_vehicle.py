@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.rover import to_east
 from stopgo.bridge.mavlink.simulated.vehicle_process import read_origin
 from stopgo.bridge.mavlink.simulated.vehicle_telemetry import MAKERS
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.telemetry import Message
@@ -79,7 +79,7 @@ def test_a_trigger_fires_when_the_wait_before_it_is_over_and_not_before(make: Ma
     bench.pass_time(2.0)
     ends_ns = bench.vehicle.camera.due_ns
     assert ends_ns is not None
-    assert (ends_ns - bench.vehicle._booted_ns) / 1e9 == pytest.approx(25.0, abs=0.1)
+    assert (ends_ns - bench.vehicle.time.booted_ns) / 1e9 == pytest.approx(25.0, abs=0.1)
 
 
 def test_a_trigger_right_before_a_waypoint_fires_while_the_vehicle_drives_and_its_scan_fails(
@@ -336,10 +336,10 @@ def test_where_it_stands_outlives_the_vehicles_process(make: Make, tmp_path: Pat
     bench.upload([waypoint(3.0, 0.0), trigger(bench, 1, 1.0), delay(2.0)])
     bench.start()
     bench.pass_time(30.0)
-    bench.vehicle.rest()
+    bench.vehicle.save_pose()
     again = make(state=tmp_path)
     assert again.at() == pytest.approx(bench.at())
-    assert again.vehicle.store.kept.images == 1
+    assert again.vehicle.store.stored.images == 1
 
 
 # Orders
@@ -627,9 +627,9 @@ def test_its_time_since_boot_does_not_run_ahead_of_the_messages(make: Make) -> N
     bench = make(faults=["jitter@300"])
     bench.clock.wait(100.0)
     bench.pass_time(5.0)
-    assert bench.vehicle.boot_ms == 5_000
+    assert bench.vehicle.time.boot_ms == 5_000
     bench.vehicle.reboot()
-    assert bench.vehicle.boot_ms == 0
+    assert bench.vehicle.time.boot_ms == 0
 
 
 def test_a_stop_error_is_not_told(make: Make) -> None:

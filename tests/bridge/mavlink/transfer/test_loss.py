@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, upload
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.ports import free_port
@@ -36,7 +36,7 @@ ROUGH = Roughness(delay_s=0.005, loss=0.1, doubled=0.2, overtaken=0.2)
 def test_a_mission_arrives_whole(profile: str, autopilot: str, rough: Roughness, count: int) -> None:
     port, sent = free_port(), stops(count, autopilot)
     with (
-        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile])),
+        vehicle_on(Url("udpin", "127.0.0.1", port), VehicleSetup(PROFILES[profile])),
         Lossy(port, rough, seed=7) as line,
         reached(line.url, vehicle=1) as peer,
     ):

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, clear, upload
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.read_back import differences
 from tests.bridge.mavlink.lists import stops

@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.messages import item_message, item_of
-from stopgo.bridge.mavlink.line.origin import check_origin
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.transfer import upload as uploads
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, clear, upload
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import item_message, item_of
+from stopgo.bridge.mavlink.vehicle_link.origin import check_origin
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import Item
@@ -220,7 +220,7 @@ class Breaks(Scripted):
 
 
 def test_of_a_vehicle_that_falls_silent_nothing_is_known() -> None:
-    said = r"fell silent when \d of 40 items had arrived .* holds now is unknown .*do not start it"
+    said = r"no data after \d of 40 items had arrived .* holds now is unknown .*do not start it"
     with Breaks(held(OLD)) as vehicle, pytest.raises(OutcomeUnknown, match=said):
         pushed(vehicle, timeout_s=0.5)
 
@@ -231,7 +231,7 @@ class Reboots(Breaks):
 
 
 def test_a_reboot_is_noticed_and_what_it_left_is_told() -> None:
-    said = r"was started again when \d of 40 items had arrived; it still holds the mission it had"
+    said = r"was restarted when \d of 40 items had arrived; it still holds the mission it had"
     with Reboots(held(OLD)) as vehicle, pytest.raises(NegativeResult, match=said):
         pushed(vehicle, timeout_s=5.0)
 
@@ -253,7 +253,7 @@ def test_a_vehicle_that_tells_nothing_was_not_touched() -> None:
             self.heard[message.get_type()] += 1
 
     with Deaf() as vehicle:
-        with pytest.raises(RobotUnreachable, match=r"did not tell its mission .*signed messages"):
+        with pytest.raises(RobotUnreachable, match=r"did not send its mission .*signed messages"):
             pushed(vehicle, timeout_s=0.5)
         assert vehicle.heard["MISSION_COUNT"] == 0
 
@@ -330,7 +330,7 @@ def test_ctrl_c_leaves_the_mission_before_and_says_so(kind: type[Scripted], befo
     sent = stops(20, before.autopilot, east=7)
     with kind(held(before)) as vehicle:
         with pytest.raises(KeyboardInterrupt):
-            pushed(vehicle, sent, progress=interrupt, tell=told.append, timeout_s=5.0)
+            pushed(vehicle, sent, progress=interrupt, report=told.append, timeout_s=5.0)
         assert dialect.MAV_MISSION_OPERATION_CANCELLED in vehicle.acks
         assert items_on(vehicle)[1:] == items_on_list(held(before))[1:]
     assert len(told) == 1 and "holds the mission it had before (6 items)" in told[0]
@@ -341,9 +341,9 @@ def test_a_second_ctrl_c_leaves_at_once_and_says_that_it_is_unknown(monkeypatch:
         raise KeyboardInterrupt
 
     told: list[str] = []
-    monkeypatch.setattr(uploads, "left_on", interrupt)
+    monkeypatch.setattr(uploads, "recovered_content", interrupt)
     with Scripted(held(OLD)) as vehicle, pytest.raises(KeyboardInterrupt):
-        pushed(vehicle, progress=interrupt, tell=told.append)
+        pushed(vehicle, progress=interrupt, report=told.append)
     (line,) = told
     assert "what it holds now is unknown" in line and "do not start it before" in line
 
@@ -357,7 +357,7 @@ def test_ctrl_c_while_the_old_mission_is_read_says_that_nothing_was_sent(
     told: list[str] = []
     monkeypatch.setattr(uploads, "download", interrupt)
     with Scripted(held(OLD)) as vehicle, pytest.raises(KeyboardInterrupt):
-        pushed(vehicle, tell=told.append)
+        pushed(vehicle, report=told.append)
     assert told == ["nothing was sent of the mission; the vehicle holds what it held"]
 
 
@@ -406,7 +406,7 @@ class NeverClears(ClearsAll):
 def test_clearing_goes_by_clear_all_where_it_must_and_is_not_believed_unseen() -> None:
     with ClearsAll(held(OLD)) as vehicle, reached(vehicle.url, vehicle=1) as peer:
         assert clear(peer) == 6
-    told = pytest.raises(OutcomeUnknown, match="not seen empty")
+    told = pytest.raises(OutcomeUnknown, match="does not show that")
     with NeverClears(held(OLD)) as vehicle, reached(vehicle.url, vehicle=1) as peer, told:
         clear(peer)
 

@@ -7,14 +7,14 @@ import threading
 
 import pytest
 
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import clear, upload
 from stopgo.bridge.mavlink.transfer.upload_recovery import own_items
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.lists import stops
 from tests.ports import free_port
@@ -26,7 +26,9 @@ KEY = bytes(range(32))
 def test_missions_arrive_among_ten_thousand_hostile_datagrams(key: bytes | None) -> None:
     port = free_port()
     listening = Url("udpin", "127.0.0.1", port)
-    vehicle = vehicle_on(Url("udpout", "127.0.0.1", port), Setting(PROFILES["ardupilot"]), signing_key=key)
+    vehicle = vehicle_on(
+        Url("udpout", "127.0.0.1", port), VehicleSetup(PROFILES["ardupilot"]), signing_key=key
+    )
     thrower = threading.Thread(target=throw, args=(port,))
     with vehicle, reached(listening, vehicle=1, signing_key=key) as peer:
         thrower.start()

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.mavlink.line import transport
-from stopgo.bridge.mavlink.line.peer import reached
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, upload
+from stopgo.bridge.mavlink.vehicle_link import transport
+from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.errors import OutcomeUnknown
 from tests.bridge.mavlink.lists import stops
 
@@ -71,7 +71,7 @@ SENT = stops(20, "ardupilot")
 
 def test_a_mission_goes_over_a_serial_line(line: NullModem) -> None:
     with (
-        vehicle_on(Url("serial", str(line.far), 57600), Setting(PROFILES["ardupilot"])),
+        vehicle_on(Url("serial", str(line.far), 57600), VehicleSetup(PROFILES["ardupilot"])),
         reached(Url("serial", str(line.near), 57600), vehicle=1) as peer,
     ):
         assert upload(peer, SENT) == Uploaded(items=40, already=False)
@@ -82,9 +82,9 @@ def test_a_pulled_plug_leaves_it_unknown(line: NullModem) -> None:
         if done == 10:
             line.pull()
 
-    said = r"fell silent when 1\d of 41 items had arrived .*serial line is gone.*do not start it"
+    said = r"no data after 1\d of 41 items had arrived .*serial port is disconnected.*do not start it"
     with (
-        vehicle_on(Url("serial", str(line.far), 57600), Setting(PROFILES["ardupilot"])),
+        vehicle_on(Url("serial", str(line.far), 57600), VehicleSetup(PROFILES["ardupilot"])),
         reached(Url("serial", str(line.near), 57600), vehicle=1, timeout_s=2.0) as peer,
         pytest.raises(OutcomeUnknown, match=said),
     ):
@@ -95,10 +95,10 @@ def test_what_is_written_while_a_lost_line_is_closed_is_lost_and_no_more(line: N
     """A reader that meets a pulled plug closes the port; for a moment it has no descriptor and is open."""
     end = transport.Serial(Url("serial", str(line.near), 57600))
     try:
-        descriptor, end._line.fd = end._line.fd, None
+        descriptor, end._port.fd = end._port.fd, None
         end.write(b"heartbeat")
         assert end.read(0.0) == []
-        assert "serial line is gone" in end.gone
+        assert "serial port is disconnected" in end.disconnected
     finally:
         os.close(descriptor)
         end.close()

@@ -18,13 +18,13 @@ from stopgo.bridge.link.keys import now_utc, read_keys
 from stopgo.bridge.link.memory_link import MemoryLink, Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.zenoh_link import Guard, connecting
-from stopgo.bridge.mavlink.line.frames import Frames, dialect
-from stopgo.bridge.mavlink.line.peer import Peer, reached
-from stopgo.bridge.mavlink.line.transport import Address, open_transport
-from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.tunnel import tunnel as tunnels
 from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
 from stopgo.bridge.mavlink.tunnel.tunnel import QUEUE, Tunnel, open_tunnel
+from stopgo.bridge.mavlink.vehicle_link.frames import Frames, dialect
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.driving.world import rover
 from tests.bridge.mavlink.scripted import Scripted
@@ -51,7 +51,7 @@ class Line:
     """A transport whose other end is the test."""
 
     datagrams = True
-    gone = ""
+    disconnected = ""
 
     def __init__(self) -> None:
         self.coming: queue.Queue[bytes] = queue.Queue()
@@ -75,8 +75,8 @@ def both_ends(**details: Any) -> Iterator[tuple[Line, Line, Tunnel]]:
     board, vehicle, ground = Switchboard(), Line(), Line()
     down, up = KEYS.mavlink("down"), KEYS.mavlink("up")
     with (
-        open_tunnel(MemoryLink(board), vehicle, tells=down, hears=up, bulk=True, **details) as end,
-        open_tunnel(MemoryLink(board), ground, tells=up, hears=down),
+        open_tunnel(MemoryLink(board), vehicle, publishes=down, receives=up, bulk=True, **details) as end,
+        open_tunnel(MemoryLink(board), ground, publishes=up, receives=down),
     ):
         yield vehicle, ground, end
 
@@ -126,7 +126,7 @@ def test_a_link_that_is_stuck_costs_the_oldest_frames_and_never_waits() -> None:
             return publish
 
     many, line = frames(250) + frames(250, system=2) + frames(250, system=3), Line()
-    with open_tunnel(Stuck(Switchboard()), line, tells="down", hears="up") as end:
+    with open_tunnel(Stuck(Switchboard()), line, publishes="down", receives="up") as end:
         line.coming.put(many[0])
         assert told.wait(60)
         for frame in many[1:]:
@@ -298,11 +298,6 @@ def test_viewers_hear_the_vehicle_and_cannot_speak_to_it(tmp_path: Path) -> None
             keys = read_keys(site / name, now=now)
             return opened.enter_context(connecting(endpoint, Guard(keys)))
 
-        def ask_of(system: int) -> bytes:
-            coder = dialect.MAVLink(None, srcSystem=system, srcComponent=190)
-            ask = COMMAND(1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, 0, 0, 0, 0, 0, 0, 0)
-            return bytes(ask.pack(coder))
-
         reader = Frames(tunnels.Counter())
 
         def hear(key: str, payload: bytes) -> None:
@@ -321,8 +316,14 @@ def test_viewers_hear_the_vehicle_and_cannot_speak_to_it(tmp_path: Path) -> None
             told = heard.get(timeout=60)
             answers += told == "COMMAND_ACK 200"
             assert told != "COMMAND_ACK 201"
-            viewers(ask_of(201))
-            stations(ask_of(200))
+            viewers(request_of(201))
+            stations(request_of(200))
+
+
+def request_of(system: int) -> bytes:
+    coder = dialect.MAVLink(None, srcSystem=system, srcComponent=190)
+    request = COMMAND(1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, 0, 0, 0, 0, 0, 0, 0)
+    return bytes(request.pack(coder))
 
 
 def test_a_tunnel_off_this_machine_wants_keys_or_insecure(tmp_path: Path) -> None:
@@ -338,6 +339,9 @@ def test_a_transport_is_closed_with_its_tunnel() -> None:
     port = free_port()
     for _ in range(2):
         with open_tunnel(
-            MemoryLink(Switchboard()), open_transport(Url("udpin", "127.0.0.1", port)), tells="a", hears="b"
+            MemoryLink(Switchboard()),
+            open_transport(Url("udpin", "127.0.0.1", port)),
+            publishes="a",
+            receives="b",
         ):
             pass

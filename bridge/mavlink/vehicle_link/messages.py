@@ -1,11 +1,11 @@
-"""MAVLink messages from what they say: all that our end sends, in the names and units of its fields."""
+"""MAVLink messages that our end sends, made from their content in the names and units of their fields."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.document import Point
 from stopgo.mission.frames.geodesy import to_steps
 from stopgo.mission.mavlink.enums import Firmware, VehicleType
@@ -14,16 +14,16 @@ from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.telemetry import Message
 
 MISSION = dialect.MAV_MISSION_TYPE_MISSION
-"""Not the fence and not the rally points, which go by the same protocol."""
+"""Type of the mission, not of the fence or the rally points, which use the same protocol."""
 POSITION_ONLY = 0x0DF8
-"""Type mask of a setpoint that is a place: speeds, accelerations and yaw are ignored."""
+"""Type mask of a setpoint that is a position: speeds, accelerations and yaw are ignored."""
 YAW_ONLY = 0x09FF
 COURSE = 0x09C7
-"""A velocity and a yaw: the place, accelerations and the yaw's rate are ignored."""
+"""Type mask of a velocity and a yaw: the position, accelerations and the yaw's rate are ignored."""
 
 
 def heartbeat(kind: VehicleType) -> Message:
-    """Of ourselves, who are no vehicle."""
+    """Our own heartbeat, which is no vehicle's."""
     return dialect.MAVLink_heartbeat_message(kind, Firmware.INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3)
 
 
@@ -38,65 +38,65 @@ def on_board_beat() -> Message:
 
 
 def command_long(to: Who, number: int, *params: float, again: int = 0) -> Message:
-    """A command; what is not given of the seven params is 0. `again`: how often it was sent before."""
+    """A command; params that are not given are 0. `again`: number of times that it was sent before."""
     filled = (*params, *(0.0,) * 7)[:7]
     return dialect.MAVLink_command_long_message(to.system, to.component, number, min(again, 255), *filled)
 
 
 def command_int(to: Who, number: int, *params: float, x: int, y: int, z: float, frame: int) -> Message:
-    """A command with a place in steps of 1e-7 degrees, and up to four params."""
+    """A command with a position in steps of 1e-7 degrees, and up to four params."""
     filled = (*params, *(0.0,) * 4)[:4]
     return dialect.MAVLink_command_int_message(to.system, to.component, frame, number, 0, 0, *filled, x, y, z)
 
 
 def request(to: Who, message: int, index: int = 0) -> Message:
-    """Asks for a message; `index` for those that are numbered."""
+    """A request for a message; `index` for those that are numbered."""
     return command_long(to, Command.REQUEST_MESSAGE, message, index)
 
 
 def interval(to: Who, message: int, hertz: float) -> Message:
-    """Asks to be told something so often."""
+    """A request to send a message at a rate."""
     return command_long(to, Command.SET_MESSAGE_INTERVAL, message, 1e6 / hertz)
 
 
 def parameter_request(to: Who, name: str) -> Message:
-    """Asks for the value of a parameter."""
+    """A request for the value of a parameter."""
     return dialect.MAVLink_param_request_read_message(to.system, to.component, name.encode(), -1)
 
 
 def set_current(to: Who, sequence: int) -> Message:
-    """Makes an item the one it works on; nobody answers, MISSION_CURRENT shows it."""
+    """Makes an item the current one; there is no answer, but MISSION_CURRENT shows it."""
     return dialect.MAVLink_mission_set_current_message(to.system, to.component, sequence)
 
 
 def set_origin(to: Who, origin: VehicleOrigin) -> Message:
-    """What its local metres are to count from."""
+    """Sets the origin of its local frame."""
     return dialect.MAVLink_set_gps_global_origin_message(
         to.system, *to_steps(origin.place), round(origin.alt * 1000)
     )
 
 
-def aim_at(to: Who, place: Point, *, down: float, now_ms: int) -> Message:
-    """Drive to a place: metres north and east of its origin."""
-    return _setpoint(to, POSITION_ONLY, place, down, 0.0, now_ms)
+def position_setpoint(to: Who, position: Point, *, down: float, now_ms: int) -> Message:
+    """Setpoint to drive to a position: metres north and east of its origin."""
+    return _setpoint(to, POSITION_ONLY, position, down, 0.0, now_ms)
 
 
-def aim_yaw(to: Who, yaw: float, *, down: float, now_ms: int) -> Message:
-    """Turn on the spot: radians clockwise from north."""
+def yaw_setpoint(to: Who, yaw: float, *, down: float, now_ms: int) -> Message:
+    """Setpoint to turn on the spot: radians clockwise from north."""
     return _setpoint(to, YAW_ONLY, (0.0, 0.0), down, yaw, now_ms)
 
 
-def keep_course(to: Who, velocity: Point, yaw: float, *, down: float, now_ms: int) -> Message:
-    """Drive on with a velocity (what its two numbers mean is the autopilot's) and a yaw."""
+def course_setpoint(to: Who, velocity: Point, yaw: float, *, down: float, now_ms: int) -> Message:
+    """Setpoint of a velocity, whose two numbers each autopilot reads in its own frame, and a yaw."""
     return _setpoint(to, COURSE, (0.0, 0.0), down, yaw, now_ms, velocity)
 
 
 def _setpoint(
-    to: Who, mask: int, place: Point, down: float, yaw: float, now_ms: int, velocity: Point = (0.0, 0.0)
+    to: Who, mask: int, position: Point, down: float, yaw: float, now_ms: int, velocity: Point = (0.0, 0.0)
 ) -> Message:
     return dialect.MAVLink_set_position_target_local_ned_message(
         now_ms & 0xFFFFFFFF, to.system, to.component, dialect.MAV_FRAME_LOCAL_NED, mask,
-        *place, down, *velocity, *(0.0,) * 4, yaw, 0.0,
+        *position, down, *velocity, *(0.0,) * 4, yaw, 0.0,
     )  # fmt: skip
 
 
@@ -142,12 +142,12 @@ def clear_all(to: Who) -> Message:
 
 
 def of_mission(message: Message) -> bool:
-    """Whether a message of the mission protocol is about the mission."""
+    """True if a message of the mission protocol is about the mission."""
     return bool(message.mission_type == MISSION)
 
 
 def warning(text: str, *, system: int) -> bytes:
-    """A STATUSTEXT for people, as if the computer on that vehicle said it; at most 50 letters arrive."""
+    """A STATUSTEXT for people, in the name of the computer on that vehicle; at most 50 letters arrive."""
     speaker: Any = dialect.MAVLink(None, srcSystem=system, srcComponent=dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
     message = dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_WARNING, text[:50].encode())
     return bytes(message.pack(speaker))
@@ -158,16 +158,16 @@ def is_signed(message: Message) -> bool:
 
 
 def message_name(message: int) -> str:
-    """As messages call themselves, such as "GPS_GLOBAL_ORIGIN"."""
+    """Name of a message, such as "GPS_GLOBAL_ORIGIN"."""
     return str(dialect.mavlink_map[message].msgname)
 
 
 def enum_name(enum: str, number: int) -> str:
-    """As in "DENIED" for 2 of MAV_RESULT; the number itself if it has no name."""
+    """Name of a value, such as "DENIED" for 2 of MAV_RESULT; the number itself if it has no name."""
     entry = dialect.enums[enum].get(number)
     return str(number) if entry is None else entry.name.removeprefix(f"{enum}_")
 
 
 def result_name(result: int) -> str:
-    """Of a MAV_MISSION_RESULT, as in "INVALID_PARAM1"."""
+    """Name of a MAV_MISSION_RESULT, such as "INVALID_PARAM1"."""
     return enum_name("MAV_MISSION_RESULT", result).removeprefix("MAV_MISSION_")

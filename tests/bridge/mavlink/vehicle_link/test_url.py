@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from stopgo.bridge.mavlink.line.url import Url, check_guarded, read_url
+from stopgo.bridge.mavlink.vehicle_link.url import Url, check_guarded, read_url
 from stopgo.mission.errors import InputError
 
 

@@ -1,4 +1,4 @@
-"""Parameters of a vehicle by their names: asked for together, and again for those that have not come."""
+"""Reading of a vehicle's parameters by name: requested together, and again those that have not come."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import struct
 import time
 from collections.abc import Collection
 
-from stopgo.bridge.mavlink.line.messages import parameter_request
-from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.vehicle_link.messages import parameter_request
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.telemetry import Message
 
 ROUNDS = 4
 ROUND_S = 0.7
-"""How long each round waits after the last answer; a vehicle says nothing of names that it has not."""
+"""Wait of each round after the last answer; a vehicle does not answer for names that it has not."""
 WHOLE = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}
-"""MAV_PARAM_TYPE of whole numbers, and how their first bytes are read."""
+"""MAV_PARAM_TYPE of whole numbers, and the format of their first bytes."""
 
 
 def read_parameters(peer: Peer, names: Collection[str]) -> dict[str, float]:
-    """The values of those that the vehicle has."""
+    """Values of those parameters that the vehicle has."""
     found: dict[str, float] = {}
     with peer.waiting("PARAM_VALUE") as waiting:
         for _ in range(ROUNDS):
@@ -36,7 +36,7 @@ def read_parameters(peer: Peer, names: Collection[str]) -> dict[str, float]:
 
 
 def value_of(message: Message, *, bytewise: bool) -> float:
-    """The value in a PARAM_VALUE; `bytewise`: a whole number's bytes stand in the float as they are."""
+    """The value in a PARAM_VALUE; `bytewise`: the float holds the bytes of a whole number."""
     form = WHOLE.get(message.param_type)
     if not bytewise or form is None:
         return float(message.param_value)

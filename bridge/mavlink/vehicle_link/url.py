@@ -1,4 +1,4 @@
-"""Where a MAVLink peer is: udpin:H:P, udpout:H:P, tcp:H:P, tcpin:H:P, serial:PATH:BAUD, `//` optional."""
+"""URL of a MAVLink peer: udpin:H:P, udpout:H:P, tcp:H:P, tcpin:H:P, serial:PATH:BAUD, `//` optional."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Url:
 
     @property
     def stays_here(self) -> bool:
-        """Whether nothing leaves this machine by way of a network."""
+        """True if nothing leaves this machine over a network."""
         from stopgo.bridge.link.zenoh_link import is_loopback
 
         return self.kind == "serial" or is_loopback(self.host)
@@ -46,7 +46,7 @@ def read_url(text: str, option: str = "--mavlink") -> Url:
     Raises
     ------
     InputError
-        If it is none.
+        If it is not a URL.
     """
     kind, _, rest = text.partition(":")
     host, _, number = rest.removeprefix("//").rpartition(":")
@@ -61,12 +61,12 @@ def read_url(text: str, option: str = "--mavlink") -> Url:
 
 
 def check_guarded(url: Url, *, signed: bool, insecure: bool, option: str = "--mavlink") -> None:
-    """Refuse to leave this machine unsigned, unless that is wanted.
+    """Refuse to send unsigned messages from this machine, unless `insecure` allows it.
 
     Raises
     ------
     InputError
-        Naming the way out.
+        With the remedies.
     """
     if not (url.stays_here or signed or insecure):
         raise InputError(

@@ -1,10 +1,10 @@
-"""How long a peer takes to answer: smoothed, with its deviation, as TCP does (RFC 6298)."""
+"""Time that a peer takes to answer: smoothed, with its deviation, as TCP does (RFC 6298)."""
 
 from __future__ import annotations
 
 
 class RoundTrips:
-    """Those seen with one peer, by whatever transfer."""
+    """Round trips measured with one peer, in all transfers."""
 
     def __init__(self) -> None:
         self.shortest_s: float | None = None
@@ -14,13 +14,13 @@ class RoundTrips:
 
     @property
     def expected_s(self) -> float | None:
-        """After so long an answer is missing; `None` before any was seen."""
+        """Time after which an answer is missing; `None` before any was measured."""
         if self.shortest_s is None:
             return None
         return self._smooth_s + max(4.0 * self._deviation_s, self._smooth_s / 2.0)
 
     def guess(self, seconds: float) -> None:
-        """Of something that was sent more than once, since the last time; only until one is seen."""
+        """Take the time since the last of several repetitions; it counts only until one is measured."""
         if self.shortest_s is None:
             self._begin(seconds)
 

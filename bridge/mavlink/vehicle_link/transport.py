@@ -1,11 +1,11 @@
-"""Bytes in and out of UDP sockets, TCP streams and serial lines, for `wire` and `tunnel`.
+"""Bytes in and out of UDP sockets, TCP streams and serial ports, for `wire` and `tunnel`.
 
-A transport that was opened never fails afterwards: while its line is gone (refused, closed by the other end,
-unplugged) it is silent, says why in `gone`, and comes back by itself. What silence means is for those to
-decide who wait for an answer.
+A transport that was opened never fails afterwards. While it is disconnected (refused, closed by the other
+end, unplugged) it returns no data, gives the reason in `disconnected`, and reconnects by itself. Whoever
+waits for an answer decides what missing data mean.
 
-One thread reads, any may write. A line that breaks under a writer is closed by the reader: to close what
-somebody waits on makes the waiting fail in ways of its own.
+One thread reads, any may write. If a connection breaks under a writer, the reader closes it: a reader that
+waits on a closed connection would fail in other ways.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from stopgo.bridge.mavlink.line.url import Url, UrlKind
+from stopgo.bridge.mavlink.vehicle_link.url import Url, UrlKind
 from stopgo.mission.errors import InputError, RobotUnreachable
 
 Address = Any
-"""Whoever sent something: an IP address and port, or a serial line; hashable."""
+"""A sender: an IP address and port, or a serial port; hashable."""
 
 READ_BYTES = 65536
 BUFFER_BYTES = 4 * 1024 * 1024
-"""Wanted of the system for datagrams that wait: a burst of telemetry should not be lost here."""
+"""Buffer requested from the system for datagrams: a burst of telemetry should not be lost here."""
 MAX_PEERS = 16
-"""A listening end remembers so many, the ones heard last."""
+"""Number of latest senders that a listening end remembers."""
 CONNECT_S = 5.0
 RETRY_S = 0.5
 
 
 class Transport(Protocol):
     datagrams: bool
-    """Whether each piece read holds whole frames."""
-    gone: str
-    """Why nothing passes at the moment; empty if all is well."""
+    """True if each chunk read holds whole frames."""
+    disconnected: str
+    """Reason why it is disconnected; empty if it is connected."""
 
     def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
-        """What has come, each piece with who sent it; empty when the time is up."""
+        """Chunks of data with their senders; empty when the time is up."""
 
     def write(self, data: bytes, to: Address | None = None) -> None:
-        """Send to one of those heard, or to all of them."""
+        """Send to one known sender, or to all of them."""
 
     def close(self) -> None: ...
 
@@ -61,12 +61,12 @@ def open_transport(url: Url) -> Transport:
 
 
 class UdpOut:
-    """Sends to one address, hears only that one."""
+    """Sends to one address, and receives only from it."""
 
     datagrams = True
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._peer = (url.host, url.number)
         self._socket = _datagrams(url)
         try:
@@ -83,30 +83,30 @@ class UdpOut:
         except BlockingIOError:  # what was ready was an error, and a writer has met it
             return []
         except OSError as error:
-            self.gone = _why(error)
+            self.disconnected = _why(error)
             return []
-        self.gone = ""
+        self.disconnected = ""
         return [(self._peer, data)]
 
     def write(self, data: bytes, to: Address | None = None) -> None:
         try:
             self._socket.send(data)
-        except BlockingIOError:  # there is no room: it is lost, as on any line
+        except BlockingIOError:  # there is no room: it is lost, as on any link
             pass
         except OSError as error:
-            self.gone = _why(error)
+            self.disconnected = _why(error)
 
     def close(self) -> None:
         self._socket.close()
 
 
 class UdpIn:
-    """Hears everyone on a port, and answers those it has heard."""
+    """Receives from everyone on a port, and sends to those senders."""
 
     datagrams = True
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._peers: dict[Address, None] = {}
         self._socket = _datagrams(url)
         _bind(self._socket, url)
@@ -139,7 +139,7 @@ class TcpOut:
     datagrams = False
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._peer = (url.host, url.number)
         self._tried = time.monotonic()
         try:
@@ -162,13 +162,13 @@ class TcpOut:
         return [(self._peer, data)] if data else []
 
     def write(self, data: bytes, to: Address | None = None) -> None:
-        line = self._socket
-        if line is not None:
+        stream = self._socket
+        if stream is not None:
             try:
-                line.sendall(data)
+                stream.sendall(data)
             except OSError as error:
-                self.gone = error.strerror or str(error)
-                _end(line)
+                self.disconnected = error.strerror or str(error)
+                _end(stream)
 
     def close(self) -> None:
         if self._socket is not None:
@@ -180,9 +180,9 @@ class TcpOut:
         return made
 
     def _lose(self, why: str) -> None:
-        line, self._socket, self.gone = self._socket, None, why
-        if line is not None:
-            line.close()
+        stream, self._socket, self.disconnected = self._socket, None, why
+        if stream is not None:
+            stream.close()
 
     def _reconnect(self, timeout_s: float) -> None:
         time.sleep(min(timeout_s, max(0.0, self._tried + RETRY_S - time.monotonic())))
@@ -191,18 +191,18 @@ class TcpOut:
         self._tried = time.monotonic()
         try:
             self._socket = self._connected()
-            self.gone = ""
+            self.disconnected = ""
         except OSError as error:
-            self.gone = error.strerror or str(error)
+            self.disconnected = error.strerror or str(error)
 
 
 class TcpIn:
-    """Accepts connections, as many as come."""
+    """Accepts any number of connections."""
 
     datagrams = False
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._listening = socket.socket(_family(url), socket.SOCK_STREAM)
         self._listening.setblocking(False)
         self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -237,7 +237,7 @@ class TcpIn:
     def _accept(self) -> None:
         try:
             stream, peer = self._listening.accept()
-        except OSError:  # it was there, and is gone again
+        except OSError:  # it has disconnected already
             return
         stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         stream.settimeout(CONNECT_S)  # a peer that never reads must not stop the others for good
@@ -261,30 +261,30 @@ class TcpIn:
 
 
 class Serial:
-    """A serial line, opened again whenever it is unplugged and plugged in."""
+    """A serial port, opened again whenever it is unplugged and plugged in."""
 
     datagrams = False
 
     def __init__(self, url: Url) -> None:
-        self.gone = ""
+        self.disconnected = ""
         self._url = url
         self._tried = time.monotonic()
         self._broken = ""
-        """Why writing failed; the reader's to see."""
-        self._line = self._opened()
+        """Reason why writing failed, for the reader."""
+        self._port = self._opened()
 
     def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
         import serial
 
         if self._broken:
             self._lose(self._broken)
-        if self._line is None:
+        if self._port is None:
             self._reopen(timeout_s)
             return []
         try:
-            self._line.timeout = timeout_s
-            data = self._line.read(1)
-            data += self._line.read(self._line.in_waiting) if data else b""
+            self._port.timeout = timeout_s
+            data = self._port.read(1)
+            data += self._port.read(self._port.in_waiting) if data else b""
         except (serial.SerialException, OSError, TypeError) as error:
             self._lose(str(error))
             return []
@@ -293,18 +293,18 @@ class Serial:
     def write(self, data: bytes, to: Address | None = None) -> None:
         import serial
 
-        line = self._line
-        if line is None or self._broken:
+        port = self._port
+        if port is None or self._broken:
             return
         try:
-            line.write(data)
+            port.write(data)
         except (serial.SerialException, OSError, TypeError) as error:  # TypeError: it is being closed
-            if line is self._line:
+            if port is self._port:
                 self._broken = str(error)
 
     def close(self) -> None:
-        if self._line is not None:
-            self._line.close()
+        if self._port is not None:
+            self._port.close()
 
     def _opened(self) -> Any:
         import serial
@@ -316,17 +316,17 @@ class Serial:
             raise InputError(f"{self._url}: cannot be opened ({why}); is it plugged in, and free?") from None
 
     def _lose(self, why: str) -> None:
-        line, self._line, self._broken = self._line, None, ""
-        self.gone = f"the serial line is gone ({why})"
-        if line is not None:
-            line.close()
+        port, self._port, self._broken = self._port, None, ""
+        self.disconnected = f"the serial port is disconnected ({why})"
+        if port is not None:
+            port.close()
 
     def _reopen(self, timeout_s: float) -> None:
         time.sleep(min(timeout_s, RETRY_S))
         if time.monotonic() >= self._tried + RETRY_S:
             self._tried = time.monotonic()
             with contextlib.suppress(InputError):
-                self._line, self.gone = self._opened(), ""
+                self._port, self.disconnected = self._opened(), ""
 
 
 OPENING: dict[UrlKind, Callable[[Url], Transport]] = {
@@ -364,7 +364,7 @@ def _why(error: OSError) -> str:
 
 
 def _end(stream: socket.socket) -> None:
-    """Let whoever reads from the stream see its end."""
+    """End the stream for its reader."""
     with contextlib.suppress(OSError):
         stream.shutdown(socket.SHUT_RDWR)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.messages import station_beat
-from stopgo.bridge.mavlink.line.peer import found, reached
-from stopgo.bridge.mavlink.line.url import read_url
-from stopgo.bridge.mavlink.line.wire import Who, wire
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import station_beat
+from stopgo.bridge.mavlink.vehicle_link.peer import found, reached
+from stopgo.bridge.mavlink.vehicle_link.url import read_url
+from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots.generic import GENERIC
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
@@ -70,7 +70,7 @@ def test_of_several_vehicles_one_must_be_named() -> None:
             pass
         with found(station, 2) as peer:
             assert peer.who == Who(2, 1)
-        unheard = pytest.raises(RobotUnreachable, match=r"no vehicle 3 within .*heard: 1")
+        unheard = pytest.raises(RobotUnreachable, match=r"no vehicle 3 within .*found: 1")
         with unheard, found(station, 3, timeout_s=1.2):
             pass
 

@@ -1,8 +1,8 @@
-"""Messages in and out of a transport: frames, checksums, signatures, and who is where.
+"""Messages in and out of a transport: frames, checksums, signatures, and addresses of senders.
 
-One thread reads; whoever waits for messages opens a queue for their types. Nothing that comes in can stop
-the thread: what is no frame, has a wrong checksum or signature, or is for somebody else is dropped and
-counted.
+One thread reads; whoever waits for messages opens a queue for their types. No input can stop the thread. It
+drops and counts bytes that are no frame, frames with a wrong checksum or signature, and messages for somebody
+else.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from stopgo.bridge.console import say
-from stopgo.bridge.mavlink.line.frames import UNREADABLE, Frames, dialect
-from stopgo.bridge.mavlink.line.transport import Address, Transport, open_transport
-from stopgo.bridge.mavlink.line.url import Url, check_guarded, read_url
+from stopgo.bridge.mavlink.vehicle_link.frames import UNREADABLE, Frames, dialect
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, Transport, open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url, check_guarded, read_url
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.telemetry import Message
@@ -32,36 +32,36 @@ READ_S = 0.1
 MAVLINK_EPOCH_S = 1_420_070_400
 """2015-01-01, from which signatures count in steps of 10 µs."""
 OLDEST_STEPS = 6_000_000
-"""A sender heard for the first time may be a minute behind."""
+"""Largest delay of a new sender's clock: a minute."""
 SIGNATURE = "wrong or no signature"
-"""Reason by which `dropped` counts what was not signed with our key, or is a replay."""
+"""Reason by which `dropped` counts messages without a signature by our key, and replays."""
 SLOW_BAUD = 57_600
-"""At this rate eight mission items take 70 ms; telemetry radios are not faster."""
+"""Highest rate of a slow link: eight mission items take 70 ms; telemetry radios are not faster."""
 UNSIGNED_ALLOWED = (MessageId.RADIO_STATUS,)
 """Radios cannot sign."""
 LEAST_PASSPHRASE = 8
 KEY_FILE = f"64 hexadecimal digits, or a passphrase of {LEAST_PASSPHRASE} characters or more"
 READ_BY_OTHERS = 0o044
-"""Permissions of the group and of everybody."""
+"""Read permissions of the group and of all users."""
 
 
 @dataclass(frozen=True)
 class Who:
-    """Our own or somebody's system and component."""
+    """System and component of a sender or receiver."""
 
     system: int
     component: int
 
 
 GROUND_STATION = Who(254, Component.MISSIONPLANNER)
-"""Not 255, which QGroundControl has: a vehicle must be able to tell two stations apart."""
+"""Our address as a station; not 255, which QGroundControl has: a vehicle must distinguish two stations."""
 
 
 B = TypeVar("B", bound="MessageQueue")
 
 
 class MessageQueue:
-    """Messages that wait for one reader: of these types (empty: all), from one sender (`None`: all)."""
+    """Queue of messages for one reader: of these types (empty: all), from one sender (`None`: all)."""
 
     def __init__(self, types: frozenset[str] = frozenset(), of: Who | None = None) -> None:
         self.types = types
@@ -72,7 +72,7 @@ class MessageQueue:
         return (not self.types or message.get_type() in self.types) and self.of in (None, sender(message))
 
     def put(self, message: Message) -> None:
-        with suppress(queue.Full):  # a flood is dropped, as on any lossy link
+        with suppress(queue.Full):  # too many are dropped, as on any lossy link
             self._queue.put_nowait(message)
 
     def get(self, timeout_s: float) -> Message | None:
@@ -84,7 +84,7 @@ class MessageQueue:
 
 
 def sender(message: Message) -> Who:
-    """Who sent a message that was received."""
+    """Sender of a received message."""
     return Who(message.get_srcSystem(), message.get_srcComponent())
 
 
@@ -103,11 +103,11 @@ class Wire:
     ) -> None:
         self.me = me
         self.name = name
-        """What errors call it."""
+        """Its name in errors."""
         self.slow = slow
-        """Whether a few messages fill it for a noticeable time."""
+        """True if a few messages fill it for a noticeable time."""
         self.dropped: Counter[str] = Counter()
-        """What was not for us or no message at all, by reason."""
+        """Number of dropped messages, by reason."""
         self._transport = transport
         self._ended = ""
         self._key, self._signs = signing_key, signs
@@ -115,7 +115,7 @@ class Wire:
         self._sending = self._mav()
         self._frames = Frames(self.dropped, self._mav)
         self._routes: dict[tuple[int, int], Address] = {}
-        self._boxes: list[MessageQueue] = []
+        self._queues: list[MessageQueue] = []
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._beat: Callable[[], Message] | None = None
@@ -124,14 +124,14 @@ class Wire:
             thread.start()
 
     @property
-    def gone(self) -> str:
-        """Why nothing passes at the moment; empty if all is well."""
-        return self._ended or self._transport.gone
+    def disconnected(self) -> str:
+        """Reason why no data pass now; empty if they pass."""
+        return self._ended or self._transport.disconnected
 
     def send(self, message: Message, *, component: int | None = None) -> None:
-        """Send to the one the message is for, if it is known where that is; else to all.
+        """Send to the receiver of the message, if its address is known; else to all.
 
-        `component`: which of our system says it, if not `me`.
+        `component`: the sender within our system, if not `me`.
         """
         target = (getattr(message, "target_system", 0), getattr(message, "target_component", 0))
         with self._lock:
@@ -143,21 +143,21 @@ class Wire:
 
     @contextmanager
     def waiting(self, *types: str, of: Who | None = None) -> Iterator[MessageQueue]:
-        """A box that collects messages of these types (all, if none is given) while it is open."""
+        """A queue that collects messages of these types (all, if none is given) while it is open."""
         with self.filling(MessageQueue(frozenset(types), of)) as waiting:
             yield waiting
 
     @contextmanager
     def filling(self, waiting: B) -> Iterator[B]:
-        """A box of the caller's own, which is filled while this is open."""
-        self._boxes.append(waiting)
+        """Fill a queue of the caller's own until the block ends."""
+        self._queues.append(waiting)
         try:
             yield waiting
         finally:
-            self._boxes.remove(waiting)
+            self._queues.remove(waiting)
 
     def beat(self, heartbeat: Callable[[], Message]) -> None:
-        """Send what `heartbeat` makes now and every second."""
+        """Send a heartbeat now and every second."""
         self._beat = heartbeat
         self.send(heartbeat())
 
@@ -199,7 +199,7 @@ class Wire:
         if not self._for_us(message):
             self.dropped["for others"] += 1
             return
-        for waiting in list(self._boxes):
+        for waiting in list(self._queues):
             if waiting.wants(message):
                 waiting.put(message)
 
@@ -209,7 +209,7 @@ class Wire:
         return system in (0, self.me.system) and component in (0, self.me.component)
 
     def _mav(self) -> Coder:
-        """A coder of its own, for each direction and peer: they keep state."""
+        """A new coder, one for each direction and peer: coders have state."""
         mav = Coder(self.me, self._seen)
         if self._key is not None:
             mav.signing.secret_key = self._key
@@ -226,7 +226,7 @@ def _why_dropped(message: Message) -> str:
 
 
 class SeenStreams:
-    """The newest time signed by each sender, whatever address it comes from: nothing is taken twice."""
+    """The newest time signed by each sender, from whatever address: no message is accepted twice."""
 
     def __init__(self) -> None:
         self._newest: dict[tuple[int, int, int], int] = {}
@@ -240,9 +240,9 @@ class SeenStreams:
 
 
 class Coder(dialect.MAVLink):
-    """The dialect's coder, but a signature's time counts only once the signature itself is right.
+    """The dialect's coder, but a signature's time counts only if the signature itself is right.
 
-    Otherwise one forged frame of a far future would lock its sender's stream.
+    Otherwise one forged frame with a time far in the future would block its sender's stream.
     """
 
     def __init__(self, me: Who, seen: SeenStreams) -> None:
@@ -251,7 +251,7 @@ class Coder(dialect.MAVLink):
         self._seen_streams = seen
 
     def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:
-        """MAVLink 2 message signing: SHA-256 of key and frame, its first 48 bits."""
+        """Check a MAVLink 2 message signature: the first 48 bits of the SHA-256 of key and frame."""
         signed, signature = bytes(msgbuf[:-6]), bytes(msgbuf[-6:])
         right = hashlib.sha256(bytes(self.signing.secret_key or b"") + signed).digest()[:6]
         timestamp = int.from_bytes(signed[-6:], "little")
@@ -263,7 +263,7 @@ class Coder(dialect.MAVLink):
 
 
 def signing_time() -> int:
-    """Now, in the steps that signatures count."""
+    """Present time in the steps of signatures."""
     return round((time.time() - MAVLINK_EPOCH_S) * 1e5)
 
 
@@ -278,10 +278,10 @@ def wire(url: Url, *, me: Who = GROUND_STATION, signing_key: bytes | None = None
         opened.close()
 
 
-def read_line(
+def read_link(
     text: str, signing_key: Path | None, *, insecure: bool, option: str = "--mavlink"
 ) -> tuple[Url, bytes | None]:
-    """Where a vehicle is, and the key that what is said to it is signed with, guarded as it should be.
+    """URL of a vehicle and the signing key for it; an unsafe combination is refused.
 
     Raises
     ------
@@ -297,13 +297,13 @@ def read_line(
 def read_signing_key(path: Path) -> bytes:
     """The 32 bytes in a key file: 64 hexadecimal digits, or a passphrase of which they are the SHA-256.
 
-    The latter is how ground stations make a key from what their users type. Whoever may not be alone with
-    the key is told so.
+    Ground stations make a key from a passphrase that way. If other users of the machine can read the file, a
+    note is printed.
 
     Raises
     ------
     InputError
-        If there is no key in the file.
+        If the file holds no key.
     """
     try:
         text = path.read_text(encoding="utf-8").strip()

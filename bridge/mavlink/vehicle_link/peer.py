@@ -1,7 +1,7 @@
-"""The vehicle at the other end of a wire: found by its heartbeat, asked and ordered until it answers.
+"""The vehicle at the other end of a wire: found by its heartbeat, queried and commanded until it answers.
 
-Whoever waits gives up on silence: after so many seconds in which the vehicle said nothing that counts, never
-after so many tries.
+Every wait ends after a number of seconds without relevant data from the vehicle, never after a number of
+tries.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
-from stopgo.bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.vehicle_link.messages import (
     command_int,
     command_long,
     enum_name,
@@ -24,9 +24,9 @@ from stopgo.bridge.mavlink.line.messages import (
     set_origin,
     station_beat,
 )
-from stopgo.bridge.mavlink.line.round_trips import RoundTrips
-from stopgo.bridge.mavlink.line.url import Url
-from stopgo.bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
+from stopgo.bridge.mavlink.vehicle_link.round_trips import RoundTrips
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_of
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
@@ -36,20 +36,20 @@ from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.telemetry import Message, has_restarted, origin_of, place_of
 
 PATIENCE_S = 5.0
-"""Silence after which a vehicle is given up."""
+"""Time without data after which a wait for a vehicle ends."""
 AGAIN_S = 0.3
-"""Between two tries of the same question or order."""
+"""Interval between two tries of the same query or command."""
 OTHERS_S = 1.3
-"""Every vehicle beats once a second: so long one waits for a second one after the first."""
+"""Wait for a second vehicle after the first: every one sends a heartbeat once a second."""
 KNOCK_S = 0.3
-"""So often a vehicle that is not heard is asked for a heartbeat."""
+"""Interval at which a heartbeat is requested from a vehicle that is not found yet."""
 CLOCKS = (MessageId.SYSTEM_TIME, MessageId.ATTITUDE)
 UNSET_ANSWERS = 8
-"""So often a vehicle takes the question and sends nothing before that means there is nothing to send."""
+"""Number of accepted requests without the message that show that the vehicle has none to send."""
 
 UNPLACED = (
-    "the vehicle has an origin, and yet tells no place on earth (GLOBAL_POSITION_INT 0, 0): in AUTO it would"
-    " pass over its waypoints; start it again, and set its origin only once it tells LOCAL_POSITION_NED"
+    "the vehicle has an origin, but reports no position on earth (GLOBAL_POSITION_INT 0, 0): in AUTO it would"
+    " pass over its waypoints; restart it, and set its origin only once it sends LOCAL_POSITION_NED"
 )
 
 
@@ -60,7 +60,7 @@ class Ack:
     command: int
     result: int
     detail: int = 0
-    """result_param2: what the command says it means."""
+    """result_param2, whose meaning depends on the command."""
 
     @property
     def accepted(self) -> bool:
@@ -68,14 +68,14 @@ class Ack:
 
     @property
     def name(self) -> str:
-        """As in "DENIED"."""
+        """Name of the result, such as "DENIED"."""
         return enum_name("MAV_RESULT", self.result)
 
 
 class Newest(MessageQueue):
-    """The newest message of each type from one vehicle, and how often its clock began again.
+    """The newest message of each type from one vehicle, and the number of its restarts.
 
-    What is said in words of its other components, or in its name by a tunnel, is kept apart.
+    Texts of its other components, or of a tunnel in its name, are stored separately.
     """
 
     def __init__(self, of: Who) -> None:
@@ -84,15 +84,15 @@ class Newest(MessageQueue):
         self.heard_s = time.monotonic()
         self.messages: dict[str, Message] = {}
         self.clock: int | None = None
-        """Number of the message that last told the time since its boot."""
+        """Number of the message that last reported the time since its boot."""
         self.text = ""
         self.text_s = -math.inf
         self._boot_ms = 0
 
     def wants(self, message: Message) -> bool:
         assert self.of is not None
-        words = message.get_type() == "STATUSTEXT" and message.get_srcSystem() == self.of.system
-        return words or super().wants(message)
+        is_text = message.get_type() == "STATUSTEXT" and message.get_srcSystem() == self.of.system
+        return is_text or super().wants(message)
 
     def put(self, message: Message) -> None:
         if message.get_type() == "STATUSTEXT":
@@ -107,9 +107,9 @@ class Newest(MessageQueue):
             self._count_boots(now_ms)
 
     def _count_boots(self, now_ms: int) -> None:
-        anew = has_restarted(self._boot_ms, now_ms)
-        self.boots += anew
-        self._boot_ms = now_ms if anew else max(now_ms, self._boot_ms)
+        restarted = has_restarted(self._boot_ms, now_ms)
+        self.boots += restarted
+        self._boot_ms = now_ms if restarted else max(now_ms, self._boot_ms)
 
 
 class Peer:
@@ -122,20 +122,20 @@ class Peer:
         self.wire = wire
         self.who = newest.of
         self.autopilot = autopilot
-        """Its kind."""
+        """The kind of its autopilot."""
         self.patience_s = patience_s
         self.round_trips = RoundTrips()
         self.in_order = False
-        """Whether it was found to give its items only one by one."""
+        """True if it was found to send its items only one by one."""
         self._newest = newest
-        self._ordering = threading.Lock()
+        self._commanding = threading.Lock()
 
     def __str__(self) -> str:
         return f"vehicle {self.who.system} ({self.autopilot.name})"
 
     @property
     def heartbeat(self) -> Message:
-        """The last one."""
+        """The last heartbeat."""
         return self._newest.messages["HEARTBEAT"]
 
     @property
@@ -144,37 +144,37 @@ class Peer:
 
     @property
     def in_auto(self) -> bool:
-        """Whether it is in the mode in which it follows the mission it holds."""
+        """True if it is in the mode in which it follows its mission."""
         return self.autopilot.in_auto(self.heartbeat)
 
     @property
     def silent_s(self) -> float:
-        """Seconds since anything was heard of it."""
+        """Seconds since its last message."""
         return time.monotonic() - self._newest.heard_s
 
     @property
     def boots(self) -> int:
-        """How often it was started again since it was found, as far as its clock tells."""
+        """Number of its restarts since it was found, as far as its clock shows them."""
         return self._newest.boots
 
     def ask_clock(self) -> None:
-        """Ask for its clock, by the messages of which most have one; `boots` follows."""
+        """Request its clock, by two messages of which most vehicles have one; `boots` follows."""
         for number in CLOCKS:
             self.request(number)
 
     def clock_seen(self, *, patience_s: float) -> None:
-        """Wait for the time since its boot, of a vehicle that has told it before."""
+        """Wait for the time since its boot, if the vehicle has reported that before."""
         if self._newest.clock is not None:
             with suppress(RobotUnreachable):
                 self.ask(self._newest.clock, patience_s=patience_s)
 
     def newest(self, name: str) -> Message | None:
-        """Its last message of a type, whenever that came."""
+        """Its last message of a type, however old."""
         return self._newest.messages.get(name)
 
     @contextmanager
     def waiting(self, *types: str) -> Iterator[MessageQueue]:
-        """A queue of what this vehicle sends, as `Wire.waiting`."""
+        """A queue of messages from this vehicle, as `Wire.waiting`."""
         with self.wire.waiting(*types, of=self.who) as waiting:
             yield waiting
 
@@ -182,7 +182,7 @@ class Peer:
         self.wire.send(message)
 
     def command(self, number: int, *params: float, patience_s: float | None = None) -> Ack:
-        """A COMMAND_LONG, sent until it is answered; what is not given of the seven params is 0.
+        """Send a COMMAND_LONG until it is answered; params that are not given are 0.
 
         Raises
         ------
@@ -203,12 +203,12 @@ class Peer:
         frame: int = MavFrame.GLOBAL,
         patience_s: float | None = None,
     ) -> Ack:
-        """A COMMAND_INT with up to four params and a place (1e-7 degrees); as `command`."""
+        """Send a COMMAND_INT with up to four params and a position (1e-7 degrees); as `command`."""
         message = command_int(self.who, number, *params, x=x, y=y, z=z, frame=frame)
         return self._commanded(number, lambda _: message, patience_s)
 
     def order(self, number: int, *params: float, what: str = "", patience_s: float | None = None) -> Ack:
-        """As `command`, and anything but ACCEPTED is an error.
+        """Send a command as `command`; anything but ACCEPTED is an error.
 
         Raises
         ------
@@ -222,7 +222,7 @@ class Peer:
         return ack
 
     def ask(self, number: int, *, patience_s: float | None = None) -> Message | None:
-        """The message of this number, or `None` if the vehicle has none to send or does not know it.
+        """Request a message; return it, or `None` if the vehicle has none to send or does not know it.
 
         Raises
         ------
@@ -231,10 +231,10 @@ class Peer:
         """
         name = message_name(number)
         taken = 0
-        with self._ordering, self.waiting(name, "COMMAND_ACK") as waiting:
+        with self._commanding, self.waiting(name, "COMMAND_ACK") as waiting:
             for _ in self._tries(AGAIN_S, patience_s):
                 self.request(number)
-                reply = self._reply(waiting, name, AGAIN_S)
+                reply = _reply(waiting, name, AGAIN_S)
                 if reply is None:
                     continue
                 if reply.get_type() == name:
@@ -247,25 +247,25 @@ class Peer:
         raise RobotUnreachable(f"{self} does not answer{self.why_silent()}; nothing was sent to it")
 
     def request(self, number: int) -> None:
-        """Ask for the message of this number, and wait for nothing; `newest` has it if it comes."""
+        """Request the message of this number without waiting; `newest` has it if it comes."""
         self.wire.send(request(self.who, number))
 
     def origin(self, *, patience_s: float | None = None) -> VehicleOrigin | None:
-        """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""
+        """Origin of its local frame (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not reported."""
         message = self.ask(MessageId.GPS_GLOBAL_ORIGIN, patience_s=patience_s)
         return None if message is None else origin_of(message)
 
     def unplaced(self) -> str:
-        """Why it would not find a waypoint; empty if it would, or tells nothing of that.
+        """Reason why it would not find a waypoint; empty if it would, or if it reports nothing of that.
 
-        ArduPilot that is given an origin before its filter runs tells it, and never uses it: measured, it
-        then told metres, armed, and in AUTO passed over waypoint after waypoint where it stood.
+        ArduPilot that gets an origin before its filter runs reports it, and never uses it. Measured: it then
+        reported metres, armed, and in AUTO passed over waypoint after waypoint without moving.
         """
-        told = self.ask(MessageId.GLOBAL_POSITION_INT)
-        return UNPLACED if told is not None and place_of(told) is None else ""
+        position = self.ask(MessageId.GLOBAL_POSITION_INT)
+        return UNPLACED if position is not None and place_of(position) is None else ""
 
     def set_origin(self, origin: VehicleOrigin, *, patience_s: float | None = None) -> VehicleOrigin | None:
-        """Tell it what its metres count from, and the origin it then has: the old one if it had one."""
+        """Set the origin of its local frame; return the one it then has: the old one if it had one."""
         message = set_origin(self.who, origin)
         for _ in self._tries(0.0, patience_s):
             self.wire.send(message)
@@ -275,28 +275,26 @@ class Peer:
         return None
 
     def why_silent(self) -> str:
-        """What may be the reason that a vehicle heard of does not answer, to be put into a sentence."""
-        if self.wire.gone:
-            return f" ({self.wire.gone})"
+        """Possible reason why a vehicle that was found does not answer, as a part of a sentence."""
+        if self.wire.disconnected:
+            return f" ({self.wire.disconnected})"
         if self.wire.dropped[SIGNATURE]:
             return f" ({self.wire.dropped[SIGNATURE]} frames had a {SIGNATURE}: is the signing key its own?)"
         if self.silent_s > OTHERS_S:
-            return f" (silent for {self.silent_s:.0f} s)"
+            return f" (no data for {self.silent_s:.0f} s)"
         if self._newest.text_s > time.monotonic() - self.patience_s - OTHERS_S:
             return f' (it last said "{self._newest.text}")'
         if is_signed(self.heartbeat):
             return " (it signs its messages, and may want ours signed: --signing-key FILE)"
-        return " (its heartbeats come: does it want signed messages, or is the line one-way?)"
+        return " (its heartbeats come: does it want signed messages, or is the link one-way?)"
 
     def _commanded(self, number: int, message: Callable[[int], Message], patience_s: float | None) -> Ack:
-        with self._ordering, self.waiting("COMMAND_ACK") as waiting:
+        with self._commanding, self.waiting("COMMAND_ACK") as waiting:
             patience = self.patience_s if patience_s is None else patience_s
             until = time.monotonic() + patience
             for nth in count():
                 self.wire.send(message(nth))
-                while (
-                    ack := self._acked(waiting, number, min(AGAIN_S, until - time.monotonic()))
-                ) is not None:
+                while (ack := _ack(waiting, number, min(AGAIN_S, until - time.monotonic()))) is not None:
                     if ack.result != CommandResult.IN_PROGRESS:
                         return ack
                     until = time.monotonic() + patience
@@ -307,27 +305,8 @@ class Peer:
             "whether it was carried out is unknown"
         )
 
-    def _acked(self, waiting: MessageQueue, number: int, timeout_s: float) -> Ack | None:
-        """The next answer to this command."""
-        until = time.monotonic() + timeout_s
-        while (message := waiting.get(until - time.monotonic())) is not None:
-            if message.command == number:
-                return Ack(message.command, message.result, message.result_param2)
-        return None
-
-    def _reply(self, waiting: MessageQueue, name: str, timeout_s: float) -> Message | None:
-        """The message asked for, else the answer to the question, whichever says more."""
-        until, answer = time.monotonic() + timeout_s, None
-        while (message := waiting.get(until - time.monotonic())) is not None:
-            if message.get_type() == name:
-                return message
-            if message.command == Command.REQUEST_MESSAGE:
-                answer = message
-                until = min(until, time.monotonic() + AGAIN_S / 3)  # the message may follow its answer
-        return answer
-
     def _tries(self, again_s: float, patience_s: float | None) -> Iterator[int]:
-        """One more try as long as there is time for it; at least one."""
+        """Numbers of the tries as long as there is time for one more; at least one."""
         patience = self.patience_s if patience_s is None else patience_s
         until = time.monotonic() + patience - again_s
         for nth in count():
@@ -338,6 +317,27 @@ class Peer:
     def _last_text(self) -> str:
         text = self.newest("STATUSTEXT")
         return f' (it last said "{text.text}")' if text is not None else ""
+
+
+def _ack(waiting: MessageQueue, number: int, timeout_s: float) -> Ack | None:
+    """The next answer to this command."""
+    until = time.monotonic() + timeout_s
+    while (message := waiting.get(until - time.monotonic())) is not None:
+        if message.command == number:
+            return Ack(message.command, message.result, message.result_param2)
+    return None
+
+
+def _reply(waiting: MessageQueue, name: str, timeout_s: float) -> Message | None:
+    """The requested message, else the answer to the request."""
+    until, answer = time.monotonic() + timeout_s, None
+    while (message := waiting.get(until - time.monotonic())) is not None:
+        if message.get_type() == name:
+            return message
+        if message.command == Command.REQUEST_MESSAGE:
+            answer = message
+            until = min(until, time.monotonic() + AGAIN_S / 3)  # the message may follow its answer
+    return answer
 
 
 def _printable(text: str) -> str:
@@ -352,7 +352,7 @@ def reached(
     signing_key: bytes | None = None,
     timeout_s: float = PATIENCE_S,
 ) -> Iterator[Peer]:
-    """A vehicle at `url`, on a wire of its own; raises as `wire` and `found` do."""
+    """A vehicle at `url`, over a wire of its own; raises as `wire` and `found` do."""
     with wire(url, signing_key=signing_key) as opened, found(opened, vehicle, timeout_s=timeout_s) as peer:
         yield peer
 
@@ -370,51 +370,51 @@ def found(
     Parameters
     ----------
     vehicle
-        Its system id; not needed if only one is heard.
+        Its system id; not needed if only one is found.
     timeout_s
-        How long to wait for a heartbeat, and then the peer's patience.
+        Longest wait for a heartbeat, and then the peer's patience.
     beat
         Makes our heartbeats; those of a ground station if not given.
 
     Raises
     ------
     RobotUnreachable
-        If none is heard.
+        If none is found.
     InputError
-        If several are, and none was named.
+        If several are found, and none was named.
     """
     with wire.waiting("HEARTBEAT") as waiting:
         wire.beat(beat or station_beat)
-        heard = _heard(waiting, vehicle, timeout_s, lambda: _knock(wire, vehicle, beat or station_beat))
-    heartbeat = _meant(wire, heard, vehicle, timeout_s)
+        beats = _heartbeats(waiting, vehicle, timeout_s, lambda: _knock(wire, vehicle, beat or station_beat))
+    heartbeat = _selected(wire, beats, vehicle, timeout_s)
     newest = Newest(sender(heartbeat))
     newest.put(heartbeat)
     with wire.filling(newest):
         yield Peer(wire, newest, autopilot_of(heartbeat.autopilot), timeout_s)
 
 
-def _heard(
+def _heartbeats(
     waiting: MessageQueue, vehicle: int | None, timeout_s: float, knock: Callable[[], None]
 ) -> dict[int, Message]:
-    """Heartbeats of autopilots by system id: of the one that is meant, or of all until no other can come."""
-    heard: dict[int, Message] = {}
+    """Heartbeats of autopilots by system id: of the named one, or of all until no other can come."""
+    beats: dict[int, Message] = {}
     until = time.monotonic() + timeout_s
     while (left_s := until - time.monotonic()) > 0:
         message = waiting.get(min(KNOCK_S, left_s))
-        if message is None and not heard:
+        if message is None and not beats:
             knock()
         if message is None or not _of_autopilot(message):
             continue
-        if not heard and vehicle is None:
+        if not beats and vehicle is None:
             until = min(until, time.monotonic() + OTHERS_S)
-        heard[message.get_srcSystem()] = message
+        beats[message.get_srcSystem()] = message
         if message.get_srcSystem() == vehicle:
             break
-    return heard
+    return beats
 
 
 def _knock(wire: Wire, vehicle: int | None, beat: Callable[[], Message]) -> None:
-    """Show that we are here, and ask for a heartbeat: on a bad line one a second may be too few."""
+    """Send our heartbeat, and request one: on a bad link one a second may be too few."""
     wire.send(beat())
     wire.send(request(Who(vehicle or 0, Component.AUTOPILOT1), MessageId.HEARTBEAT))
 
@@ -427,16 +427,16 @@ def _of_autopilot(heartbeat: Message) -> bool:
     )
 
 
-def _meant(wire: Wire, heard: dict[int, Message], vehicle: int | None, timeout_s: float) -> Message:
-    if vehicle is None and len(heard) == 1:
-        return next(iter(heard.values()))
-    if vehicle in heard:
-        return heard[vehicle]
-    names = ", ".join(f"{system} ({autopilot_of(heard[system].autopilot).name})" for system in sorted(heard))
-    if vehicle is None and heard:
+def _selected(wire: Wire, beats: dict[int, Message], vehicle: int | None, timeout_s: float) -> Message:
+    if vehicle is None and len(beats) == 1:
+        return next(iter(beats.values()))
+    if vehicle in beats:
+        return beats[vehicle]
+    names = ", ".join(f"{system} ({autopilot_of(beats[system].autopilot).name})" for system in sorted(beats))
+    if vehicle is None and beats:
         raise InputError(f"{wire.name}: several vehicles: {names}; name one with --vehicle ID")
     whom = "no vehicle" if vehicle is None else f"no vehicle {vehicle}"
-    others = f" (heard: {names})" if heard else ""
+    others = f" (found: {names})" if beats else ""
     raise RobotUnreachable(
         f"{wire.name}: {whom} within {timeout_s:g} s{others}{_why_none(wire)}; nothing was sent. "
         "Is it on, and does it send there?"
@@ -444,7 +444,7 @@ def _meant(wire: Wire, heard: dict[int, Message], vehicle: int | None, timeout_s
 
 
 def _why_none(wire: Wire) -> str:
-    if wire.gone:
-        return f" ({wire.gone})"
+    if wire.disconnected:
+        return f" ({wire.disconnected})"
     dropped = wire.dropped[SIGNATURE]
     return f" ({dropped} frames had a {SIGNATURE}: is the signing key the vehicle's?)" if dropped else ""

@@ -1,4 +1,4 @@
-"""MAVLink messages out of bytes, one sender's beside another's."""
+"""MAVLink messages from bytes, of several senders at once."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from typing import Any
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from stopgo.bridge.mavlink.line.transport import Address
+from stopgo.bridge.mavlink.vehicle_link.transport import Address
 from stopgo.mission.mavlink.telemetry import Message
 
 MAX_SENDERS = 64
 UNREADABLE = "unreadable"
-"""Reason by which is counted what is no frame."""
+"""Reason by which bytes that are no frame are counted."""
 ERRORS = (dialect.MAVError, struct.error, UnicodeDecodeError, ValueError, TypeError, IndexError)
-"""What a parser raises on bytes that are no frames."""
+"""Errors that a parser raises on bytes that are no frames."""
 
 
 def plain_coder() -> Any:
-    """Packs and parses, and knows no keys."""
+    """A coder that packs and parses without a signing key."""
     coder = dialect.MAVLink(None)
     coder.robust_parsing = True
     return coder
 
 
 class Frames:
-    """Whole frames: half a one is completed by the sender who began it, and never in a next datagram."""
+    """Whole frames: only the sender who began a frame completes it, and never in another datagram."""
 
     def __init__(self, dropped: Counter[str], coder: Callable[[], Any] = plain_coder) -> None:
         self._dropped = dropped
@@ -52,7 +52,7 @@ class Frames:
             return []
 
     def whole(self, data: bytes, *, datagram: bool, sender: Address = None) -> list[tuple[bytes, Message]]:
-        """The frames that `data` completes, with what they say; what is no frame is dropped and counted."""
+        """The frames that `data` completes, with their messages; other bytes are dropped and counted."""
         messages = self.messages(data, datagram=datagram, sender=sender)
         read = [message for message in messages if message.get_type() != "BAD_DATA"]
         self._dropped[UNREADABLE] += len(messages) - len(read)

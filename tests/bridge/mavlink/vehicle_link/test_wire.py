@@ -18,10 +18,10 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.bridge.mavlink.line.transport import open_transport
-from stopgo.bridge.mavlink.line.url import Url, read_url
-from stopgo.bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, read_signing_key, wire
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import Url, read_url
+from stopgo.bridge.mavlink.vehicle_link.wire import SIGNATURE, MessageQueue, Who, Wire, read_signing_key, wire
 from stopgo.mission.errors import InputError, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
@@ -42,7 +42,7 @@ def text(number: int) -> Message:
 
 
 def heard(waiting: MessageQueue, number: int) -> bool:
-    """Whether that number comes before the time is up; what comes before it is thrown away."""
+    """True if that number comes in time; messages before it are thrown away."""
     until = time.monotonic() + WAIT_S
     while (message := waiting.get(until - time.monotonic())) is not None:
         if message.time_boot_ms == number:
@@ -59,7 +59,7 @@ def passes(one: Wire, other: Wire, *, start: int = 0) -> None:
                 sends.send(text(number))
                 if waiting.get(0.1) is not None:
                     break
-                assert time.monotonic() < until, f"nothing passes: {one.gone or other.gone}"
+                assert time.monotonic() < until, f"nothing passes: {one.disconnected or other.disconnected}"
 
 
 # Lines.
@@ -80,12 +80,12 @@ def test_tcp_goes_both_ways_and_is_connected_again() -> None:
             passes(station, vehicle)
             stack.close()
             until = time.monotonic() + WAIT_S
-            while not station.gone:
+            while not station.disconnected:
                 station.send(text(0))
                 assert time.monotonic() < until
             with wire(udp("tcpin", port), me=VEHICLE) as again:
                 passes(station, again)
-                assert station.gone == ""
+                assert station.disconnected == ""
 
 
 def test_nobody_at_a_tcp_port_is_said_at_once() -> None:
@@ -97,13 +97,13 @@ def test_nobody_at_a_tcp_port_is_said_at_once() -> None:
 
 
 def test_a_writer_that_meets_an_error_does_not_hold_up_the_reader() -> None:
-    """What `select` saw on the socket is gone by the time it is read."""
+    """The datagram that `select` saw is no longer there when it is read."""
     transport = open_transport(udp("udpout", free_port()))
     writer = threading.Thread(target=lambda: [transport.write(b"x") for _ in range(5000)])
     writer.start()
     while writer.is_alive():
         assert transport.read(0.001) == []
-    assert transport.gone == "nothing listens there"
+    assert transport.disconnected == "nothing listens there"
     transport.close()
 
 
@@ -147,11 +147,11 @@ def test_a_serial_line_that_is_unplugged_comes_back(cable: Cable) -> None:
         assert os.read(cable.end, 300)[:1] == b"\xfd"
         cable.unplug()
         until = time.monotonic() + WAIT_S
-        while "serial line is gone" not in station.gone:
+        while "serial port is disconnected" not in station.disconnected:
             station.send(text(2))  # to a line that is gone, which is no error
             assert time.monotonic() < until
         cable.plug()
-        while station.gone:
+        while station.disconnected:
             assert time.monotonic() < until
             waiting.get(0.01)
         cable.say(text(3))
@@ -257,8 +257,8 @@ def test_ten_thousand_hostile_datagrams_stop_nothing(key: bytes | None) -> None:
             if number % 100 == 99:  # one at a time, or the system drops what is not read
                 mark = 1_000_000 + number
                 throw(packed(mark, key=key))
-                assert heard(waiting, mark), station.gone
-        assert station.gone == ""
+                assert heard(waiting, mark), station.disconnected
+        assert station.disconnected == ""
         assert station.dropped["unreadable"] > 1000
         assert key is None or station.dropped[SIGNATURE] > 1000
 

@@ -1,0 +1,64 @@
+"""Commands that a vehicle must get because of its run's progress; at most one of them is pending."""
+
+from __future__ import annotations
+
+from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
+from stopgo.bridge.mavlink.auto.external_changes import ExternalChanges
+from stopgo.bridge.mavlink.auto.logbook import Logbook, PendingCommand
+from stopgo.mission.mavlink.autopilots.kind import AUTO
+from stopgo.mission.mavlink.following import steps as progress
+from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.observer import Observer
+from stopgo.mission.mavlink.following.steps import Observation, tried_again
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.states import Run
+
+
+class PendingCommands:
+    """Decides on pending commands, and sends them."""
+
+    def __init__(
+        self, book: Logbook, observer: Observer, commands: ConfirmedCommands, others: ExternalChanges
+    ) -> None:
+        self._book = book
+        self._observer = observer
+        self._commands = commands
+        self._others = others
+
+    def after_step(self, listed: ListedMission, before: Run, after: Run) -> PendingCommand | None:
+        """The command that a step of the run requires; none for a run that somebody else has stopped."""
+        since_ns = self._book.clock.now_ns()
+        if tried_again(before, after):
+            return PendingCommand(command="jump", place=listed.stops[after.at].at, since_ns=since_ns)
+        early = after.state == "FINISHED" and (self._observer.sequence or 0) < listed.sequence(listed.end - 1)
+        stops = before.state == "RUNNING" and (after.state in ("HELD", "ABORTED") or early)
+        if stops and self._observer.mode == AUTO and self._others.changed_list(before, listed) is None:
+            return PendingCommand(command="hold", place=0, since_ns=since_ns)
+        return None
+
+    def past_skipped(self, run: Run, listed: ListedMission, observed: Observation) -> PendingCommand | None:
+        """The command for a vehicle that waits at a skipped stop: it goes on at once."""
+        if run.state not in ("RUNNING", "HOMING") or not observed.drives:
+            return None
+        place = progress.after_skipped(run, listed, observed)
+        if place is None:
+            return None
+        return PendingCommand(command="jump", place=place, since_ns=self._book.clock.now_ns())
+
+    def send(self, pending: PendingCommand, listed: ListedMission) -> None:
+        """Send a command; a refused one holds the run. It is pending no more after either.
+
+        Raises
+        ------
+        OutcomeUnknown, RobotUnreachable
+            If it is still pending.
+        """
+        try:
+            if pending.command == "hold":
+                self._commands.hold()
+            else:
+                self._commands.jump(listed.sequence(pending.place))
+        except Denied as denied:
+            reason = denied.refused.message
+            self._book.move(lambda run: () if run.state != "RUNNING" else (runs.held(run, reason),))
+        self._book.clear_pending(pending)

@@ -1,0 +1,148 @@
+"""Mode and arming of an autopilot: its guided mode, hold, and changes by another operator.
+
+A stop waits behind no other command. It stays pending, and is sent again, until a heartbeat shows another
+mode than the guided one: so it also outlives a link that is cut.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from stopgo.bridge.mavlink.driving.autopilot_telemetry import NewestMessages
+from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
+from stopgo.bridge.mavlink.vehicle_link.messages import command_long
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.mission.mavlink.autopilots.kind import Mode
+from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.items import Command
+
+TICK_S = 0.1
+STOP_S = 2.5
+"""Longest wait of `stop` for the vehicle to show hold; the command is repeated after that, too."""
+IN_FLIGHT_S = 0.3
+"""A heartbeat that comes this soon after a command may have been sent before it."""
+
+
+class ModeControl:
+    """Commands for one autopilot's mode, and the mode that was last commanded or accepted."""
+
+    def __init__(self, peer: Peer, newest: NewestMessages, closing: threading.Event) -> None:
+        self.known_mode: Mode | None = None
+        """The mode as commanded or accepted here: somebody else chose any other one."""
+        self._peer = peer
+        self._kind = peer.autopilot
+        self._modes = peer.autopilot.modes
+        self._newest = newest
+        self._closing = closing
+        self._lock = threading.Lock()
+        """Keeps commands for hold and for the guided mode in order, never crossed."""
+        self._guide_sent_s = 0.0
+        self._stop_pending = threading.Event()
+        self._stop_sent_s = 0.0
+
+    # Reported mode
+
+    def mode(self) -> Mode:
+        return self._kind.mode_of(self._peer.heartbeat)
+
+    def mode_since(self, at_s: float) -> Mode | None:
+        """The mode in a heartbeat since then (monotonic); `None` if none came."""
+        beat = self._newest.since("HEARTBEAT", at_s)
+        return None if beat is None else self._kind.mode_of(beat)
+
+    def is_guided(self) -> bool:
+        """True if a heartbeat since `guide` shows the guided mode; an older one proves nothing."""
+        beat = self._newest.since("HEARTBEAT", self._guide_sent_s)
+        if beat is None:
+            self._peer.request(MessageId.HEARTBEAT)
+            return False
+        return self._kind.mode_of(beat) == self._modes.guided
+
+    @property
+    def holds_by_failsafe(self) -> bool:
+        """True if a failsafe of its own put it on hold, for instance because setpoints were missing."""
+        beat = self._peer.heartbeat
+        return self._kind.mode_of(beat) == self._modes.hold and self._kind.in_failsafe(beat)
+
+    # Control by somebody else
+
+    def other_control(self) -> str:
+        """Report the mode if it is neither the guided mode nor hold: somebody else drives; else empty."""
+        mode = self.mode()
+        if mode in (self._modes.guided, self._modes.hold):
+            return ""
+        name = self._modes.name(mode)
+        return f"the autopilot is in {name}: somebody else drives it; to hand it over, switch it to HOLD"
+
+    def mode_change(self) -> str:
+        """Report a change of mode that somebody else made since the known mode; empty if there was none."""
+        mode = self.mode()
+        ours = self._stop_pending.is_set() and mode == self._modes.hold
+        if ours or self.known_mode in (None, mode):
+            return ""
+        return f"somebody switched the autopilot to {self._modes.name(mode)}"
+
+    def accept_mode(self) -> None:
+        """Take the reported mode as known: an operator who commands to go on knows it.
+
+        In a mode in which somebody else drives, hold is the handover, so no mode is known until then.
+        """
+        self.known_mode = None if self.other_control() else self.mode()
+
+    # Commands
+
+    def arm(self) -> str:
+        """Arm the vehicle; return why that failed, else empty."""
+        return refusal(self._peer, Command.COMPONENT_ARM_DISARM, 1.0, what="arming")
+
+    def guide(self) -> str:
+        """Command the guided mode; return why it was refused, else empty (then see `is_guided`)."""
+        with self._lock:
+            self._stop_pending.clear()
+            self._guide_sent_s = time.monotonic()
+        self.known_mode = guided = self._modes.guided
+        name = self._modes.name(guided)
+        return refusal(self._peer, Command.DO_SET_MODE, *guided.params, what=f"the mode {name}")
+
+    def hold_after_restart(self, boot_mode: Mode) -> str:
+        """Put an autopilot that restarted in `boot_mode` on hold; return why not, else empty."""
+        if self.mode() not in (boot_mode, self._modes.hold):
+            return f"somebody switched the autopilot to {self._modes.name(self.mode())}"
+        self.known_mode = None
+        sent_s = time.monotonic()
+        why = refusal(self._peer, Command.DO_SET_MODE, *self._modes.hold.params, what="the mode to hold")
+        while not why and self.mode_since(sent_s) != self._modes.hold:
+            self._peer.request(MessageId.HEARTBEAT)
+            self._closing.wait(TICK_S)
+            if time.monotonic() > sent_s + COMMAND_S:
+                why = "the autopilot accepted hold and does not show it"
+        return why
+
+    def stop(self) -> None:
+        """Command hold, and wait a moment until the vehicle shows it; hold stays pending until then.
+
+        A vehicle that somebody else drives in another mode is left alone.
+        """
+        self._stop_sent_s = time.monotonic()
+        self._stop_pending.set()
+        until = self._stop_sent_s + STOP_S
+        while self._stop_pending.is_set() and time.monotonic() < until and not self._closing.is_set():
+            self.repeat_stop()
+            self._closing.wait(TICK_S)
+
+    def repeat_stop(self) -> None:
+        """Send a pending stop again, or clear it once the vehicle shows another mode."""
+        if not self._stop_pending.is_set():
+            return
+        with self._lock:
+            if not self._stop_pending.is_set():
+                return
+            beat = self._newest.since("HEARTBEAT", self._stop_sent_s + IN_FLIGHT_S)
+            mode = self.mode()
+            if beat is not None and mode != self._modes.guided:
+                self.accept_mode()
+                self._stop_pending.clear()
+            elif mode in (self._modes.guided, self._modes.hold):
+                self._peer.send(command_long(self._peer.who, Command.DO_SET_MODE, *self._modes.hold.params))
+        self._peer.request(MessageId.HEARTBEAT)
