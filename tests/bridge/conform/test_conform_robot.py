@@ -153,10 +153,10 @@ class DrivesWhatItIsSent(Controller):
 
 
 class GoesOnByItself(Controller):
-    def _recover(self) -> None:
-        super()._recover()
+    def __init__(self, **parts: Any) -> None:
+        super().__init__(**parts)
         if self.run.state == "PAUSED":
-            self._run = changed(self.run, state="RUNNING")
+            self._store._run = changed(self.run, state="RUNNING")
 
 
 class ReadsStrictly(Agent):
