@@ -1,7 +1,7 @@
 """The robot's memory: what happened, what was ordered and answered, what it holds and where it stands.
 
 One SQLite file. What belongs together is written in one transaction and is on disk before anybody is told.
-What is read is what was written, or the robot does not come up: see sealed_rows.
+What is read is what was written, or the robot does not come up: see hashed_rows.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from typing import IO, TypeVar
 import msgspec
 
 from stopgo.bridge.link.protocol import Manifest
-from stopgo.bridge.robot.journal_format import bring_up_to_date, make_tables, put_pieces
+from stopgo.bridge.robot.hashed_rows import DamagedRow, NewestTransaction, read_rows, verify_rows, write_row
+from stopgo.bridge.robot.journal_format import bring_up_to_date, make_tables, put_chunks
 from stopgo.bridge.robot.reserve import Reserve
-from stopgo.bridge.robot.sealed_rows import DamagedRow, NewestTransaction, put, sealed, verify
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.mission.run.orders import Answer
@@ -70,7 +70,7 @@ class Journal:
         stored = 0 if self._newest is None else self._newest.read()
         with self.transaction():
             bring_up_to_date(self._connection)
-            verify(self._connection)
+            verify_rows(self._connection)
             if stored > self._changes():
                 raise DamagedRow("its last entries are missing")
 
@@ -243,7 +243,7 @@ class Journal:
         """Keep a mission that came by another way than in pieces."""
         with self.transaction():
             number = self._new_document()
-            put_pieces(self._connection, number, document, manifest.chunk_bytes)
+            put_chunks(self._connection, number, document, manifest.chunk_bytes)
             self._name_mission(manifest, number)
 
     def _name_mission(self, manifest: Manifest, document: int) -> None:
@@ -333,10 +333,10 @@ class Journal:
 
     def _sealed(self, table: str, clause: str, *values: object) -> list[tuple]:
         with self._lock:
-            return sealed(self._connection, table, clause, *values)
+            return read_rows(self._connection, table, clause, *values)
 
     def _put(self, table: str, *values: object) -> None:
-        put(self._connection, table, *values)
+        write_row(self._connection, table, *values)
 
     def _write(self, table: str, *values: object) -> None:
         with self.transaction():

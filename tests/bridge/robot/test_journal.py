@@ -13,6 +13,7 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.protocol import Manifest
+from stopgo.bridge.robot.hashed_rows import HASHED_TABLES, write_row
 from stopgo.bridge.robot.journal import (
     LOCKED_S,
     MISSIONS_KEPT,
@@ -23,7 +24,6 @@ from stopgo.bridge.robot.journal import (
 )
 from stopgo.bridge.robot.journal_format import FORMAT, TABLES
 from stopgo.bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
-from stopgo.bridge.robot.sealed_rows import SEALED, put
 from stopgo.bridge.station.watch import event_line
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Started, UnknownKind, event_of
@@ -123,10 +123,10 @@ def journal_of_the_second_format(folder: Path) -> None:
         connection.execute(f"DROP TABLE {table}")
     connection.executescript(FORMER_TABLES)
     body = msgspec.json.encode(manifest)
-    put(connection, "missions", manifest.mission_id, 1, body, b"")
-    put(connection, "missions", manifest.mission_id, 2, body, document)
-    put(connection, "transfers", "other", body)
-    put(connection, "chunks", manifest.sha256, 0, document[:100])
+    write_row(connection, "missions", manifest.mission_id, 1, body, b"")
+    write_row(connection, "missions", manifest.mission_id, 2, body, document)
+    write_row(connection, "transfers", "other", body)
+    write_row(connection, "chunks", manifest.sha256, 0, document[:100])
     connection.execute("PRAGMA user_version = 2")
     connection.commit()
     connection.close()
@@ -137,10 +137,10 @@ def journal_of_the_first_format(folder: Path) -> None:
     journal_of_the_second_format(folder)
     connection = sqlite3.connect(folder / "journal.sqlite")
     connection.execute("DROP INDEX events_of_run")
-    for table in SEALED:
+    for table in HASHED_TABLES:
         connection.execute(f"ALTER TABLE {table} RENAME TO new_{table}")
     connection.executescript(re.sub(r",\s*seal BLOB NOT NULL", "", FORMER_TABLES + TABLES))
-    for table in SEALED:
+    for table in HASHED_TABLES:
         columns = ", ".join(name for _, name, *_ in connection.execute(f"PRAGMA table_info({table})"))
         connection.execute(f"INSERT INTO {table} SELECT {columns} FROM new_{table}")
         connection.execute(f"DROP TABLE new_{table}")
