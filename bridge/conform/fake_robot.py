@@ -16,7 +16,7 @@ from stopgo.bridge.link.seals import Question, Seal, SealedAnswering, SealedHear
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.mission.document import Mission

@@ -35,5 +35,5 @@ class CurrentMission:
         newest = self.newest
         if newest is not None and (newest.id, newest.revision) == (mission_id, revision):
             return newest
-        stored = None if mission_id is None else self._journal.mission(mission_id, revision or 0)
+        stored = None if mission_id is None else self._journal.missions.read(mission_id, revision or 0)
         return None if stored is None else read_mission(stored[1])

@@ -73,13 +73,13 @@ class Inbox:
             return refusal
         if self._holds(manifest):
             return Ready(held=tuple(range(manifest.chunks)))
-        self._journal.drop_pieces()
-        shortage = self._journal.room_for(manifest.size)
+        self._journal.missions.drop_unused_chunks()
+        shortage = self._journal.space_shortage(manifest.size)
         if shortage:
             return _no("storage", shortage)
-        if self._journal.transfer(mission_id) != manifest:
-            self._journal.begin_transfer(manifest)
-        return Ready(held=self._journal.chunks_held(manifest))
+        if self._journal.missions.transfer(mission_id) != manifest:
+            self._journal.missions.begin_transfer(manifest)
+        return Ready(held=self._journal.missions.received_chunks(manifest))
 
     def _unwelcome(self, mission_id: str, manifest: Manifest) -> Rejected | None:
         if manifest.mission_id != mission_id:
@@ -93,7 +93,7 @@ class Inbox:
         return self._outdated(mission_id, manifest)
 
     def _outdated(self, mission_id: str, manifest: Manifest) -> Rejected | None:
-        held = self._journal.newest_revision(mission_id)
+        held = self._journal.missions.newest_manifest(mission_id)
         if held is None or held.revision < manifest.revision:
             return None
         if (held.revision, held.digest) == (manifest.revision, manifest.digest) or self._holds(manifest):
@@ -110,11 +110,11 @@ class Inbox:
 
     def _holds(self, manifest: Manifest) -> bool:
         """Whether this very mission is stored; its bytes may have been written with other spaces."""
-        held = self._journal.held(manifest.mission_id, manifest.revision)
+        held = self._journal.missions.manifest(manifest.mission_id, manifest.revision)
         return held is not None and held.digest == manifest.digest
 
     def _chunk(self, mission_id: str, number: int, request: Request) -> Reply:
-        manifest = self._journal.transfer(mission_id)
+        manifest = self._journal.missions.transfer(mission_id)
         if manifest is None or request.parameters.get("of") != manifest.sha256:
             return _no("incomplete", "no such transfer is under way; begin it again")
         if number >= manifest.chunks:
@@ -123,10 +123,10 @@ class Inbox:
         expected = last if number == manifest.chunks - 1 else manifest.chunk_bytes
         if len(request.payload) != expected:
             return _no("incomplete", f"chunk {number} has {len(request.payload)} bytes, not {expected}")
-        shortage = self._journal.room_for(len(request.payload))
+        shortage = self._journal.space_shortage(len(request.payload))
         if shortage:
             return _no("storage", shortage)
-        self._journal.store_chunk(manifest, number, request.payload)
+        self._journal.missions.store_chunk(manifest, number, request.payload)
         return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
 
     def _commit(self, mission_id: str, commit: Commit) -> Reply:
@@ -140,24 +140,24 @@ class Inbox:
             return mission
         refusal = self._controller.take(commit, mission)
         with suppress(sqlite3.OperationalError):  # there is no room to forget: another time
-            self._journal.drop_pieces()
+            self._journal.missions.drop_unused_chunks()
         return refusal or Accepted(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest,
             already=already, waits=self._controller.waits(mission),
         )  # fmt: skip
 
     def _stored(self, manifest: Manifest) -> Mission | Rejected:
-        stored = self._journal.mission(manifest.mission_id, manifest.revision)
+        stored = self._journal.missions.read(manifest.mission_id, manifest.revision)
         assert stored is not None
         return self._read(stored[1], manifest)
 
     def _received(self, manifest: Manifest) -> Mission | Rejected:
         """The mission that has arrived in chunks, if they are all there and give the right hash."""
-        document = b"".join(self._journal.pieces(manifest))
+        document = b"".join(self._journal.missions.chunks(manifest))
         if len(document) != manifest.size:
             return _no("incomplete", f"{len(document)} of {manifest.size} bytes have arrived")
         if hashlib.sha256(document).hexdigest() != manifest.sha256:
-            self._journal.end_transfer(manifest)
+            self._journal.missions.end_transfer(manifest)
             return _no("digest", "what arrived has another sha256 than the manifest; push it again")
         return self._read(document, manifest)
 

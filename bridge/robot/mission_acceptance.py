@@ -62,11 +62,11 @@ class MissionAcceptance:
             return Rejected(reason=refused.reason, messages=(refused.message,))
         change = Change(store.run) if known else _change_to(mission, store.run)
         with store.journal.transaction():
-            store.journal.keep_transfer(commit.manifest)
+            store.journal.missions.complete_transfer(commit.manifest)
             store.journal.store_nonce(commit.nonce, mission.digest)
             store.store_lease(lease)
             run = store.store(Change(change.run, (*handed_over(before, lease), *change.events)))
-            store.journal.retire_missions(
+            store.journal.missions.retire(
                 *((run.mission_id, wanted) for wanted in (run.revision, run.next_revision))
             )
         store.pending.clear()

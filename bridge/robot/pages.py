@@ -56,11 +56,11 @@ def part_page(journal: Journal, request: Request) -> Reply:
         number, revision = count_of(step[1]), count_of(request.parameters.get("revision", ""))
     except ValueError as error:
         return Malformed(message=f"{'/'.join(step)}: {error}")
-    manifest = journal.held(mission_id, revision)
+    manifest = journal.missions.manifest(mission_id, revision)
     if manifest is None:
         message = f"mission {mission_id} revision {revision} is not on this robot"
         return Rejected(reason="no_mission", messages=(message,))
-    data = journal.part(manifest, number * CHUNK_BYTES, CHUNK_BYTES)
+    data = journal.missions.part(manifest, number * CHUNK_BYTES, CHUNK_BYTES)
     return MissionPart(manifest=manifest, index=number, data=data)
 
 

@@ -21,7 +21,8 @@ from stopgo.bridge.link.protocol import KeyExpressions, place_of
 from stopgo.bridge.robot.agent import Agent, on_link, others_of
 from stopgo.bridge.robot.controller import Controller, new_boot_id
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import Journal, open_journal
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.robot.recorder import LIMIT_BYTES, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
 from stopgo.bridge.robot.robot_hardware import OpenBody
@@ -128,10 +129,10 @@ def robot_on(
     """A robot on `link`, which is sealed with the robot's keys if it has any."""
     with open_journal(options.state, options.name) as journal:
         recorder = RunRecorder(
-            options.state / "record", room=journal.room_for, limit_bytes=options.record_bytes
+            options.state / "record", room=journal.space_shortage, limit_bytes=options.record_bytes
         )
         clock, wall = clocks(journal, speed_up=options.speed_up, newest_ns=recorder.newest_ns)
-        journal.edge = crashing(options.faults)
+        journal.rows.commit_hook = crashing(options.faults)
         with options.body(clock) as body:
             recorder.health = body.base.health
             controller = Controller(

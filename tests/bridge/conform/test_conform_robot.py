@@ -190,7 +190,7 @@ class SaysNothingOfItself(Agent):
 
 class TakesDamage(Inbox):
     def _received(self, manifest: Manifest) -> Mission | Rejected:
-        document = b"".join(self._journal.pieces(manifest))
+        document = b"".join(self._journal.missions.chunks(manifest))
         try:
             return self._read(document, manifest)
         except ValueError:
@@ -257,8 +257,8 @@ def changed_parameters(request: Request, **parameters: str) -> Request:
 
 class WantsPiecesInOrder(Inbox):
     def _chunk(self, mission_id: str, number: int, request: Request) -> Any:
-        manifest = self._journal.transfer(mission_id)
-        held = () if manifest is None else self._journal.chunks_held(manifest)
+        manifest = self._journal.missions.transfer(mission_id)
+        held = () if manifest is None else self._journal.missions.received_chunks(manifest)
         if number > len(held):
             return Rejected(reason="incomplete", messages=("in order, please",))
         return super()._chunk(mission_id, number, request)
