@@ -184,7 +184,7 @@ class TellsAllStops(Agent):
 
 
 class SaysNothingOfItself(Agent):
-    def _tell_news(self) -> None:
+    def _publish_news(self) -> None:
         self._closing.wait()
 
 
