@@ -124,14 +124,14 @@ class ForgedAnswers:
         self.distrusted = ""
         self.forges: Callable[[str], bool] = lambda key: False
 
-    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
-        return self._seals.question(key, payload, parameters)
+    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        return self._seals.seal_question(key, payload, parameters)
 
-    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
-        return self._seals.opened(question, payload, seal)
+    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+        return self._seals.verify_answer(question, payload, seal)
 
-    def answering(self, answer: Answering) -> SealedAnswering:
-        sealed = self._seals.answering(answer)
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
+        sealed = self._seals.seal_answers(answer)
 
         def answered(request: Request) -> tuple[bytes, bytes]:
             reply, seal = sealed(request)
@@ -139,11 +139,11 @@ class ForgedAnswers:
 
         return answered
 
-    def telling(self, key: str, payload: bytes) -> bytes:
-        return self._seals.telling(key, payload)
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
+        return self._seals.seal_publication(key, payload)
 
-    def hearing(self, heard: Hearing) -> SealedHearing:
-        return self._seals.hearing(heard)
+    def verify_publications(self, heard: Hearing) -> SealedHearing:
+        return self._seals.verify_publications(heard)
 
 
 def _spoilt(seal: bytes) -> bytes:

@@ -81,11 +81,11 @@ class MemoryLink:
 
     def serve(self, key: str, answer: Answering) -> None:
         # Whoever serves a key last answers first.
-        self._board.serving.insert(0, (self, key, self._seals.answering(answer)))
+        self._board.serving.insert(0, (self, key, self._seals.seal_answers(answer)))
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
         return lambda payload: self._board.tell(
-            SealedMessage("told", key, payload, self._seals.telling(key, payload))
+            SealedMessage("told", key, payload, self._seals.seal_publication(key, payload))
         )
 
     def announce(self, key: str) -> None:
@@ -109,13 +109,13 @@ class MemoryLink:
         return self._answers(key, payload, {})
 
     def _answers(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> list[bytes]:
-        question = self._seals.question(key, payload, parameters)
+        question = self._seals.seal_question(key, payload, parameters)
         arrived = self._board.answers(SealedMessage("question", key, payload, question.seal, parameters))
-        opened = (self._seals.opened(question, packet.payload, packet.seal) for packet in arrived)
+        opened = (self._seals.verify_answer(question, packet.payload, packet.seal) for packet in arrived)
         return [payload for payload in opened if payload is not None]
 
     def hear(self, key: str, heard: Hearing) -> None:
-        self._board.hearing.append((key, self._seals.hearing(heard)))
+        self._board.hearing.append((key, self._seals.verify_publications(heard)))
 
     def watch_presence(self, key: str, changed: Presence) -> None:
         for alive in sorted(self._board.alive):

@@ -212,7 +212,7 @@ class ZenohLink:
             _undeclare(self._declared)
 
     def serve(self, key: str, answer: Answering) -> None:
-        sealed = self._seals.answering(answer)
+        sealed = self._seals.seal_answers(answer)
 
         def answered(query: zenoh.Query) -> None:
             with query:
@@ -236,7 +236,7 @@ class ZenohLink:
 
         def publish(payload: bytes) -> None:
             if not self._silent:
-                publisher.put(payload, attachment=self._seals.telling(key, payload) or None)
+                publisher.put(payload, attachment=self._seals.seal_publication(key, payload) or None)
 
         return publish
 
@@ -263,7 +263,7 @@ class ZenohLink:
         """Answers that are to be believed, as they come."""
         if self._silent:
             return
-        question = self._seals.question(key, payload, parameters)
+        question = self._seals.seal_question(key, payload, parameters)
         replies = self._session.get(
             zenoh.Selector(key, dict(parameters)),
             payload=payload,
@@ -278,12 +278,12 @@ class ZenohLink:
         )
         for reply in replies:
             if reply.ok is not None:
-                opened = self._seals.opened(question, reply.ok.payload.to_bytes(), _seal_of(reply.ok))
+                opened = self._seals.verify_answer(question, reply.ok.payload.to_bytes(), _seal_of(reply.ok))
                 if opened is not None:
                     yield opened
 
     def hear(self, key: str, heard: Hearing) -> None:
-        judged = self._seals.hearing(heard)
+        judged = self._seals.verify_publications(heard)
 
         def sampled(sample: zenoh.Sample) -> None:
             judged(str(sample.key_expr), sample.payload.to_bytes(), _seal_of(sample))

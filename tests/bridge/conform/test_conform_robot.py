@@ -317,21 +317,21 @@ def verdicts_on(robot: RobotUnderTest, requirement: str) -> list[ConformVerdict]
 
 
 class BelievesEverybody(KeySeals):
-    def answering(self, answer: Answering) -> SealedAnswering:
-        sealed = super().answering(answer)
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
+        sealed = super().seal_answers(answer)
         own = self
 
         def answered(request: Request) -> tuple[bytes, bytes]:
             reply, seal = sealed(request)
             if b"untrusted" not in reply:
                 return reply, seal
-            return answer(request), own.telling(request.key, b"")
+            return answer(request), own.seal_publication(request.key, b"")
 
         return answered
 
 
 class SealsNoStates(KeySeals):
-    def telling(self, key: str, payload: bytes) -> bytes:
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
         return b""
 
 
