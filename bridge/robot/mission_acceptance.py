@@ -5,7 +5,7 @@ from __future__ import annotations
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.protocol import Commit, Rejected
 from stopgo.bridge.robot.base import Base
-from stopgo.bridge.robot.mission_fitness import follows, weighed_by, why_unfit
+from stopgo.bridge.robot.mission_fitness import fitness_inputs, follows, why_unfit
 from stopgo.bridge.robot.run_store import RunStore
 from stopgo.mission.document import Mission
 from stopgo.mission.run import revision
@@ -40,7 +40,7 @@ class MissionAcceptance:
             if not follows(run, mission):
                 unfit = why_unfit(mission, base=self._base, run=run, held=held, revisions=self._revisions)
             with self._store.lock:
-                if weighed_by(run) == weighed_by(self._store.run):
+                if fitness_inputs(run) == fitness_inputs(self._store.run):
                     return self._take(commit, mission, unfit)
 
     def waits(self, mission: Mission) -> bool:
