@@ -12,7 +12,7 @@ from stopgo.bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, S
 
 @dataclass(frozen=True)
 class SealedMessage:
-    """A message as whoever carries it sees it."""
+    """A message as its carrier sees it."""
 
     kind: Literal["question", "answer", "told"]
     key: str
@@ -22,7 +22,7 @@ class SealedMessage:
 
 
 class Switchboard:
-    """Joins links in memory: what one end publishes the others hear, at once and in the caller's thread."""
+    """Connects links in memory: publications arrive at once, in the caller's thread."""
 
     def __init__(self) -> None:
         self.serving: list[tuple[MemoryLink, str, SealedAnswering]] = []
@@ -30,9 +30,9 @@ class Switchboard:
         self.watching: list[tuple[str, Presence]] = []
         self.alive: set[str] = set()
         self.cut = False
-        """While true nothing passes."""
+        """True while no message passes."""
         self.failure: Exception | None = None
-        """What has ended the work of the end that answers; raised to whoever asks."""
+        """Error that ended the end that answers; raised in the end that asks."""
 
     def fail(self, error: Exception) -> None:
         self.failure = error
@@ -41,11 +41,11 @@ class Switchboard:
         return MemoryLink(self, seals)
 
     def carried(self, packet: SealedMessage) -> Iterable[SealedMessage]:
-        """What becomes of a message on its way: it arrives, unless the line is cut."""
+        """Return the messages that arrive: this one, unless the link is cut."""
         return () if self.cut else (packet,)
 
     def answers(self, question: SealedMessage) -> list[SealedMessage]:
-        """What all who serve its key answer to a question, as it arrives where it was asked."""
+        """Return all answers to a question, as they arrive at the end that asked."""
         if self.failure is not None:
             raise self.failure
         arrived: list[SealedMessage] = []
@@ -60,7 +60,7 @@ class Switchboard:
         return arrived
 
     def tell(self, packet: SealedMessage) -> None:
-        """Let everybody hear what was published, as it arrives there."""
+        """Deliver a publication to all subscribers, as it arrives there."""
         for arrived in self.carried(packet):
             for pattern, heard in list(self.hearing):
                 if matches(pattern, arrived.key):
@@ -80,7 +80,7 @@ class MemoryLink:
         return self._seals.distrusted
 
     def serve(self, key: str, answer: Answering) -> None:
-        # Whoever serves a key last answers first.
+        # The end that served a key last answers first.
         self._board.serving.insert(0, (self, key, self._seals.seal_answers(answer)))
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
