@@ -1,7 +1,7 @@
-"""A file of numbered entries that grows at its end, and gives back exactly what was written or nothing.
+"""A file of numbered entries that grows at its end; an entry is read exactly as written, or not at all.
 
-Each entry is on disk when `append` returns. One that a killed program or a full disk has left unfinished is
-taken off when the file is opened; one that the disk has changed since is as if it were not there.
+Each entry is on disk when `append` returns. An entry that a killed program or a full disk left incomplete is
+removed when the file is opened. An entry that the disk has damaged is skipped.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _HEAD = struct.Struct(">4sIII")
 """Mark, number, length and checksum of what follows."""
 _MARK = b"\x91sg\n"
 _AT_ONCE = 1 << 20
-"""Bytes that are searched for the next entry in one go."""
+"""Bytes that are searched for the next entry at once."""
 _to_disk = getattr(os, "fdatasync", os.fsync)  # macOS has the second only
 
 
@@ -27,26 +27,26 @@ class RecordFile:
     """Numbered entries; the methods may be called from any thread."""
 
     def __init__(self, handle: int, *, writing: bool = True) -> None:
-        """`handle` is of a file that is open; what is unfinished is cut off if it is for `writing` too."""
+        """`handle` is an open file; if it is opened for `writing`, an incomplete end is removed."""
         self._handle = handle
         self._lock = threading.Lock()
-        self._places: dict[int, int] = {}  # read once, so that what is damaged is not among them
+        self._offsets: dict[int, int] = {}  # read once, without damaged entries
         self.size = 0
         """Bytes up to the end of the newest entry."""
         for number, at, size in _entries(handle):
-            self._places[number] = at
+            self._offsets[number] = at
             self.size = at + size
         if writing:
             os.ftruncate(handle, self.size)
-        self.newest = max(self._places, default=0)
+        self.newest = max(self._offsets, default=0)
 
     def append(self, number: int, body: bytes) -> None:
-        """Write an entry behind the others.
+        """Write an entry after the others.
 
         Raises
         ------
         OSError
-            If there is no room; the file is then as it was.
+            If the disk is full; the file is then unchanged.
         """
         packed = zlib.compress(body, 1)
         whole = _HEAD.pack(_MARK, number, len(packed), _checksum(number, packed)) + packed
@@ -58,21 +58,21 @@ class RecordFile:
                 with contextlib.suppress(OSError):
                     os.ftruncate(self._handle, self.size)
                 raise
-            self._places[number] = self.size
+            self._offsets[number] = self.size
             self.size += len(whole)
             self.newest = number
 
     def read(self, number: int) -> bytes | None:
-        """An entry as it was written; none if there is none, or the disk has changed it."""
+        """Return an entry as it was written; `None` if there is none, or it is damaged."""
         with self._lock:
-            at = self._places.get(number)
+            at = self._offsets.get(number)
             found = None if at is None else _entry_at(self._handle, at)
         return None if found is None else zlib.decompress(found[1])
 
 
 @contextmanager
 def open_record_file(path: Path) -> Iterator[RecordFile]:
-    """The file at `path`, made if there is none; raises OSError if it cannot be."""
+    """Open the file at `path`, made if there is none; raises OSError if that fails."""
     handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o644)
     try:
         yield RecordFile(handle)
@@ -82,7 +82,7 @@ def open_record_file(path: Path) -> Iterator[RecordFile]:
 
 @contextmanager
 def read_record_file(path: Path) -> Iterator[RecordFile]:
-    """The file at `path` as it is, also while it grows; raises OSError if there is none."""
+    """Open the file at `path` for reading, also while it grows; raises OSError if there is none."""
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
     try:
         yield RecordFile(handle, writing=False)
@@ -91,7 +91,7 @@ def read_record_file(path: Path) -> Iterator[RecordFile]:
 
 
 def _entries(handle: int) -> Iterator[tuple[int, int, int]]:
-    """Number, place and size of every sound entry; what lies between two is passed over."""
+    """Yield number, offset and size of every sound entry; bytes between two entries are skipped."""
     at, end = 0, os.fstat(handle).st_size
     while at < end:
         found = _entry_at(handle, at)
@@ -104,7 +104,7 @@ def _entries(handle: int) -> Iterator[tuple[int, int, int]]:
 
 
 def _next_mark(handle: int, at: int, end: int) -> int:
-    """Where the next entry may begin; the end if there is none."""
+    """Return the offset where the next entry may begin; the end if there is none."""
     for start in range(at, end, _AT_ONCE):
         found = os.pread(handle, _AT_ONCE + len(_MARK) - 1, start).find(_MARK)
         if found >= 0:
@@ -117,7 +117,7 @@ def _entry_at(handle: int, at: int) -> tuple[int, bytes] | None:
     if len(head) < _HEAD.size:
         return None
     mark, number, length, checksum = _HEAD.unpack(head)
-    if mark != _MARK or length > os.fstat(handle).st_size - at - _HEAD.size:  # a length that is none
+    if mark != _MARK or length > os.fstat(handle).st_size - at - _HEAD.size:  # the length is damaged
         return None
     packed = os.pread(handle, length, at + _HEAD.size)
     sound = len(packed) == length and _checksum(number, packed) == checksum

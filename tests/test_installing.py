@@ -135,16 +135,19 @@ def test_without_file_locks_everything_is_importable_and_a_journal_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on Windows, where planning and stations run and robots do not."""
-    from stopgo.bridge.robot import journal
+    from stopgo.bridge.robot import journal_file
 
     monkeypatch.setitem(sys.modules, "fcntl", None)
-    with pytest.raises(InputError, match="on Linux and macOS only"), journal.open_journal(tmp_path, "r1"):
+    with (
+        pytest.raises(InputError, match="on Linux and macOS only"),
+        journal_file.open_journal(tmp_path, "r1"),
+    ):
         raise AssertionError("was opened")
 
 
 def test_no_module_but_the_journal_knows_of_file_locks() -> None:
     knows = [name for name, path in MODULES.items() if "import fcntl" in path.read_text(encoding="utf-8")]
-    assert knows == ["stopgo.bridge.robot.journal"]
+    assert knows == ["stopgo.bridge.robot.journal_file"]
 
 
 def test_every_folder_is_typed_and_every_extra_of_a_user_is_in_all() -> None:

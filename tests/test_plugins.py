@@ -18,11 +18,12 @@ import pytest
 
 import stopgo
 from stopgo.bridge.link.clock import SimulatedClock
-from stopgo.bridge.robot.plugin_body import GuardedBase, plugin_body
+from stopgo.bridge.robot.plugin_body import GuardedBase, GuardedScanner, plugin_body
 from stopgo.command_line import main
 from stopgo.mission.console.plugins import Variant
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.floor import FloorPlan
+from stopgo.mission.run.scans import ScanResult
 from stopgo.mission.settings import Settings
 from stopgo.planner import plan
 from stopgo.planner.floors import read_floor
@@ -307,6 +308,14 @@ def test_a_base_that_fails_is_stopped_and_drives_no_more() -> None:
     assert guarded.goto([(0, 0)], heading=None, limits=limits, interrupt=Event()) == "blocked"
     guarded.stop()
     assert stops == ["stop", "stop"]
+
+
+@pytest.mark.parametrize("name", ["scan_outcome", "what_became"])
+def test_a_scanner_reports_an_interrupted_scan_by_the_new_or_the_former_name(name: str) -> None:
+    ended = ScanResult(file="a.e57", size=1, sha256="0" * 64, points=1)
+    scanner: Any = SimpleNamespace(**{name: lambda label: ended if label == "a" else None})
+    guarded = GuardedScanner(Variant("--controller my:robot", "my:robot", scanner, ours=False), scanner)
+    assert (guarded.scan_outcome("a"), guarded.scan_outcome("b")) == (ended, None)
 
 
 LOG = """

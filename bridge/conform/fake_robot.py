@@ -16,7 +16,7 @@ from stopgo.bridge.link.seals import Question, Seal, SealedAnswering, SealedHear
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.mission.document import Mission
@@ -126,14 +126,14 @@ class ForgedAnswers:
         self.distrusted = ""
         self.forges: Callable[[str], bool] = lambda key: False
 
-    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
-        return self._seals.question(key, payload, parameters)
+    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        return self._seals.seal_question(key, payload, parameters)
 
-    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
-        return self._seals.opened(question, payload, seal)
+    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+        return self._seals.verify_answer(question, payload, seal)
 
-    def answering(self, answer: Answering) -> SealedAnswering:
-        sealed = self._seals.answering(answer)
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
+        sealed = self._seals.seal_answers(answer)
 
         def answered(request: Request) -> tuple[bytes, bytes]:
             reply, seal = sealed(request)
@@ -141,11 +141,11 @@ class ForgedAnswers:
 
         return answered
 
-    def telling(self, key: str, payload: bytes) -> bytes:
-        return self._seals.telling(key, payload)
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
+        return self._seals.seal_publication(key, payload)
 
-    def hearing(self, heard: Hearing) -> SealedHearing:
-        return self._seals.hearing(heard)
+    def verify_publications(self, heard: Hearing) -> SealedHearing:
+        return self._seals.verify_publications(heard)
 
 
 def _falsified(seal: bytes) -> bytes:

@@ -22,22 +22,22 @@ class FalsifiedSeals:
         self.falsify: Falsifying = lambda question, seals: question
         self.distrusted = ""
 
-    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
-        return self.falsify(self._seals.question(key, payload, parameters), self._seals)
+    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        return self.falsify(self._seals.seal_question(key, payload, parameters), self._seals)
 
-    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
-        self._seals.opened(question, payload, seal)
+    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+        self._seals.verify_answer(question, payload, seal)
         self.distrusted = self._seals.distrusted
         return payload
 
-    def answering(self, answer: Answering) -> SealedAnswering:
-        return self._seals.answering(answer)
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
+        return self._seals.seal_answers(answer)
 
-    def telling(self, key: str, payload: bytes) -> bytes:
-        return self._seals.telling(key, payload)
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
+        return self._seals.seal_publication(key, payload)
 
-    def hearing(self, heard: Hearing) -> SealedHearing:
-        return self._seals.hearing(heard)
+    def verify_publications(self, heard: Hearing) -> SealedHearing:
+        return self._seals.verify_publications(heard)
 
 
 def unsigned(question: Question, seals: Seals) -> Question:
@@ -54,19 +54,19 @@ def flipped(question: Question, seals: Seals) -> Question:
 
 def of_another_key(question: Question, seals: Seals) -> Question:
     """Sign for another key expression."""
-    other = seals.question(f"{question.key}x", question.payload, question.parameters)
+    other = seals.seal_question(f"{question.key}x", question.payload, question.parameters)
     return replace(question, seal=other.seal)
 
 
 def of_another_payload(question: Question, seals: Seals) -> Question:
     """Sign another payload."""
-    other = seals.question(question.key, question.payload + b" ", question.parameters)
+    other = seals.seal_question(question.key, question.payload + b" ", question.parameters)
     return replace(question, seal=other.seal)
 
 
 def of_other_parameters(question: Question, seals: Seals) -> Question:
     """Sign other parameters."""
-    other = seals.question(question.key, question.payload, {**question.parameters, "since": "7"})
+    other = seals.seal_question(question.key, question.payload, {**question.parameters, "since": "7"})
     return replace(question, seal=other.seal)
 
 

@@ -130,10 +130,10 @@ class StationBench:
             sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
         )  # fmt: skip
         journal, controller = self.robot.journal, self.robot.controller
-        journal.begin_transfer(manifest)
+        journal.missions.begin_transfer(manifest)
         for number in range(manifest.chunks):
             data = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES]
-            journal.store_chunk(manifest, number, data)
+            journal.missions.store_chunk(manifest, number, data)
         commit = Commit(
             manifest=manifest, commander=self.commander, nonce=uuid.uuid4().hex, take_over=True,
             not_after_ns=self.robot.wall.now_ns() + 10**10,

@@ -1,1 +1,1 @@
-"""What carries words between station and robot: in memory or over zenoh, with keys and a clock."""
+"""The link between station and robot: in memory or over zenoh, with keys and a clock."""

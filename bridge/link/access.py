@@ -1,9 +1,9 @@
-"""Who may send what on a robot's keys, at the robot and at a router: nothing, unless a rule here says so.
+"""Access rules for a robot's key expressions, at the robot and at a router: deny, unless a rule here allows.
 
-zenoh applies this by the certificate of a link. At a robot every holder of the site's keys may ask and
-listen; who may order is told by the seals, for behind a router all come by one link. At a router each robot
-is held to its own keys, and nobody can stand in for another. A rule lets a message pass only if it includes
-the message's whole key. What is denied looks to the other end like no answer.
+zenoh applies these rules by the certificate of a link. At a robot every holder of the site's keys may ask and
+listen. Message signatures decide who may command, for behind a router all messages come by one link. At a
+router each robot is limited to its own key expressions, so none can act as another. A rule allows a message
+only if it includes the message's whole key. To the other end a denied message looks like no answer.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ LOOKING = ("declare_liveliness_subscriber", "liveliness_query")
 
 @dataclass(frozen=True)
 class Flow:
-    """Messages on some keys, from those who begin with them to those who serve them."""
+    """Messages on some key expressions, between the ends that ask and the ends that serve."""
 
     name: str
     asked: tuple[str, ...] = ()
@@ -36,7 +36,7 @@ class Flow:
 
 
 def access_control(keys: KeyExpressions) -> dict[str, Any]:
-    """zenoh's `access_control` at one robot: default deny; its own tunnel's end may join it as well."""
+    """Return zenoh's `access_control` at one robot: default deny; its own tunnel's end may connect too."""
     every = [
         *_served(_everything(keys), "ingress", "egress"),
         *_served(_looking_for_twins(keys, "look out for"), "egress", "ingress"),
@@ -54,7 +54,7 @@ def access_control(keys: KeyExpressions) -> dict[str, Any]:
 
 
 def router_access_control(holders: Sequence[Holder], site: str | None) -> dict[str, Any]:
-    """zenoh's `access_control` at a router: default deny, each robot on its own keys, others by role."""
+    """Return zenoh's `access_control` at a router: default deny, robots on their own keys, others by role."""
     every = KeyExpressions.of_every_robot(site)
     roles = {
         "viewer": _served(_watching(every, "viewer"), "ingress", "egress"),
@@ -112,7 +112,7 @@ def _commanding(keys: KeyExpressions, name: str) -> Flow:
 
 
 def _everything(keys: KeyExpressions) -> Flow:
-    """What anybody may want of one robot; and of all robots at once: who is there."""
+    """Return all messages of one robot, and the tokens of all robots."""
     every, own = KeyExpressions.of_every_robot(keys.site), _commanding(keys, "holder")
     return replace(own, asked=(*own.asked, keys.boot), shown=(*own.shown, every.alive))
 
@@ -132,7 +132,7 @@ def _looking_for_twins(keys: KeyExpressions, name: str) -> Flow:
 
 
 def _served(flow: Flow, inward: str, outward: str) -> list[dict[str, Any]]:
-    """Rules where what is asked comes `inward`, and what is answered and told goes `outward`."""
+    """Return rules for a flow: questions go `inward`, answers and publications `outward`."""
     rules = (
         _rule(f"{flow.name} ask", ["query"], inward, flow.asked),
         _rule(f"{flow.name} answer", ["reply", "declare_queryable"], outward, flow.asked),

@@ -1,4 +1,4 @@
-"""A site's authority, in the office: it issues keys, renews them, and calls them back.
+"""A site's certificate authority, in the office: it issues keys, renews and revokes them.
 
 A site's folder holds `authority/` (its key, every certificate it has issued, and the list of those revoked)
 and a folder for each holder, to be given to that machine.
@@ -41,7 +41,7 @@ AUTHORITY: Final = "authority"
 AUTHORITY_DAYS: Final = 3650
 DAYS: Final = 90
 ADDRESSES: Final = ("127.0.0.1", "::1", "localhost")
-"""Where every robot and router may be reached."""
+"""Addresses at which every robot and router may be reached."""
 SERVERS: Final[tuple[HolderRole, ...]] = ("robot", "router")
 """Roles that others connect to."""
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.@-]{0,55}")
@@ -56,7 +56,7 @@ class Issued(msgspec.Struct, frozen=True, kw_only=True):
     holder: Holder
     state: KeyState
     current: bool
-    """Whether it is the one in its holder's folder; others were replaced by it."""
+    """True if it is the one in its holder's folder, which replaced the others."""
 
 
 def init_site(folder: Path, *, now: datetime) -> None:
@@ -134,7 +134,7 @@ def rotate(
 
 
 def revoke(folder: Path, name: str, *, old: bool = False) -> tuple[str, ...]:
-    """Let certificates of `name` count no more: all, or only the `old` that were replaced; their serials.
+    """Revoke the certificates of `name`: all, or only the replaced (`old`) ones; return their serials.
 
     The list goes into every holder's folder here; it counts on a machine from when it is copied there.
 
@@ -158,7 +158,7 @@ def revoke(folder: Path, name: str, *, old: bool = False) -> tuple[str, ...]:
 
 
 def listed(folder: Path, *, now: datetime) -> tuple[Issued, ...]:
-    """Every certificate that the site's authority has issued, by name, the newest first."""
+    """Return every certificate that the site's authority has issued, by name, the newest first."""
     revoked, found = _revoked(folder).serials, []
     for certificate in _all_issued(folder):
         holder = holder_of(certificate)
@@ -196,7 +196,7 @@ def _all_issued(folder: Path) -> list[x509.Certificate]:
 
 
 def _revoked(folder: Path) -> Revoked:
-    """The site's list; one that was made before there were lists has revoked nobody."""
+    """Return the site's list; a site from before there were lists has an empty one."""
     files = KeyFiles(folder / AUTHORITY)
     if not files.revoked.exists():
         return Revoked(number=0, serials=())
@@ -204,7 +204,7 @@ def _revoked(folder: Path) -> Revoked:
 
 
 def _distribute(folder: Path, revoked: bytes) -> None:
-    """Into the folders of all holders first: what the authority has, everybody has."""
+    """Write the list into the folders of all holders, and into the authority's last."""
     holders = sorted(path.parent for path in folder.glob("*/cert.pem") if path.parent.name != AUTHORITY)
     for path in (*holders, folder / AUTHORITY):
         write_atomic(KeyFiles(path).revoked, revoked)
@@ -232,8 +232,9 @@ def _issue(
 
 
 def _signed(revoked: Revoked, key: Ed25519PrivateKey) -> bytes:
-    told = msgspec.json.encode(revoked)
-    return msgspec.json.encode(SignedList(revoked=msgspec.Raw(told), signature=key.sign(REVOKED + told)))
+    encoded = msgspec.json.encode(revoked)
+    signature = key.sign(REVOKED + encoded)
+    return msgspec.json.encode(SignedList(revoked=msgspec.Raw(encoded), signature=signature))
 
 
 def _subject(common: str, organisation: str | None, unit: str | None = None) -> x509.Name:
@@ -259,7 +260,7 @@ def _certificate(
     role: HolderRole | None,
     addresses: Iterable[str] = (),
 ) -> x509.Certificate:
-    """A certificate; without a role it is an authority's own."""
+    """Return a certificate; without a role it is an authority's own."""
     from cryptography import x509
     from cryptography.x509.oid import ExtendedKeyUsageOID
 
@@ -296,12 +297,12 @@ def _general_name(address: str) -> x509.GeneralName:
 
 
 def _addresses(certificate: x509.Certificate) -> tuple[str, ...]:
-    """Where its holder may be reached, as it was issued."""
+    """Return the addresses of the holder, as issued."""
     from cryptography import x509
 
     names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-    told = (str(name.value) for name in names)
-    return tuple(address for address in told if not address.endswith(".stopgo"))
+    values = (str(name.value) for name in names)
+    return tuple(address for address in values if not address.endswith(".stopgo"))
 
 
 def _make_folder(folder: Path) -> None:

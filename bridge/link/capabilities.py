@@ -1,4 +1,4 @@
-"""What robots can do beyond the version that they speak, and what a station goes without where one cannot."""
+"""Capabilities of robots beyond their protocol version, and the effect of each missing one."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from collections.abc import Iterable
 from typing import Final
 
 RECORD: Final = "record"
-"""The capability of a robot that keeps a record of its runs."""
+"""Capability of a robot that records its runs."""
 
 WITHOUT: Final[dict[str, str]] = {
     RECORD: "of a link lost for longer than its last 3000 poses the way stays unknown",
 }
-"""By the name in `Info.capabilities`: what follows where it is missing."""
+"""Effect of a missing capability, by its name in `Info.capabilities`."""
 
 
-def told_of_capabilities(told: Iterable[str]) -> str:
-    """What a robot can, and what this stopgo would use and it lacks, in one line."""
-    has = sorted(told)
+def told_of_capabilities(names: Iterable[str]) -> str:
+    """Return a robot's capabilities in one line, with those that it lacks."""
+    has = sorted(names)
     lacks = [f"lacks {name}: {why}" for name, why in WITHOUT.items() if name not in has]
     return "; ".join([", ".join(has) or "nothing beyond version 1", *lacks])

@@ -1,4 +1,4 @@
-"""Time, which comes from outside: the wall's, sped up for a simulated robot, or a test's own."""
+"""Clocks: the wall clock, the same sped up for a simulated robot, and a test's own."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class WallClock:
 
 
 class SimulatedClock:
-    """Time that passes only when somebody waits; what was set for a time happens while it passes."""
+    """Clock whose time passes only during `wait`; scheduled calls happen while it passes."""
 
     def __init__(self, *, origin_ns: int = 1_700_000_000_000_000_000) -> None:
         self._now_ns = origin_ns
@@ -50,11 +50,11 @@ class SimulatedClock:
         return self._now_ns
 
     def at(self, seconds: float, happens: Callable[[], object]) -> None:
-        """Let `happens` be called `seconds` from now, by whoever waits then."""
+        """Call `happens` in `seconds` from now, in the thread that waits then."""
         heapq.heappush(self._due, (self._now_ns + round(seconds * 1e9), len(self._due), happens))
 
     def jump(self, seconds: float) -> None:
-        """Somebody sets the date, forward or back; nobody waits for that, and what is due is so no sooner."""
+        """Set the date forward or back; nothing waits for it, and scheduled calls come no sooner."""
         by_ns = round(seconds * 1e9)
         self._now_ns += by_ns
         self._due = [(due_ns + by_ns, order, happens) for due_ns, order, happens in self._due]

@@ -1,4 +1,4 @@
-"""One holder's keys, and whom they let it believe: everybody whom the same authority has issued keys to.
+"""Keys of one holder, and the check of other holders' certificates: all have the same authority.
 
 A certificate names who holds it in its common name (`robot:r1`, `station:alice`), so that a router can tell
 one from another, and carries the role apart, as its organisational unit. Keys are Ed25519 and serve both the
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 HolderRole = Literal["station", "viewer", "robot", "router"]
 ROLES: Final[tuple[HolderRole, ...]] = ("station", "viewer", "robot", "router")
 REVOKED = b"stopgo/1 revoked\n"
-"""Goes before the list that is signed."""
+"""Prefix of the signed list."""
 
 
 @dataclass(frozen=True)
 class KeyFiles:
-    """One holder's folder: the authority's certificate, its own, its private key, and who is revoked."""
+    """One holder's folder: the authority's certificate, its own, its private key, and the revoked list."""
 
     folder: Path
 
@@ -57,19 +57,19 @@ class KeyFiles:
 
 
 class Holder(msgspec.Struct, frozen=True, kw_only=True):
-    """Who a certificate was issued to."""
+    """The holder that a certificate was issued to."""
 
     role: HolderRole
     name: str
     serial: str
-    """Of the certificate, hexadecimal."""
+    """Serial number of the certificate, hexadecimal."""
     not_before: datetime
     not_after: datetime
 
 
 @dataclass(frozen=True)
 class HeldKeys:
-    """Keys that have been read and found to fit together."""
+    """Keys that were read and belong together."""
 
     files: KeyFiles
     holder: Holder
@@ -79,33 +79,33 @@ class HeldKeys:
 
     @cached_property
     def der(self) -> bytes:
-        """The certificate, as it goes beside messages."""
+        """The certificate, as messages carry it."""
         from cryptography.hazmat.primitives.serialization import Encoding
 
         return self.certificate.public_bytes(Encoding.DER)
 
 
 class Untrusted(Exception):
-    """A signature that does not hold; the message says why."""
+    """A signature or a sender that is not valid; the message has the reason."""
 
 
 class Revoked(msgspec.Struct, frozen=True, kw_only=True):
-    """Certificates that count no more."""
+    """List of the certificates that are no longer valid."""
 
     number: int
-    """Grows with every list; an older one does not replace a newer."""
+    """Number of the list; a list never replaces one with a higher number."""
     serials: tuple[str, ...]
 
 
 class SignedList(msgspec.Struct, frozen=True, kw_only=True):
-    """How `Revoked` is written to a file: signed by the authority, over the list as it stands there."""
+    """A `Revoked` list as a file: the list's bytes, with the authority's signature over them."""
 
     revoked: msgspec.Raw
     signature: bytes
 
 
 def read_revoked(path: Path, authority: x509.Certificate) -> Revoked:
-    """The list of revoked certificates.
+    """Return the list of revoked certificates.
 
     Raises
     ------
@@ -143,11 +143,10 @@ def _revoked_in(data: bytes, path: Path, authority: x509.Certificate) -> Revoked
 
 
 class Certificates:
-    """Tells who holds a certificate, if the authority of one's own keys has issued it and it counts now.
+    """Finds the holder of a certificate, if the authority of one's own keys issued it and it is valid.
 
-    The list of those revoked is looked at each time, and read again when its file has changed. One that
-    cannot be read, or is older, does not replace what is known; with `state`, a folder where the newest is
-    kept, not after a restart either.
+    The revoked list is read again when its file has changed. A list that cannot be read, or is older, does
+    not replace the known one; with the folder `state`, not even after a restart.
     """
 
     def __init__(self, held: HeldKeys, now: Callable[[], datetime], state: Path | None = None) -> None:
@@ -162,7 +161,7 @@ class Certificates:
         self._stamp: tuple[int, ...] = ()
 
     def holder(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
-        """Who holds a certificate, and the public key that proves it.
+        """Return the holder of a certificate, and its public key.
 
         Raises
         ------
@@ -222,7 +221,7 @@ class Certificates:
 
 
 def kept_list(state: Path, authority: x509.Certificate) -> Path:
-    """Where the newest list of one authority is kept, beside what else outlives a restart."""
+    """Return the path of an authority's newest list in the state folder."""
     from cryptography.hazmat.primitives.hashes import SHA256
 
     return state / f"revoked-{authority.fingerprint(SHA256()).hex()[:16]}.json"
@@ -239,7 +238,7 @@ def _read_kept(path: Path, authority: x509.Certificate) -> Revoked:
 
 
 def read_keys(folder: Path, *, now: datetime, state: Path | None = None) -> HeldKeys:
-    """The keys in one holder's folder; a newer list of those revoked that is kept in `state` counts as well.
+    """Read the keys in one holder's folder; a newer revoked list in the folder `state` counts too.
 
     Raises
     ------
@@ -277,7 +276,7 @@ def read_keys(folder: Path, *, now: datetime, state: Path | None = None) -> Held
 
 
 def holder_of(certificate: x509.Certificate) -> Holder:
-    """Role, name and validity that a certificate tells; raises `InputError` if it is none of ours."""
+    """Return role, name and validity from a certificate; raises `InputError` if stopgo did not issue it."""
     common, unit = common_name(certificate), _unit(certificate)
     if common in ROLES:
         raise InputError(
@@ -297,7 +296,7 @@ def holder_of(certificate: x509.Certificate) -> Holder:
 
 
 def common_name(certificate: x509.Certificate) -> str:
-    """Empty if it has none."""
+    """Return the common name; empty if there is none."""
     from cryptography.x509.oid import NameOID
 
     return _attribute(certificate, NameOID.COMMON_NAME)
@@ -321,7 +320,7 @@ def _attribute(certificate: x509.Certificate, oid: x509.ObjectIdentifier) -> str
 
 
 def read_certificate(path: Path) -> x509.Certificate:
-    """The certificate in a file; raises `InputError` naming it."""
+    """Read the certificate in a file; raises `InputError` naming it."""
     from cryptography import x509
 
     try:
@@ -333,7 +332,7 @@ def read_certificate(path: Path) -> x509.Certificate:
 
 
 def read_key(path: Path) -> Ed25519PrivateKey:
-    """The private key in a file that its owner alone may read or write; raises `InputError` naming it."""
+    """Read a private key; raises `InputError` if others than its owner may read or write the file."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 

@@ -1,4 +1,4 @@
-"""A link carries bytes between station and robot; this is its interface.
+"""Interface of a link, which carries bytes between station and robot.
 
 `ask` gives `None` when no answer came: that means unknown, never "not carried out".
 """
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Request:
-    """A question as it reaches the end that answers it."""
+    """A question as it arrives at the end that answers it."""
 
     key: str
     payload: bytes
     parameters: Mapping[str, str] = field(default_factory=dict)
     seal: bytes = b""
     holder: Holder | None = None
-    """Who asks, where ends hold keys; that has been verified then."""
+    """The verified sender; `None` if ends hold no keys."""
     fresh: bool = True
-    """Whether it is certain that it was asked just now."""
+    """True if the question was certainly asked just now."""
 
 
 class Unanswered(Exception):
-    """Raised by whoever answers, to give no answer at all."""
+    """Raised by a function that answers, to give no answer at all."""
 
 
 Answering = Callable[[Request], bytes]
@@ -38,20 +38,20 @@ Presence = Callable[[str, bool], None]
 
 
 class Link(Protocol):
-    """What both ends need of a transport. Callbacks come from the link's own threads.
+    """The transport as both ends use it. Callbacks come from the link's own threads.
 
-    Where ends hold keys a link seals what is said on it, and passes on only what is to be believed.
+    Where ends hold keys a link signs its messages, and passes on only verified ones.
     """
 
     @property
     def distrusted(self) -> str:
-        """Why the last message that was not believed was not; empty if all were."""
+        """Reason of the last message that was not accepted; empty if all were."""
 
     def serve(self, key: str, answer: Answering) -> None:
         """Answer every question on `key` (which may hold wildcards), one at a time."""
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
-        """A function that sends on `key`; what is `bulk` may be left out on a full line."""
+        """Return a function that publishes on `key`; `bulk` messages may be dropped on a full link."""
 
     def announce(self, key: str) -> None:
         """Show that this end is alive until the link is closed."""
@@ -65,13 +65,13 @@ class Link(Protocol):
         parameters: Mapping[str, str] | None = None,
         bulk: bool = False,
     ) -> bytes | None:
-        """The answer of the one who serves `key`, or `None` if none came in time.
+        """Return the answer of the end that serves `key`, or `None` if none came in time.
 
-        A question that is `bulk`, and its answer, give way to others on a full line.
+        A `bulk` question and its answer have a lower priority than others.
         """
 
     def ask_all(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[bytes]:
-        """The answers of all who serve `key`: more than one if two robots have one name."""
+        """Return the answers of all ends that serve `key`: more than one if two robots have one name."""
 
     def hear(self, key: str, heard: Hearing) -> None:
         """Call `heard` with every sample on `key` from now on."""
@@ -83,12 +83,12 @@ class Link(Protocol):
 
 
 def endpoints_in(text: str) -> list[str]:
-    """Where to connect to, as it is typed: endpoints with commas between them."""
+    """Return the endpoints in a text, with commas between them."""
     return text.split(",")
 
 
 def matches(pattern: str, key: str) -> bool:
-    """Whether a key expression with `*` (one part) and a last `**` (any number) includes `key`."""
+    """True if a key expression with `*` (one part) and a last `**` (any number) includes `key`."""
     wanted, parts = pattern.split("/"), key.split("/")
     if wanted[-1] == "**":
         wanted.pop()

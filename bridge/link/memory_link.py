@@ -12,7 +12,7 @@ from stopgo.bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, S
 
 @dataclass(frozen=True)
 class SealedMessage:
-    """A message as whoever carries it sees it."""
+    """A message as its carrier sees it."""
 
     kind: Literal["question", "answer", "told"]
     key: str
@@ -22,7 +22,7 @@ class SealedMessage:
 
 
 class Switchboard:
-    """Joins links in memory: what one end publishes the others hear, at once and in the caller's thread."""
+    """Connects links in memory: publications arrive at once, in the caller's thread."""
 
     def __init__(self) -> None:
         self.serving: list[tuple[MemoryLink, str, SealedAnswering]] = []
@@ -30,9 +30,9 @@ class Switchboard:
         self.watching: list[tuple[str, Presence]] = []
         self.alive: set[str] = set()
         self.cut = False
-        """While true nothing passes."""
+        """True while no message passes."""
         self.failure: Exception | None = None
-        """What has ended the work of the end that answers; raised to whoever asks."""
+        """Error that ended the end that answers; raised in the end that asks."""
 
     def fail(self, error: Exception) -> None:
         self.failure = error
@@ -41,11 +41,11 @@ class Switchboard:
         return MemoryLink(self, seals)
 
     def carried(self, packet: SealedMessage) -> Iterable[SealedMessage]:
-        """What becomes of a message on its way: it arrives, unless the line is cut."""
+        """Return the messages that arrive: this one, unless the link is cut."""
         return () if self.cut else (packet,)
 
     def answers(self, question: SealedMessage) -> list[SealedMessage]:
-        """What all who serve its key answer to a question, as it arrives where it was asked."""
+        """Return all answers to a question, as they arrive at the end that asked."""
         if self.failure is not None:
             raise self.failure
         arrived: list[SealedMessage] = []
@@ -60,7 +60,7 @@ class Switchboard:
         return arrived
 
     def tell(self, packet: SealedMessage) -> None:
-        """Let everybody hear what was published, as it arrives there."""
+        """Deliver a publication to all subscribers, as it arrives there."""
         for arrived in self.carried(packet):
             for pattern, heard in list(self.hearing):
                 if matches(pattern, arrived.key):
@@ -80,12 +80,12 @@ class MemoryLink:
         return self._seals.distrusted
 
     def serve(self, key: str, answer: Answering) -> None:
-        # Whoever serves a key last answers first.
-        self._board.serving.insert(0, (self, key, self._seals.answering(answer)))
+        # The end that served a key last answers first.
+        self._board.serving.insert(0, (self, key, self._seals.seal_answers(answer)))
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
         return lambda payload: self._board.tell(
-            SealedMessage("told", key, payload, self._seals.telling(key, payload))
+            SealedMessage("told", key, payload, self._seals.seal_publication(key, payload))
         )
 
     def announce(self, key: str) -> None:
@@ -109,13 +109,13 @@ class MemoryLink:
         return self._answers(key, payload, {})
 
     def _answers(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> list[bytes]:
-        question = self._seals.question(key, payload, parameters)
+        question = self._seals.seal_question(key, payload, parameters)
         arrived = self._board.answers(SealedMessage("question", key, payload, question.seal, parameters))
-        opened = (self._seals.opened(question, packet.payload, packet.seal) for packet in arrived)
+        opened = (self._seals.verify_answer(question, packet.payload, packet.seal) for packet in arrived)
         return [payload for payload in opened if payload is not None]
 
     def hear(self, key: str, heard: Hearing) -> None:
-        self._board.hearing.append((key, self._seals.hearing(heard)))
+        self._board.hearing.append((key, self._seals.verify_publications(heard)))
 
     def watch_presence(self, key: str, changed: Presence) -> None:
         for alive in sorted(self._board.alive):

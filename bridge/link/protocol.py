@@ -1,6 +1,6 @@
-"""What station and robot say to one another: every key and every message, known to this module alone.
+"""Key expressions and messages between station and robot; no other module knows them.
 
-Messages are JSON; docs/reference/protocol.md tells them to people. Times that end in `_ns` are
+Messages are JSON; docs/reference/protocol.md describes them. Times that end in `_ns` are
 nanoseconds on the robot's clock.
 """
 
@@ -29,7 +29,7 @@ from stopgo.mission.run.orders import Answer, Count, ShortText
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024
-"""An order beside a push waits at most for one: 33 ms at 8 Mbit/s."""
+"""During a push a command waits at most for one chunk: 33 ms at 8 Mbit/s."""
 MAX_CHUNK_BYTES: Final = 256 * 1024
 MAX_DOCUMENT_BYTES: Final = 64 * 1024 * 1024
 LOG_PAGE: Final = 100
@@ -50,7 +50,7 @@ class KeyExpressions:
     robot: str
     site: str | None = None
     every: bool = False
-    """Robot `*` stands for every robot: to ask them or hear them, never to order."""
+    """True if the robot is `*`, every robot: for questions and publications, never for commands."""
 
     @classmethod
     def of_every_robot(cls, site: str | None) -> KeyExpressions:
@@ -108,12 +108,12 @@ class KeyExpressions:
 
     @property
     def keep(self) -> str:
-        """Asked every few seconds by whoever watches, who keeps the lease by it if it is theirs."""
+        """Queried every few seconds by a station that watches; it renews that station's lease."""
         return f"{self.root}/keep"
 
     @property
     def boot(self) -> str:
-        """Asked to find out whether a name is taken."""
+        """Queried to find out if a name is in use."""
         return f"{self.root}/boot"
 
     def watcher(self, name: str) -> str:
@@ -128,58 +128,58 @@ class KeyExpressions:
         return f"{self.root}/mission/{mission_id}/{step}"
 
     def mavlink(self, what: str) -> str:
-        """Raw frames: `down` from the vehicle, `up` to it; `alive`, `hello`: the tunnel's end there."""
+        """Raw frames: `down` from the vehicle, `up` to it; `alive`, `hello`: the tunnel's robot end."""
         return f"{self.root}/mavlink/{what}"
 
     def robot_of(self, key: str) -> str:
-        """The robot whose key this is."""
+        """Return the robot that a key belongs to."""
         return key.removeprefix(self.root.removesuffix(self.robot)).partition("/")[0]
 
 
 class Tagged(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is"):
-    """Base of most messages: frozen, and says what it is. What a newer peer adds to one is passed over."""
+    """Base of most messages: frozen, with the message's name in `is`. Unknown fields are ignored."""
 
 
 class OwnMap(Transform, frozen=True, forbid_unknown_fields=False):
-    """How a robot was told that the site lies on its map; what a newer peer adds to it is passed over."""
+    """Transform from the site to a robot's map; unknown fields are ignored."""
 
 
 class Info(Tagged, frozen=True):
-    """What a robot says of itself on `info`."""
+    """Identity, state and limits of a robot, on `info`."""
 
     protocol: int
     stopgo: str
     robot: str
     boot_id: str
     clock_ns: Nanoseconds
-    """The clock that `valid_for_s` counts on."""
+    """Time on the clock that `valid_for_s` counts on."""
     state: StateReport
     lease: Lease | None
-    """The last commander, also when its time is over."""
+    """The newest lease, also when it has ended."""
     chunk_bytes: int
     document_bytes: int
     profiles: tuple[str, ...] | None
-    """Scan profiles the scanner knows; `None` if it takes any."""
+    """Names of the scanner's profiles; `None` if it accepts any."""
     to_map: OwnMap | None
-    """Site to map, if the robot was told; else each mission's `frame.to_map` counts."""
+    """Transform from the site to the map, if the robot was given one; else each mission's `frame.to_map`."""
     capabilities: tuple[str, ...] = ()
-    """What it can do beyond the version that it speaks, by name; a robot that tells of none can none."""
+    """Names of the robot's capabilities beyond its protocol version."""
 
 
 class Watching(Tagged, frozen=True):
-    """Somebody watches the robot, and keeps the lease if it is theirs; answered with `Info`."""
+    """Sign of a station that watches the robot; renews its lease, if it has it; answered with `Info`."""
 
     commander: ShortText
 
 
 class Booted(Tagged, frozen=True):
-    """Which start of a robot's program answers."""
+    """The start of a robot's program that answers."""
 
     boot_id: str
 
 
 class Manifest(Tagged, frozen=True):
-    """What is about to be transferred, on `mission/<id>/begin`."""
+    """Description of the document that will be transferred, on `mission/<id>/begin`."""
 
     mission_id: ShortText
     revision: Count
@@ -187,7 +187,7 @@ class Manifest(Tagged, frozen=True):
     """The mission's own digest."""
     size: Count
     sha256: ShortText
-    """Of the transferred bytes."""
+    """Hash of the transferred bytes."""
     chunk_bytes: Count
 
     @property
@@ -196,7 +196,7 @@ class Manifest(Tagged, frozen=True):
 
 
 class Ready(Tagged, frozen=True):
-    """The robot awaits the chunks that are not in `held`."""
+    """The robot waits for the chunks that are not in `held`."""
 
     held: tuple[int, ...]
 
@@ -207,41 +207,41 @@ class ChunkHeld(Tagged, frozen=True):
 
 
 class Commit(Tagged, frozen=True):
-    """Everything has been sent: verify and store it, on `mission/<id>/commit`."""
+    """Request to verify and store a mission whose chunks have all been sent, on `mission/<id>/commit`."""
 
     manifest: Manifest
     commander: ShortText
     nonce: ShortText
-    """Taken once: the same commit may be sent again, but not to undo a later one."""
+    """Accepted once: the same commit may be sent again, but not to undo a later one."""
     not_after_ns: int
     boot_id: ShortText | None = None
-    """The start of the robot's program that `not_after_ns` counts in; another refuses what it has not."""
+    """The start of the robot's program that `not_after_ns` belongs to; after another start it is refused."""
     fence: Count | None = None
     take_over: bool = False
 
 
 class Accepted(Tagged, frozen=True):
-    """The mission is stored on the robot, whole."""
+    """Confirmation that the whole mission is stored on the robot."""
 
     mission_id: str
     revision: int
     digest: str
     already: bool
-    """Whether the robot held exactly this before."""
+    """True if the robot had exactly this mission before."""
     waits: bool = False
-    """Whether it will be followed from the next stop of the present run on."""
+    """True if the current run will follow it from the next stop on."""
 
 
 class Rejected(Tagged, frozen=True):
-    """The mission was not taken; what the robot held before is unchanged."""
+    """The mission was not accepted; the robot's earlier mission is unchanged."""
 
     reason: str
-    """One of `Reason`, or what a newer robot calls it."""
+    """One of `Reason`, or a newer robot's name for it."""
     messages: tuple[str, ...]
 
 
 class MissionPart(Tagged, frozen=True):
-    """A piece of the stored mission, read back on `mission/<id>/part/<i>`."""
+    """A part of the stored mission, read back on `mission/<id>/part/<i>`."""
 
     manifest: Manifest
     index: int
@@ -249,16 +249,16 @@ class MissionPart(Tagged, frozen=True):
 
 
 class Malformed(Tagged, frozen=True):
-    """The request could not be read; nothing was done."""
+    """Refusal of a request that could not be read; nothing was done."""
 
     message: str
 
 
 class LogPage(Tagged, frozen=True):
-    """Events by number from the journal; `newest` tells whether there are more."""
+    """Events from the journal by number; there are more if `newest` is higher."""
 
     bodies: tuple[msgspec.Raw, ...] = msgspec.field(name="events")
-    """As the journal has them, also those of kinds that this stopgo does not know."""
+    """As in the journal, including kinds that this stopgo does not know."""
     newest: int
 
     @property
@@ -267,15 +267,15 @@ class LogPage(Tagged, frozen=True):
 
 
 class PosePage(Tagged, frozen=True):
-    """Past poses in order; fewer than a page can hold if there are no more."""
+    """Past poses in order; a page that is not full is the last."""
 
     boot_id: str
-    """The boot that `seq` and `since` count in."""
+    """The boot that `seq` and `since` belong to."""
     poses: tuple[PoseReport, ...]
 
 
 class PoseRow(msgspec.Struct, frozen=True, array_like=True):
-    """A pose of a record, as an array: what a `PoseReport` tells, but for what all of an entry share."""
+    """A pose of a record, as an array: a `PoseReport` without the values that its whole entry shares."""
 
     seq: int
     robot_ns: Nanoseconds
@@ -286,23 +286,23 @@ class PoseRow(msgspec.Struct, frozen=True, array_like=True):
 
 
 class RecordEntry(msgspec.Struct, frozen=True, kw_only=True):
-    """Half a second of a run, as the robot wrote it down; of one boot."""
+    """Half a second of a run, of one boot, as the robot recorded it."""
 
     number: int
     """From 1 within the run, also over reboots."""
     boot_id: str
     began_ns: Nanoseconds
-    """When the run began."""
+    """Begin of the run."""
     poses: tuple[PoseRow, ...] = ()
     states: tuple[StateReport, ...] = ()
-    """Those that differ from the one before."""
+    """States that differ from the one before."""
     health: tuple[Health, ...] = ()
     missing: tuple[PosesMissing, ...] = ()
-    """What is not in the record before this."""
+    """Gaps in the record before this entry."""
 
 
 class RecordPage(Tagged, frozen=True):
-    """Entries of one run's record, by number; `newest` tells whether there are more."""
+    """Entries of one run's record by number; there are more if `newest` is higher."""
 
     run_id: str
     since: int
@@ -310,22 +310,22 @@ class RecordPage(Tagged, frozen=True):
     entries: tuple[RecordEntry, ...]
     newest: int
     missing: tuple[PosesMissing, ...] = ()
-    """What finds no room at present; an entry tells of it when there is room again."""
+    """Poses that cannot be written at present; an entry reports them when there is space again."""
 
 
 class RunKept(msgspec.Struct, frozen=True, kw_only=True):
-    """A run of which the robot keeps a record."""
+    """A run with a record on the robot."""
 
     run_id: str
     entries: int
     bytes: int
     """On the robot's disk."""
     retired: bool
-    """Whether only that it was is left, for want of room."""
+    """True if only its name is left, for lack of space."""
 
 
 class RecordIndex(Tagged, frozen=True):
-    """The runs that the robot keeps records of, oldest first; the last may be under way."""
+    """The recorded runs, oldest first; the last may still run."""
 
     runs: tuple[RunKept, ...]
 
@@ -345,13 +345,13 @@ Reply = (
     | MissionPart
     | Malformed
 )
-"""Everything a robot answers with."""
+"""All answers of a robot."""
 
 M = TypeVar("M")
 
 
 def untrusted(error: Exception) -> Rejected:
-    """What is answered to those who are not believed, or may not do what they ask."""
+    """Return the answer to a sender that is not trusted, or not allowed to do this."""
     return Rejected(reason="untrusted", messages=(str(error),))
 
 
@@ -360,7 +360,7 @@ def encode(message: Any) -> bytes:
 
 
 def decode(payload: bytes, kind: type[M]) -> M:
-    """The message in `payload`.
+    """Return the message in `payload`.
 
     Raises
     ------
@@ -375,7 +375,7 @@ _PLACE = re.compile(rf"(?P<root>(?:.+?/)?sx/{VERSION}/(?P<robot>[^/]+))/(?P<rest
 
 
 def place_of(key: str) -> tuple[str, str, str]:
-    """Root, robot and rest of a robot's key; raises `ValueError` if it is none."""
+    """Return root, robot and rest of a robot's key; raises `ValueError` if it is not one."""
     found = _PLACE.fullmatch(key)
     if found is None:
         raise ValueError(f"{key[:80]!r} is no robot's key")
@@ -383,12 +383,12 @@ def place_of(key: str) -> tuple[str, str, str]:
 
 
 def parts_of(key: str) -> list[str]:
-    """What comes after the robot's name in one of its keys, part by part."""
+    """Return the parts of a robot's key after its name."""
     return place_of(key)[2].split("/")
 
 
 def count_of(text: str, *, digits: int = 15) -> int:
-    """The number in a key or parameter; raises `ValueError` for anything but a plain, not too large one."""
+    """Return the number in a key or parameter; raises `ValueError` if it is not plain, or too large."""
     if not (text.isascii() and text.isdecimal()) or len(text) > digits:
         raise ValueError(f"{text[:20]!r} is not a number")
     return int(text)

@@ -1,4 +1,4 @@
-"""The JSON Schema of every message on the link, made from the code and shipped as protocol.schema.json.
+"""JSON Schema of all messages on the link, generated from the code and shipped as protocol.schema.json.
 
 Regenerate the shipped file with
 `python -m stopgo.bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
@@ -20,7 +20,7 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def protocol_schema() -> bytes:
-    """A definition for each message, event, report and seal, by its name on the link, as indented JSON.
+    """Return a definition of each message, event, report and seal, by its name on the link, as indented JSON.
 
     Any further field is valid in each of them, and so is an event of a kind that is not known.
     """
@@ -42,7 +42,7 @@ def _event() -> dict[str, Any]:
 
 
 def _of_any_other_kind(unknown: dict[str, Any]) -> dict[str, Any]:
-    """On the link it goes by its own name; `UnknownKind` is what a reader makes of it."""
+    """Return the schema of an event of an unknown kind, which has its own name on the link."""
     known = [kind for kind in KINDS if kind != UnknownKind.__name__]
     fields = {name: schema for name, schema in unknown["properties"].items() if name != "kind"}
     fields["event"] = {"type": "string", "not": {"enum": known}}

@@ -1,9 +1,33 @@
-"""Who said it, to whom and when: the seal that goes beside every message between ends that hold keys.
+"""Signatures of messages between ends that hold keys; each travels with its message, as a seal.
 
-A seal is an Ed25519 signature over the bytes as they were sent, with what binds them: the key that they are
-sent on, which names the robot; the robot's boot and a number or, in an answer, the question's nonce; and the
-time on the speaker's clock. So nobody in between can change, swap, replay or long withhold a message and be
-believed. An end without keys seals nothing and believes everything, which is good for one machine only.
+A seal is an Ed25519 signature, and the values that bind it to one use. Nobody between two ends can change,
+swap, replay or long delay a message unnoticed. Without keys (`NO_SEALS`) every message is unsigned and is
+accepted: for use on one machine only.
+
+What is signed (`_signed`): a line for the kind of message ("question", "answer" or "told"), a line for each
+thing that it is bound to, four lines with the seal's `nonce`, `boot_id`, `number` and `at_ns`, then the bytes
+as they were sent. It is bound to the key that it is sent on, which names the robot; a question to its
+parameters too; an answer to the question's parameters and the hash of its payload.
+
+Questions and answers
+    The question has a fresh nonce, which its answer repeats. An answer to another question is not accepted.
+    Each answer has the robot's boot and the time on its clock. The station stores both (`Anchor`). Into its
+    next question it puts that boot, and the time that the robot's clock must show by then. So the robot
+    sees if a question is fresh: of this boot, and at most `OLDEST_S` old. A question that is not fresh is
+    answered, but counts as no contact and renews no lease; commands and commits have limits of their own.
+
+Publications
+    They are numbered by key. A number that is not above the last one is a replay. A robot's numbers begin
+    again with each boot, a station's with each session (`nonce`). A station accepts a robot's publications
+    only after an answer of the same boot, which brings the certificate and the clock.
+
+Invariants
+    1. Who sent a message is known from the certificate, never from what the message says.
+    2. A certificate counts only if the holder's own authority issued it, and it is valid and not revoked now.
+    3. Two clocks are never compared directly: a station counts on from what the robot's clock showed.
+    4. A message that is not accepted has no effect; `distrusted` has the reason of the last one.
+    5. `_lock` guards the anchors and both counters while they change. No signature is made or checked
+       under it.
 """
 
 from __future__ import annotations
@@ -30,30 +54,30 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 OLDEST_S: Final = 10.0
-"""What was said longer ago is not believed: a slow line beside a push holds a message for seconds."""
+"""Greatest age of a message that is accepted. During a push a slow link delays messages by seconds."""
 AHEAD_S: Final = 1.0
-"""By so much two clocks may run apart before they are compared anew."""
+"""Greatest drift between two clocks before they are compared again."""
 
 
 class Seal(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Goes beside a message, as JSON; fields that are not known are passed over."""
+    """The attachment of a message, as JSON; unknown fields are ignored."""
 
     signature: bytes = b""
     certificate: bytes | None = None
-    """DER; a robot leaves it out of what it publishes, for its answers have told it."""
+    """DER; a robot's publications have none, for its answers bring it."""
     nonce: str = ""
-    """Of the question, also in its answer; of the sender's session in what a station publishes."""
+    """Of the question, repeated in its answer; in a station's publications, of its session."""
     boot_id: str = ""
-    """The robot's boot, also in what a station says to it once it knows."""
+    """The robot's boot; a station adds it once it knows it."""
     number: int = 0
-    """Of what is published on one key since then; grows."""
+    """Number of a publication on its key since that boot or session; grows."""
     at_ns: int = 0
-    """On a clock of the robot that counts from anywhere; a station tells the time that must be there."""
+    """On a clock of the robot with any origin; a station computes the time that this clock must show."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked, and what its answer must fit."""
+    """A question with its seal, and what its answer must match."""
 
     key: str
     payload: bytes
@@ -64,50 +88,51 @@ class Question:
 
 
 SealedAnswering = Callable[[Request], tuple[bytes, bytes]]
-"""Gives the answer and its seal."""
+"""Returns the answer and its seal."""
 SealedHearing = Callable[[str, bytes, bytes], None]
-"""Is given key, payload and seal."""
+"""Receives key, payload and seal."""
 
 
 class Seals(Protocol):
-    """How one end of a link seals what it says, and judges what it hears."""
+    """One end's way to sign its messages, and to verify those of the other end."""
 
     distrusted: str
-    """Why the last message that was not believed was not."""
+    """Reason of the last message that was not accepted."""
 
-    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question: ...
+    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        """Return the question with its seal."""
 
-    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
-        """The answer if it is to be believed."""
+    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+        """Return the answer if it is to be accepted, else `None`."""
 
-    def answering(self, answer: Answering) -> SealedAnswering:
-        """Answers what is to be believed, sealed; refuses everything else."""
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
+        """Return a function that answers verified questions, and refuses all others; it seals its answers."""
 
-    def telling(self, key: str, payload: bytes) -> bytes:
-        """The seal of what is published."""
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
+        """Return the seal of a publication."""
 
-    def hearing(self, heard: Hearing) -> SealedHearing:
-        """Hears what is to be believed, and nothing else."""
+    def verify_publications(self, heard: Hearing) -> SealedHearing:
+        """Return a function that passes on verified publications only."""
 
 
 class NoSeals:
-    """Neither seals nor doubts."""
+    """No signatures: nothing is signed, everything is accepted."""
 
     distrusted = ""
 
-    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
         return Question(key, payload, parameters)
 
-    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
         return payload
 
-    def answering(self, answer: Answering) -> SealedAnswering:
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
         return lambda request: (answer(request), b"")
 
-    def telling(self, key: str, payload: bytes) -> bytes:
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
         return b""
 
-    def hearing(self, heard: Hearing) -> SealedHearing:
+    def verify_publications(self, heard: Hearing) -> SealedHearing:
         return lambda key, payload, seal: heard(key, payload)
 
 
@@ -116,18 +141,18 @@ NO_SEALS: Final = NoSeals()
 
 @dataclass(frozen=True)
 class Anchor:
-    """A robot's boot as its last answer told it, and that moment on both clocks."""
+    """A robot's boot from its last answer, and the moment of that answer on both clocks."""
 
     boot_id: str
     certificate: bytes
     at_ns: int
     asked_ns: int
-    """Here, when the question was sent; the robot read its clock after that."""
+    """On this end's clock, when the question was sent; the robot read its clock after that."""
     heard_ns: int
 
 
 class KeySeals:
-    """Seals with one holder's keys; believes those whom the same authority has issued theirs."""
+    """Signs with one holder's keys, and accepts holders whose keys the same authority has issued."""
 
     def __init__(
         self,
@@ -139,32 +164,32 @@ class KeySeals:
         refused: Callable[[str, str], None] = lambda key, why: None,
         state: Path | None = None,
     ) -> None:
-        """`refused` is told of questions that are not believed: their key, and why not.
+        """`refused` is called with the key of each question that is not accepted, and the reason.
 
-        In the folder `state` the newest list of revoked certificates is kept.
+        The newest list of revoked certificates is stored in the folder `state`.
         """
         self.distrusted = ""
         self._held = held
         self._boot_id = boot_id
-        """Of a robot that answers here; a station has none."""
+        """Boot of the robot at this end; empty at a station."""
         self._clock_ns = clock_ns
         self._refused = refused
         self._certificates = Certificates(held, now, state)
         self._session = secrets.token_hex(8)
         self._lock = threading.Lock()
         self._anchors: dict[str, Anchor] = {}
-        self._told: Counter[str] = Counter()
-        self._heard: dict[tuple[str, ...], int] = {}
+        self._published: Counter[str] = Counter()
+        self._last_received: dict[tuple[str, ...], int] = {}
 
-    # Asking
+    # Questions
 
-    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
-        boot_id, at_ns = self._there(key)
+    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        boot_id, at_ns = self._robot_time(key)
         seal = Seal(nonce=secrets.token_hex(16), certificate=self._held.der, boot_id=boot_id, at_ns=at_ns)
-        sealed = self._sealed(seal, payload, "question", key, _parameters(parameters))
+        sealed = self._with_signature(seal, payload, "question", key, _parameters(parameters))
         return Question(key, payload, parameters, sealed, seal.nonce, self._clock_ns())
 
-    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
         try:
             self._check_answer(question, payload, _read(seal))
         except Untrusted as error:
@@ -186,109 +211,109 @@ class KeySeals:
                 seal.boot_id, seal.certificate or b"", seal.at_ns, question.asked_ns, heard_ns
             )
 
-    def _there(self, key: str) -> tuple[str, int]:
-        """The robot's boot and what its clock must at least show by now, if it has answered before."""
+    def _robot_time(self, key: str) -> tuple[str, int]:
+        """Return the robot's boot and the least time its clock must show now, if it has answered before."""
         anchor = self._anchors.get(_place(key)[1])
         if anchor is None:
             return "", 0
         return anchor.boot_id, anchor.at_ns + self._clock_ns() - anchor.heard_ns
 
-    # Answering
+    # Answers
 
-    def answering(self, answer: Answering) -> SealedAnswering:
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
         def answered(request: Request) -> tuple[bytes, bytes]:
             nonce = ""
             try:
                 seal = _read(request.seal)
                 nonce = seal.nonce
-                reply = answer(self._believed(request, seal))
+                reply = answer(self._verified(request, seal))
             except Untrusted as error:
                 self.distrusted = str(error)
                 self._refused(request.key, str(error))
                 reply = encode(untrusted(error))
             own = Seal(certificate=self._held.der, nonce=nonce, boot_id=self._boot_id, at_ns=self._clock_ns())
             about = (_parameters(request.parameters), _hash(request.payload))
-            return reply, self._sealed(own, reply, "answer", request.key, *about)
+            return reply, self._with_signature(own, reply, "answer", request.key, *about)
 
         return answered
 
-    def _believed(self, request: Request, seal: Seal) -> Request:
-        """The request with who asks, if that is certain, and whether it was asked just now."""
+    def _verified(self, request: Request, seal: Seal) -> Request:
+        """Return the request with its verified sender, and with `fresh` true if it was asked just now."""
         holder, public = self._certificates.holder(seal.certificate or b"")
         _verify(public, seal, request.payload, "question", request.key, _parameters(request.parameters))
         return replace(request, holder=holder, fresh=self._is_fresh(seal))
 
     def _is_fresh(self, seal: Seal) -> bool:
-        """Whether it was said in this boot, a moment ago."""
+        """True if the message was sent in this boot, a moment ago."""
         age_s = (self._clock_ns() - seal.at_ns) / 1e9
         return seal.boot_id == self._boot_id and -AHEAD_S <= age_s <= OLDEST_S
 
-    # Publishing and hearing
+    # Publications
 
-    def telling(self, key: str, payload: bytes) -> bytes:
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
         with self._lock:
-            self._told[key] += 1
-            number = self._told[key]
+            self._published[key] += 1
+            number = self._published[key]
         if self._boot_id:
             seal = Seal(boot_id=self._boot_id, number=number, at_ns=self._clock_ns())
         else:
-            boot_id, at_ns = self._there(key)
+            boot_id, at_ns = self._robot_time(key)
             seal = Seal(
                 certificate=self._held.der, nonce=self._session, boot_id=boot_id, number=number, at_ns=at_ns
             )
-        return self._sealed(seal, payload, "told", key)
+        return self._with_signature(seal, payload, "told", key)
 
-    def hearing(self, heard: Hearing) -> SealedHearing:
-        def judged(key: str, payload: bytes, seal: bytes) -> None:
+    def verify_publications(self, heard: Hearing) -> SealedHearing:
+        def passed_on(key: str, payload: bytes, seal: bytes) -> None:
             try:
-                self._check_told(key, payload, _read(seal))
+                self._check_publication(key, payload, _read(seal))
             except Untrusted as error:
                 self.distrusted = str(error)
                 return
             heard(key, payload)
 
-        return judged
+        return passed_on
 
-    def _check_told(self, key: str, payload: bytes, seal: Seal) -> None:
-        speaker = self._station_speaks if self._boot_id else self._robot_speaks
-        stream = speaker(key, payload, seal)
+    def _check_publication(self, key: str, payload: bytes, seal: Seal) -> None:
+        check = self._check_station if self._boot_id else self._check_robot
+        stream = check(key, payload, seal)
         with self._lock:
-            if seal.number <= self._heard.get(stream, 0):
-                raise Untrusted("it was said before")
-            self._heard[stream] = seal.number
+            if seal.number <= self._last_received.get(stream, 0):
+                raise Untrusted("it was received before")
+            self._last_received[stream] = seal.number
 
-    def _station_speaks(self, key: str, payload: bytes, seal: Seal) -> tuple[str, ...]:
+    def _check_station(self, key: str, payload: bytes, seal: Seal) -> tuple[str, ...]:
         certificate = seal.certificate or b""
         holder, public = self._certificates.holder(certificate)
         _verify(public, seal, payload, "told", key)
         if holder.role != "station":
-            raise Untrusted(f"{holder.name} is a {holder.role}; only stations speak to a robot")
+            raise Untrusted(f"{holder.name} is a {holder.role}; only stations may publish to a robot")
         if not self._is_fresh(seal):
-            raise Untrusted(f"what {holder.name} said is old, or was meant for another boot")
+            raise Untrusted(f"the message of {holder.name} is old, or for another boot")
         return key, seal.nonce, _hash(certificate)
 
-    def _robot_speaks(self, key: str, payload: bytes, seal: Seal) -> tuple[str, ...]:
+    def _check_robot(self, key: str, payload: bytes, seal: Seal) -> tuple[str, ...]:
         robot, where = _place(key)
         anchor = self._anchors.get(where)
         if anchor is None or seal.boot_id != anchor.boot_id:
-            raise Untrusted(f"{robot} has not answered since it was started")
+            raise Untrusted(f"{robot} has not answered since it started")
         holder, public = self._certificates.holder(anchor.certificate)
         _verify(public, seal, payload, "told", key)
         _must_be_robot(holder, robot)
-        said_ns = anchor.asked_ns + seal.at_ns - anchor.at_ns
-        if self._clock_ns() - said_ns > OLDEST_S * 1e9:
-            raise Untrusted(f"what {robot} said is older than {OLDEST_S:g} s")
+        sent_ns = anchor.asked_ns + seal.at_ns - anchor.at_ns
+        if self._clock_ns() - sent_ns > OLDEST_S * 1e9:
+            raise Untrusted(f"the message of {robot} is older than {OLDEST_S:g} s")
         return key, seal.boot_id
 
-    def _sealed(self, seal: Seal, payload: bytes, *about: str) -> bytes:
+    def _with_signature(self, seal: Seal, payload: bytes, *about: str) -> bytes:
         signature = self._held.key.sign(_signed(seal, payload, *about))
         return msgspec.json.encode(msgspec.structs.replace(seal, signature=signature))
 
 
 def _signed(seal: Seal, payload: bytes, *about: str) -> bytes:
-    """What is signed: a line for each thing that the message is bound to, then the message as it is."""
-    what, *rest = about
-    lines = (f"stopgo/{VERSION} {what}", *rest, seal.nonce, seal.boot_id, str(seal.number), str(seal.at_ns))
+    """Return the bytes to sign: a line for each thing that the message is bound to, then the message."""
+    kind, *rest = about
+    lines = (f"stopgo/{VERSION} {kind}", *rest, seal.nonce, seal.boot_id, str(seal.number), str(seal.at_ns))
     if any("\n" in line for line in lines):
         raise Untrusted("its key or parameters have several lines")
     return "\n".join(lines).encode(errors="surrogatepass") + b"\n" + payload
@@ -313,7 +338,7 @@ def _read(seal: bytes) -> Seal:
 
 
 def _place(key: str) -> tuple[str, str]:
-    """The robot that a key names, and its end there: the robot's own, or its tunnel's."""
+    """Return the robot in a key, and its end: the root of its keys, or of its tunnel's."""
     try:
         root, robot, rest = place_of(key)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Why no link comes about, in words: asked of the endpoint itself, once nobody was found behind it."""
+"""Diagnosis of a link that does not open: the endpoint itself is tried, once no robot was found there."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from stopgo.bridge.link.link import endpoints_in
 
 PROBE_S = 2.0
 ALERT_S = 0.5
-"""How long a server may take to refuse the certificate that it was shown."""
+"""Wait for a server to refuse a certificate."""
 
 
 def why_no_link(endpoints: str, keys: HeldKeys | None) -> str:
-    """What is wrong with the line to `tls/10.1.2.3:7447`, or several; empty if nothing is to be seen."""
+    """Return the fault of the link to `tls/10.1.2.3:7447`, or to several; empty if none is found."""
     found = [(endpoint, _why(endpoint, keys)) for endpoint in endpoints_in(endpoints)]
     if len(found) == 1:
         return found[0][1]
@@ -38,7 +38,7 @@ def _why(endpoint: str, keys: HeldKeys | None) -> str:
 
 
 def _speaks_tls(line: socket.socket) -> bool:
-    """Whether the other end answers a greeting of TLS in kind, which nobody else does."""
+    """True if the other end answers a TLS greeting with TLS."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     line.settimeout(ALERT_S)

@@ -1,8 +1,8 @@
-"""A link over zenoh. Everything that zenoh must be told, and every trap it has, is in this module.
+"""A link over zenoh. All settings and all pitfalls of zenoh are in this module.
 
-The robot listens as a router and stations connect as peers without scouting. Shared memory is off, for it
-drops queries silently; the lease is set at both ends, for each end's governs the other; a session is
-always closed, for one with callbacks hangs the interpreter's exit.
+The robot listens as a router, and stations connect as peers without scouting. Shared memory is off, for it
+drops queries silently. The lease is set at both ends, for each end's lease governs the other. A session is
+always closed, for an open one with callbacks blocks the interpreter's exit.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ LEASE_MS = 2000
 OPEN_S = 5.0
 LEAST_OPEN_S = 0.5
 ALL_LINKED_S = 1.0
-"""How long a station with several endpoints waits for all of them."""
-LOOK_S = 0.02
+"""Wait of a station with several endpoints for all of them."""
+POLL_S = 0.02
 BATCH_BYTES = 8192
-"""Of what zenoh sends in one piece: one that takes longer than the lease to arrive closes the link."""
+"""Batch size of zenoh: a batch that takes longer than the lease to arrive closes the link."""
 SEND_BUFFER_BYTES = 32 * 1024
-"""Of the operating system, per link: what lies there no urgent message can overtake."""
+"""Send buffer of the operating system, per link; no urgent message can overtake its content."""
 MAX_MESSAGE_BYTES = 1_000_000
 OPEN = ("tcp", "udp", "ws")
 ENCRYPTED = ("tls", "quic")
@@ -58,39 +58,39 @@ COMMON: dict[str, Any] = {
 }
 RETRY = {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 1.5}
 LAST_SECOND = timedelta(seconds=1)
-"""In which a certificate that has ended is still taken for a new link, which zenoh does not close again."""
+"""Time in which zenoh accepts an expired certificate for a new link, which it does not close again."""
 
 
 @dataclass(frozen=True)
 class Guard:
-    """How a link is guarded: by keys, or by staying on this machine, or knowingly not at all."""
+    """Protection of a link: keys, or this machine only, or none (`insecure`)."""
 
     keys: HeldKeys | None = None
     insecure: bool = False
     access: dict[str, Any] | None = None
-    """zenoh's access control, at the end that is asked."""
+    """zenoh's access control, at the end that serves."""
     boot_id: str = ""
-    """Of a robot, for its seals."""
+    """Boot of a robot, for its signatures."""
     refused: Callable[[str, str], None] = lambda key, why: None
-    """Told of questions that are not believed."""
+    """Called with the key and the reason of questions that are not accepted."""
     state: Path | None = None
-    """Folder of a robot's that keeps the newest list of revoked certificates."""
+    """Folder of a robot in which the newest revoked list is stored."""
 
     @property
     def seals(self) -> Seals:
-        """What goes beside messages on a link that is so guarded."""
+        """Signatures of messages on a link with this protection."""
         if self.keys is None:
             return NO_SEALS
         return KeySeals(self.keys, boot_id=self.boot_id, refused=self.refused, state=self.state)
 
 
 UNGUARDED = Guard()
-"""Good for this machine only."""
+"""No protection: for this machine only."""
 
 
 @contextmanager
 def listening(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
-    """A link on which others connect to `endpoint`, such as `tcp/127.0.0.1:7447`; it routes between them."""
+    """Open a link that listens on `endpoint`, such as `tcp/127.0.0.1:7447`, and routes between its peers."""
     check_endpoint(endpoint, guard, option="--listen")
     with _opened({"mode": "router", "listen/endpoints": [endpoint]}, endpoint, guard) as link:
         yield link
@@ -98,7 +98,7 @@ def listening(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
 
 @contextmanager
 def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
-    """A robot's link to the router at `endpoint`, which stations connect to as well.
+    """Open a robot's link to the router at `endpoint`, to which stations connect too.
 
     The robot is a router too: a router does not carry between two peers that it takes for neighbours.
     """
@@ -109,11 +109,10 @@ def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
 
 @contextmanager
 def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_S) -> Iterator[ZenohLink]:
-    """A station's link to `endpoint`; returned at once, it connects, again and again, in the background.
+    """Open a station's link to `endpoint`; it is returned at once, and connects in the background.
 
-    Each attempt takes at most `open_s`; closing waits for the one under way. There may be several endpoints,
-    with commas between them: whoever listens there has a moment to be linked first, so that two of one name
-    are both heard.
+    Each attempt takes at most `open_s`; closing waits for the current one. There may be several endpoints,
+    with commas between them. The link waits a moment for all, so that two robots of one name both answer.
     """
     endpoints = endpoints_in(endpoint)
     for one in endpoints:
@@ -131,7 +130,7 @@ def _reaching(*endpoints: str) -> dict[str, Any]:
 
 
 def _guarding(guard: Guard) -> dict[str, Any]:
-    """What zenoh must be told of keys and access; each setting is refused at opening if it cannot be."""
+    """Return zenoh's settings for keys and access; a wrong one is refused at opening."""
     settings: dict[str, Any] = {} if guard.access is None else {"access_control": guard.access}
     if guard.keys is None:
         return settings
@@ -168,7 +167,7 @@ def _opened(settings: dict[str, Any], endpoint: str, guard: Guard) -> Iterator[Z
 
 @contextmanager
 def _silent_after(link: ZenohLink, keys: HeldKeys | None) -> Iterator[None]:
-    """Whoever's keys have ended says and hears nothing more, also on a link of the last second."""
+    """Silence the link once the keys have expired, also a link of the last second."""
     if keys is None:
         yield
         return
@@ -188,7 +187,7 @@ class ZenohLink:
     def __init__(self, session: zenoh.Session, seals: Seals = NO_SEALS) -> None:
         self._session = session
         self._seals = seals
-        # A token or subscriber that nobody refers to is collected, and gone.
+        # A token or subscriber without a reference is garbage collected, and undeclared.
         self._declared: list[Any] = []
         self._publishers: list[zenoh.Publisher] = []
         self._lock = threading.Lock()
@@ -199,20 +198,20 @@ class ZenohLink:
         return self._seals.distrusted
 
     def await_others(self, count: int, within_s: float) -> None:
-        """Wait until so many others are linked, or until the time is up."""
+        """Wait until `count` others are connected, or the time is over."""
         deadline = time.monotonic() + within_s
         info = self._session.info
         while len([*info.routers_zid(), *info.peers_zid()]) < count and time.monotonic() < deadline:
-            time.sleep(LOOK_S)
+            time.sleep(POLL_S)
 
     def fall_silent(self) -> None:
-        """Be gone for the others, while the session stays open."""
+        """Disappear for the others, while the session stays open."""
         self._silent = True
         with self._lock:
             _undeclare(self._declared)
 
     def serve(self, key: str, answer: Answering) -> None:
-        sealed = self._seals.answering(answer)
+        sealed = self._seals.seal_answers(answer)
 
         def answered(query: zenoh.Query) -> None:
             with query:
@@ -222,7 +221,7 @@ class ZenohLink:
                     reply, seal = sealed(Request(str(query.key_expr), payload, parameters, _seal_of(query)))
                 except Unanswered:
                     return
-                # With the priority of the question: zenoh gives an answer no other.
+                # The answer has the priority of the question: zenoh offers no other.
                 query.reply(query.key_expr, reply, encoding=JSON, attachment=seal or None)
 
         self._declared.append(self._session.declare_queryable(key, answered, complete=True))
@@ -236,7 +235,7 @@ class ZenohLink:
 
         def publish(payload: bytes) -> None:
             if not self._silent:
-                publisher.put(payload, attachment=self._seals.telling(key, payload) or None)
+                publisher.put(payload, attachment=self._seals.seal_publication(key, payload) or None)
 
         return publish
 
@@ -260,10 +259,10 @@ class ZenohLink:
     def _answers(
         self, key: str, payload: bytes, timeout_s: float, parameters: Mapping[str, str], *, bulk: bool
     ) -> Iterator[bytes]:
-        """Answers that are to be believed, as they come."""
+        """Yield the verified answers, as they come."""
         if self._silent:
             return
-        question = self._seals.question(key, payload, parameters)
+        question = self._seals.seal_question(key, payload, parameters)
         replies = self._session.get(
             zenoh.Selector(key, dict(parameters)),
             payload=payload,
@@ -278,12 +277,12 @@ class ZenohLink:
         )
         for reply in replies:
             if reply.ok is not None:
-                opened = self._seals.opened(question, reply.ok.payload.to_bytes(), _seal_of(reply.ok))
+                opened = self._seals.verify_answer(question, reply.ok.payload.to_bytes(), _seal_of(reply.ok))
                 if opened is not None:
                     yield opened
 
     def hear(self, key: str, heard: Hearing) -> None:
-        judged = self._seals.hearing(heard)
+        judged = self._seals.verify_publications(heard)
 
         def sampled(sample: zenoh.Sample) -> None:
             judged(str(sample.key_expr), sample.payload.to_bytes(), _seal_of(sample))
@@ -308,7 +307,7 @@ def _undeclare(declared: list[Any]) -> None:
 
 
 def check_endpoint(endpoint: str, guard: Guard, *, option: str) -> None:
-    """Refuse what is not an endpoint, and one that is not guarded as it should be.
+    """Refuse a text that is not an endpoint, and an endpoint without the protection it needs.
 
     Raises
     ------
@@ -351,6 +350,6 @@ def _seal_of(message: zenoh.Query | zenoh.Sample) -> bytes:
 
 
 def _short(error: zenoh.ZError) -> str:
-    """The part of zenoh's message that a person can use: the operating system's, if there is one."""
+    """Return the useful part of zenoh's message: the operating system's, if there is one."""
     found = re.search(r"[A-Z][A-Za-z ]+ \(os error \d+\)", str(error))
     return found.group() if found else re.sub(r" at \S+\.rs:\d+\S*", "", str(error).splitlines()[0])[:200]

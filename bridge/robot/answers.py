@@ -1,4 +1,4 @@
-"""What an order is decided by, and what was answered: one that comes again is carried out once."""
+"""Answers to commands, stored so that a command that comes again is carried out once."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from stopgo.mission.run.states import Run
 
 
 def answered(journal: Journal, order: Order, run: Run) -> Answer | None:
-    """The answer that this very order got before; another order under its id is refused."""
+    """Return the earlier answer to this same command; another command under its id is refused."""
     before = journal.answer(order.cmd_id)
     if before is None:
         return None
     sha256, answer = before
     if sha256 == _sha256(order):
         return answer
-    reused = Refused("id_reused", f"command id {order.cmd_id} was used for another order")
+    reused = Refused("id_reused", f"command id {order.cmd_id} was used for another command")
     return answer_to(order, reused, run)
 
 
 def answer_to(order: Order, refused: Refused | None, run: Run) -> Answer:
-    """What is answered to an order, and what the run is then."""
+    """Return the answer to a command, with the state of the run after it."""
     return Answer(
         cmd_id=order.cmd_id, verb=order.verb, outcome="refused" if refused else "ok",
         reason=refused.reason if refused else None, message=refused.message if refused else "",
@@ -37,17 +37,17 @@ def answer_to(order: Order, refused: Refused | None, run: Run) -> Answer:
 
 
 def remember_answer(journal: Journal, order: Order, answer: Answer, *, keep: int = ANSWERS_KEPT) -> None:
-    """Store it with the order it belongs to, and forget all but the newest."""
+    """Store an answer with the hash of its command, and delete all but the newest."""
     with journal.transaction():
         journal.store_answer(_sha256(order), answer)
         journal.forget_answers(keep=keep)
 
 
-def situation_of(journal: Journal, mission: Mission | None, **seen: Any) -> Situation:
-    """All that an order is decided by: what is seen now, and what the journal knows of it."""
+def situation_of(journal: Journal, mission: Mission | None, **observed: Any) -> Situation:
+    """Return all that a decision depends on: what was `observed`, and what the journal has."""
     has_run = mission is not None and journal.has_run(mission.id, mission.revision)
     lease, new_run_id = journal.fact("lease", Lease), uuid.uuid4().hex[:12]
-    return Situation(mission=mission, has_run=has_run, lease=lease, new_run_id=new_run_id, **seen)
+    return Situation(mission=mission, has_run=has_run, lease=lease, new_run_id=new_run_id, **observed)
 
 
 def _sha256(order: Order) -> str:

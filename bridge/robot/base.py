@@ -1,4 +1,4 @@
-"""What the controller needs of a robot and of a scanner: two small interfaces, so that each is one class."""
+"""The two interfaces of the controller to its hardware: a base and a scanner."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ Outcome = Literal["arrived", "interrupted", "blocked"]
 
 
 class Rest(msgspec.Struct, frozen=True, kw_only=True):
-    """By how much the poses of a base that stands still differ: what its localisation makes of standing."""
+    """Greatest difference between two poses of a base at standstill; it depends on the localisation."""
 
     metres: float = 0.002
     radians: float = 0.002
 
 
 class BaseHealth(msgspec.Struct, frozen=True, kw_only=True):
-    """What a base tells of itself besides its battery; each thing is `None` where it does not."""
+    """Health of a base besides its battery; each value is `None` if the base does not report it."""
 
     localisation: float | None = None
-    """How well it knows where it is, 0 to 1."""
+    """Quality of the localisation, 0 to 1."""
     emergency_stop: bool | None = None
     safety_field: bool | None = None
-    """Whether something stands in the field that its safety scanners watch."""
+    """True if an object is in the field of its safety scanners."""
 
 
 class Base(Protocol):
-    """What carries the scanner. Poses are in the mission's frame."""
+    """The vehicle that carries the scanner. Poses are in the mission's frame."""
 
     def pose(self) -> Pose: ...
 
@@ -44,30 +44,30 @@ class Base(Protocol):
         """0 to 1."""
 
     def health(self) -> BaseHealth:
-        """What else is known of it now."""
+        """Return the health besides the battery."""
 
     def endurance_s(self) -> float | None:
-        """Seconds that a full battery lasts at work; `None` if it cannot tell."""
+        """Return the seconds that a full battery lasts at work; `None` if unknown."""
 
     def rest(self) -> Rest:
-        """What counts as standing still while a robot settles."""
+        """Return the limits within which the base counts as stationary."""
 
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:
-        """Drive along `path`, turn to `heading`, and stand still; also when `interrupt` is set meanwhile."""
+        """Drive along `path`, turn to `heading`, and stop; stop early when `interrupt` is set."""
 
     def stop(self) -> None:
-        """Stand still, whatever was going on (after a reboot the wheels may still turn)."""
+        """Stand still, whatever the base is doing (after a reboot the wheels may still turn)."""
 
     def unfit(self, mission: Mission) -> str:
-        """Why it can never drive this mission; empty if it can."""
+        """Return why the base can never drive this mission; empty if it can."""
 
     def not_ready(self) -> str:
-        """Why it cannot drive at present; empty if it can."""
+        """Return why the base cannot drive at present; empty if it can."""
 
     def blocked_by(self) -> str:
-        """What ended the last drive as blocked, if more is known than where; else empty."""
+        """Return the cause of the last blocked drive; empty if unknown."""
 
 
 class Scanner(Protocol):
@@ -75,8 +75,8 @@ class Scanner(Protocol):
         """Scan, and give up when `interrupt` is set or `scan.timeout_s` has passed."""
 
     def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
-        """How a scan ended that was begun before the program was started anew; `None` if it cannot say."""
+        """Return the outcome of a scan that began before the program restarted; `None` if unknown."""
 
     @property
     def profiles(self) -> tuple[str, ...] | None:
-        """Scan profiles it knows; `None` if it takes any."""
+        """Names of the scan profiles; `None` if the scanner accepts any."""

@@ -1,4 +1,4 @@
-"""Where a mission arrives on the robot: announced, in pieces, and then taken whole or not at all."""
+"""Arrival of missions at the robot: announced, received in chunks, then accepted whole or not at all."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from stopgo.mission.document import Mission, digest_of
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.run.orders import Reason
 
-MOST_REASONS = 20
-"""Reasons told of one mission that cannot be run."""
+MAX_REASONS = 20
+"""Most reasons in the rejection of one mission."""
 
 
 class Inbox:
@@ -68,20 +68,20 @@ class Inbox:
         return Malformed(message=f"no such step: {'/'.join(step)}")
 
     def _begin(self, mission_id: str, manifest: Manifest) -> Reply:
-        refusal = self._unwelcome(mission_id, manifest)
+        refusal = self._refusal_of(mission_id, manifest)
         if refusal:
             return refusal
         if self._holds(manifest):
             return Ready(held=tuple(range(manifest.chunks)))
-        self._journal.drop_pieces()
-        shortage = self._journal.room_for(manifest.size)
+        self._journal.missions.drop_unused_chunks()
+        shortage = self._journal.space_shortage(manifest.size)
         if shortage:
             return _no("storage", shortage)
-        if self._journal.transfer(mission_id) != manifest:
-            self._journal.begin_transfer(manifest)
-        return Ready(held=self._journal.chunks_held(manifest))
+        if self._journal.missions.transfer(mission_id) != manifest:
+            self._journal.missions.begin_transfer(manifest)
+        return Ready(held=self._journal.missions.received_chunks(manifest))
 
-    def _unwelcome(self, mission_id: str, manifest: Manifest) -> Rejected | None:
+    def _refusal_of(self, mission_id: str, manifest: Manifest) -> Rejected | None:
         if manifest.mission_id != mission_id:
             return _no("wrong_mission", f"the manifest is for mission {manifest.mission_id}")
         if not 0 < manifest.size <= MAX_DOCUMENT_BYTES:
@@ -93,7 +93,7 @@ class Inbox:
         return self._outdated(mission_id, manifest)
 
     def _outdated(self, mission_id: str, manifest: Manifest) -> Rejected | None:
-        held = self._journal.newest_revision(mission_id)
+        held = self._journal.missions.newest_manifest(mission_id)
         if held is None or held.revision < manifest.revision:
             return None
         if (held.revision, held.digest) == (manifest.revision, manifest.digest) or self._holds(manifest):
@@ -109,29 +109,29 @@ class Inbox:
         )
 
     def _holds(self, manifest: Manifest) -> bool:
-        """Whether this very mission is stored; its bytes may have been written with other spaces."""
-        held = self._journal.held(manifest.mission_id, manifest.revision)
+        """True if this same mission is stored; its bytes may differ in white space."""
+        held = self._journal.missions.manifest(manifest.mission_id, manifest.revision)
         return held is not None and held.digest == manifest.digest
 
     def _chunk(self, mission_id: str, number: int, request: Request) -> Reply:
-        manifest = self._journal.transfer(mission_id)
+        manifest = self._journal.missions.transfer(mission_id)
         if manifest is None or request.parameters.get("of") != manifest.sha256:
-            return _no("incomplete", "no such transfer is under way; begin it again")
+            return _no("incomplete", "no such transfer is open; begin it again")
         if number >= manifest.chunks:
             return _no("incomplete", f"chunk {number}: there are {manifest.chunks}")
         last = manifest.size - manifest.chunk_bytes * (manifest.chunks - 1)
         expected = last if number == manifest.chunks - 1 else manifest.chunk_bytes
         if len(request.payload) != expected:
             return _no("incomplete", f"chunk {number} has {len(request.payload)} bytes, not {expected}")
-        shortage = self._journal.room_for(len(request.payload))
+        shortage = self._journal.space_shortage(len(request.payload))
         if shortage:
             return _no("storage", shortage)
-        self._journal.store_chunk(manifest, number, request.payload)
+        self._journal.missions.store_chunk(manifest, number, request.payload)
         return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
 
     def _commit(self, mission_id: str, commit: Commit) -> Reply:
         manifest = commit.manifest
-        refusal = self._unwelcome(mission_id, manifest)
+        refusal = self._refusal_of(mission_id, manifest)
         if refusal:
             return refusal
         already = self._holds(manifest)
@@ -139,25 +139,25 @@ class Inbox:
         if isinstance(mission, Rejected):
             return mission
         refusal = self._controller.take(commit, mission)
-        with suppress(sqlite3.OperationalError):  # there is no room to forget: another time
-            self._journal.drop_pieces()
+        with suppress(sqlite3.OperationalError):  # a full disk cannot delete: the next commit will
+            self._journal.missions.drop_unused_chunks()
         return refusal or Accepted(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest,
             already=already, waits=self._controller.waits(mission),
         )  # fmt: skip
 
     def _stored(self, manifest: Manifest) -> Mission | Rejected:
-        stored = self._journal.mission(manifest.mission_id, manifest.revision)
+        stored = self._journal.missions.read(manifest.mission_id, manifest.revision)
         assert stored is not None
         return self._read(stored[1], manifest)
 
     def _received(self, manifest: Manifest) -> Mission | Rejected:
-        """The mission that has arrived in chunks, if they are all there and give the right hash."""
-        document = b"".join(self._journal.pieces(manifest))
+        """Return the mission that has arrived, if its chunks are complete and have the right hash."""
+        document = b"".join(self._journal.missions.chunks(manifest))
         if len(document) != manifest.size:
             return _no("incomplete", f"{len(document)} of {manifest.size} bytes have arrived")
         if hashlib.sha256(document).hexdigest() != manifest.sha256:
-            self._journal.end_transfer(manifest)
+            self._journal.missions.end_transfer(manifest)
             return _no("digest", "what arrived has another sha256 than the manifest; push it again")
         return self._read(document, manifest)
 
@@ -176,12 +176,12 @@ class Inbox:
             manifest.mission_id, manifest.revision, manifest.digest,
         ):  # fmt: skip
             return _no("digest", "the document's id, revision or digest is not the manifest's")
-        wrong = tuple(islice(what_is_wrong(mission, self.profiles), MOST_REASONS))
+        wrong = tuple(islice(what_is_wrong(mission, self.profiles), MAX_REASONS))
         return Rejected(reason="infeasible", messages=wrong) if wrong else mission
 
 
 def what_is_wrong(mission: Mission, profiles: tuple[str, ...] | None) -> Iterator[str]:
-    """Why this robot cannot run the mission; nothing if it can."""
+    """Yield the reasons why this robot cannot run the mission; none if it can."""
     yield from map(str, problems_of(mission))
     for stop in mission.stops:
         if profiles is not None and stop.scan.profile not in profiles:

@@ -1,4 +1,4 @@
-"""The tables of a journal, and how one that an older stopgo wrote is brought up to date."""
+"""Tables of a journal, and the conversion of a journal that an older stopgo wrote."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import sqlite3
 import msgspec
 
 from stopgo.bridge.link.protocol import CHUNK_BYTES
-from stopgo.bridge.robot.sealed_rows import SEALED, DamagedRow, put, seal_of, sealed
+from stopgo.bridge.robot.hashed_rows import HASHED_TABLES, DamagedRow, read_rows, row_hash, write_row
 
 FORMAT = 3
-"""Of the journal: 1 had no hashes, 2 held each mission in one row; a newer one is refused."""
+"""Format of the journal: 1 had no hashes, 2 had each mission in one row; a newer one is refused."""
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL);
@@ -31,21 +31,21 @@ CREATE TABLE IF NOT EXISTS chunks (
     document INTEGER NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, seal BLOB NOT NULL,
     PRIMARY KEY (document, number));
 """
-"""`document` numbers a mission's JSON, which lies in `chunks`; 0: only the mission's name has been kept."""
+"""`document` is the number of a mission's JSON in `chunks`; 0: only the mission's name is still stored."""
 
 
 def make_tables(connection: sqlite3.Connection) -> None:
-    """Make those that are not there; part of the transaction that is under way, if one is."""
+    """Make the tables that do not exist; part of the open transaction, if there is one."""
     for statement in filter(str.strip, TABLES.split(";")):
         connection.execute(statement)
 
 
 def bring_up_to_date(connection: sqlite3.Connection) -> None:
-    """Write an older journal's rows as this program does, in the transaction that is under way.
+    """Convert an older journal's rows to this format, in the open transaction.
 
     Raises
     ------
-    Damaged
+    DamagedRow
         If the journal is a newer program's, or damaged.
     """
     (found,) = connection.execute("PRAGMA user_version").fetchone()
@@ -53,12 +53,12 @@ def bring_up_to_date(connection: sqlite3.Connection) -> None:
         raise DamagedRow(
             f"a newer stopgo wrote it (format {found}; this one reads up to {FORMAT}); update stopgo"
         )
-    for table in SEALED:
+    for table in HASHED_TABLES:
         names = columns_of(connection, table)
         if "seal" not in names:
-            _seal_all(connection, table, len(names))
+            _hash_all(connection, table, len(names))
     if "sha256" in columns_of(connection, "chunks"):
-        _cut_missions(connection)
+        _divide_missions(connection)
     if found < FORMAT:
         connection.execute(f"PRAGMA user_version = {FORMAT}")
 
@@ -67,29 +67,29 @@ def columns_of(connection: sqlite3.Connection, table: str) -> list[str]:
     return [name for _, name, *_ in connection.execute(f"PRAGMA table_info({table})")]
 
 
-def _seal_all(connection: sqlite3.Connection, table: str, columns: int) -> None:
+def _hash_all(connection: sqlite3.Connection, table: str, columns: int) -> None:
     connection.execute(f"ALTER TABLE {table} ADD COLUMN seal BLOB NOT NULL DEFAULT x''")
     for row in connection.execute(f"SELECT rowid, * FROM {table}").fetchall():
-        seal = seal_of(table, row[1 : columns + 1])
-        connection.execute(f"UPDATE {table} SET seal = ? WHERE rowid = ?", (seal, row[0]))
+        hashed = row_hash(table, row[1 : columns + 1])
+        connection.execute(f"UPDATE {table} SET seal = ? WHERE rowid = ?", (hashed, row[0]))
 
 
-def _cut_missions(connection: sqlite3.Connection) -> None:
-    """Lay whole missions down in pieces, and number the documents; a push that was under way begins anew."""
-    missions = sealed(connection, "missions", "ORDER BY rowid")
+def _divide_missions(connection: sqlite3.Connection) -> None:
+    """Store whole missions in chunks, and number the documents; an unfinished push begins again."""
+    missions = read_rows(connection, "missions", "ORDER BY rowid")
     for table in ("missions", "transfers", "chunks"):
-        sealed(connection, table, "")
+        read_rows(connection, table, "")
         connection.execute(f"DROP TABLE {table}")
     make_tables(connection)
     for document, (mission_id, revision, manifest, data) in enumerate(missions, start=1):
-        put(connection, "missions", mission_id, revision, manifest, document if data else 0)
+        write_row(connection, "missions", mission_id, revision, manifest, document if data else 0)
         chunk_bytes = msgspec.json.decode(manifest)["chunk_bytes"]
-        put_pieces(connection, document, data, chunk_bytes)
+        put_chunks(connection, document, data, chunk_bytes)
 
 
-def put_pieces(
+def put_chunks(
     connection: sqlite3.Connection, document: int, data: bytes, chunk_bytes: int = CHUNK_BYTES
 ) -> None:
-    """Lay a whole document down in pieces."""
+    """Store a whole document in chunks."""
     for number, start in enumerate(range(0, len(data), chunk_bytes)):
-        put(connection, "chunks", document, number, data[start : start + chunk_bytes])
+        write_row(connection, "chunks", document, number, data[start : start + chunk_bytes])

@@ -1,7 +1,7 @@
-"""Turns the poses of a robot's own map into the mission's frame, and paths the other way.
+"""Rotation and shift between the mission's frame and the map of a robot.
 
-A building's drawing and the map a robot has made of it share scale but not origin or direction. Everything
-behind this edge speaks the mission's frame; only the base itself speaks the map's.
+A building's drawing and the map a robot has made of it share scale but not origin or direction. Only
+the base itself uses the map's frame; all other code uses the mission's.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from stopgo.mission.run.events import Pose
 
 
 class OnMap:
-    """A base that is driven in the mission's frame and drives in its own map."""
+    """A base with poses and paths in the mission's frame; the base inside drives in its own map."""
 
     def __init__(self, base: Base, own: Transform | None = None) -> None:
         self._base = base
@@ -27,7 +27,7 @@ class OnMap:
         self.to_map = own or SAME
 
     def take(self, mission: Mission) -> None:
-        """Turn as the mission says, unless the robot was told how to turn."""
+        """Use the mission's transform, unless the robot was given one."""
         self.to_map = self._own or mission.frame.to_map or SAME
 
     def pose(self) -> Pose:
@@ -69,18 +69,18 @@ class OnMap:
 
 
 def turned_point(point: Point, to_map: Transform) -> Point:
-    """Site to map: turned by `heading`, then shifted."""
+    """Transform a point from the site to the map: rotated by `heading`, then shifted."""
     return frame_transform.to_map_point(to_map, point)
 
 
 def turned(pose: Pose, to_map: Transform) -> Pose:
-    """A pose of the site on the map."""
+    """Transform a pose from the site to the map."""
     x, y = turned_point((pose.x, pose.y), to_map)
     return Pose(x=x, y=y, heading=math.remainder(pose.heading + to_map.heading, math.tau))
 
 
 def turned_back(pose: Pose, to_map: Transform) -> Pose:
-    """A pose of the map in the site's frame; exactly itself where there is nothing to turn."""
+    """Transform a pose from the map to the site; without a transform it is returned unchanged."""
     if to_map == SAME:
         return pose
     x, y = frame_transform.from_map_point(to_map, (pose.x, pose.y))

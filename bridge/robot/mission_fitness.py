@@ -1,4 +1,4 @@
-"""Whether a robot can take a mission: by its base, during its present run, and with its battery."""
+"""Fitness of a robot for a mission: by its base, its current run and its battery."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stopgo.mission.run.states import Run
 def why_unfit(
     mission: Mission, *, base: Base, run: Run, held: Mission | None, revisions: RevisionPolicy
 ) -> Refused | None:
-    """Why a mission cannot be taken; `None` if it can. `held` is the mission of the run."""
+    """Return why a mission cannot be accepted; `None` if it can. `held` is the mission of the run."""
     unfit = base.unfit(mission)
     if unfit:
         return Refused("infeasible", unfit)
@@ -24,7 +24,7 @@ def why_unfit(
 
 
 def _unfit_now(mission: Mission, run: Run, held: Mission, revisions: RevisionPolicy) -> Refused | None:
-    """Why the run cannot go on by `mission` from the next stop on."""
+    """Return why the run cannot follow `mission` from the next stop on."""
     if mission.id != held.id:
         return Refused("running", f"the robot is {run.state} with mission {held.id}")
     if revisions == "refuse":
@@ -42,11 +42,11 @@ def _too_long(mission: Mission, base: Base, *, first: int) -> Refused | None:
 
 
 def follows(run: Run, mission: Mission) -> bool:
-    """Whether this is the mission to be run already, now or from the next stop on."""
+    """True if the run follows this mission already, or will from the next stop on."""
     return run.mission_id == mission.id and mission.revision in (run.revision, run.next_revision)
 
 
-def weighed_by(run: Run) -> tuple[object, ...]:
-    """What of a run decides whether a mission can be taken; a pause changes none of it."""
+def fitness_inputs(run: Run) -> tuple[object, ...]:
+    """Return the values of a run that fitness depends on; a pause changes none of them."""
     wanted = (run.mission_id, run.revision, run.next_revision)
     return (*wanted, run.run_id, run.at, run.over, run.homing, run.then)

@@ -1,8 +1,7 @@
-"""Reads a mission of any length in such a way that a stop given meanwhile is heard.
+"""Reading of a mission of any length without delay for a pause or an abort that comes meanwhile.
 
-One call that decodes ten megabytes keeps every other thread of the program from going on for a quarter of a
-second, and a collection of its million parts for another tenth. So stops are read one by one, and nothing is
-collected until they are.
+One call that decodes ten megabytes blocks every other thread for a quarter of a second. Garbage collection
+of its million objects takes another tenth. So stops are read one by one, with the collector off.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ class MissionOfRawStops(Mission, frozen=True, kw_only=True):
 
 
 def read_mission(document: bytes) -> Mission:
-    """The mission in its JSON.
+    """Return the mission in its JSON.
 
     Raises
     ------
     msgspec.DecodeError, UnicodeDecodeError, RecursionError
-        If it is none.
+        If it is not a mission.
     """
-    with _nothing_collected():
+    with _collector_off():
         raw = msgspec.json.decode(document, type=MissionOfRawStops)
         stops = tuple(_stop(number, body) for number, body in enumerate(raw.stops))
         return Mission(**(msgspec.structs.asdict(raw) | {"stops": stops}))
@@ -43,25 +42,25 @@ def _stop(number: int, body: msgspec.Raw) -> Stop:
     try:
         return _STOP.decode(body)
     except msgspec.ValidationError as error:
-        told = str(error)
+        message = str(error)
         where = f"$.stops[{number}]"
-        told = told.replace("`$", f"`{where}", 1) if "`$" in told else f"{told} - at `{where}`"
-        raise msgspec.ValidationError(told) from None
+        message = message.replace("`$", f"`{where}", 1) if "`$" in message else f"{message} - at `{where}`"
+        raise msgspec.ValidationError(message) from None
 
 
-MANY_PARTS = 20_000
-"""So many new parts are collected in some 2 ms, and need no care."""
+MANY_OBJECTS = 20_000
+"""The garbage collector handles this many new objects in about 2 ms."""
 
 
 @contextmanager
-def _nothing_collected() -> Iterator[None]:
-    """Where much is read meanwhile it counts as old at once: the next quick collection passes it over."""
+def _collector_off() -> Iterator[None]:
+    """Collect no garbage in the block; many new objects count as old after it, so collections skip them."""
     collects = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if gc.get_count()[0] > MANY_PARTS and not gc.get_freeze_count():  # unfreezing is of all or nothing
+        if gc.get_count()[0] > MANY_OBJECTS and not gc.get_freeze_count():  # unfreezing is all or nothing
             gc.freeze()
             gc.unfreeze()
         if collects:

@@ -1,4 +1,4 @@
-"""How a differential drive follows a polyline: it turns in place at corners and runs straight between them.
+"""Motion of a differential drive along a polyline: it turns in place at corners and drives straight between.
 
 A straight of length L at speed v and acceleration a takes L/v + v/a when L >= v²/a (trapezoid), else
 2·sqrt(L/a) (triangle); a turn takes angle / turn rate.
@@ -42,7 +42,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class Straight:
-    """A straight run from standstill to standstill."""
+    """A straight drive from standstill to standstill."""
 
     start: Pose
     length: float
@@ -72,7 +72,7 @@ class Straight:
 
 @dataclass(frozen=True)
 class Brake:
-    """Coming to a stand from `speed`."""
+    """Braking from `speed` to standstill."""
 
     start: Pose
     speed: float
@@ -116,7 +116,7 @@ def along(
     turn_rate: float,
     acceleration: float,
 ) -> Motion:
-    """The motion from `start` through the points of `path`, ending turned to `heading` if given."""
+    """Return the motion from `start` through the points of `path`, and a final turn to `heading` if given."""
     phases: list[Phase] = []
     at = start
     for x, y in path:
@@ -133,7 +133,7 @@ def along(
 
 
 def ahead(pose: Pose, distance: float) -> Pose:
-    """The pose `distance` metres straight ahead."""
+    """Return the pose `distance` metres straight ahead."""
     return Pose(
         x=pose.x + distance * math.cos(pose.heading),
         y=pose.y + distance * math.sin(pose.heading),
@@ -142,5 +142,5 @@ def ahead(pose: Pose, distance: float) -> Pose:
 
 
 def wrapped(angle: float) -> float:
-    """The angle within [-π, π]."""
+    """Return the angle within [-π, π]."""
     return math.remainder(angle, math.tau)

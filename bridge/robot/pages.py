@@ -1,4 +1,4 @@
-"""What is asked for page by page: past events, past poses, and the pieces of a stored mission."""
+"""Answers in pages: past events, past poses, and the parts of a stored mission."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from stopgo.bridge.robot.journal import Journal
 from stopgo.mission.run.events import PoseReport
 
 POSES_KEPT = 3000
-"""For stations that come late or were cut off."""
+"""Poses in memory, for stations that come late or were disconnected."""
 
 
 def events_page(journal: Journal, request: Request) -> Reply:
-    """Events since a number, of one run if the request names it."""
+    """Return the events above a number, of one run if the request names it."""
     try:
         since = count_of(request.parameters.get("since", "0"))
     except ValueError as error:
@@ -39,7 +39,7 @@ def events_page(journal: Journal, request: Request) -> Reply:
 
 
 def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> Reply:
-    """Poses since a number, of one run if the request names it."""
+    """Return the poses above a number, of one run if the request names it."""
     try:
         since = count_of(request.parameters.get("since", "0"))
     except ValueError as error:
@@ -50,21 +50,21 @@ def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> R
 
 
 def part_page(journal: Journal, request: Request) -> Reply:
-    """A piece of a stored mission, asked for on `…/mission/<id>/part/<number>`."""
+    """Return the part of a stored mission that is requested on `…/mission/<id>/part/<number>`."""
     mission_id, step = address_of(request.key)
     try:
         number, revision = count_of(step[1]), count_of(request.parameters.get("revision", ""))
     except ValueError as error:
         return Malformed(message=f"{'/'.join(step)}: {error}")
-    manifest = journal.held(mission_id, revision)
+    manifest = journal.missions.manifest(mission_id, revision)
     if manifest is None:
         message = f"mission {mission_id} revision {revision} is not on this robot"
         return Rejected(reason="no_mission", messages=(message,))
-    data = journal.part(manifest, number * CHUNK_BYTES, CHUNK_BYTES)
+    data = journal.missions.part(manifest, number * CHUNK_BYTES, CHUNK_BYTES)
     return MissionPart(manifest=manifest, index=number, data=data)
 
 
 def address_of(key: str) -> tuple[str, list[str]]:
-    """Mission id and step of `…/sx/1/<robot>/mission/<id>/<step…>`."""
+    """Return mission id and step of `…/sx/1/<robot>/mission/<id>/<step…>`."""
     _, mission_id, *step = parts_of(key)
     return mission_id, step

@@ -1,4 +1,4 @@
-"""What a robot has done and its journal could not take: stored as soon as there is room again."""
+"""Events and answers that the journal could not take; they are stored when the disk has space again."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stopgo.mission.run.orders import Answer, Order
 
 
 class PendingWrites:
-    """Events and answers in the order in which they came to be; gone if the power fails before."""
+    """Events and answers in their order, in memory only: lost if the power fails before they are stored."""
 
     def __init__(self) -> None:
         self._events: list[AnyEvent] = []
@@ -28,12 +28,12 @@ class PendingWrites:
             self._answers[order.cmd_id] = (order, answer)
 
     def answered(self, order: Order) -> Answer | None:
-        """The answer that this very order got."""
+        """Return the answer to this same command; `None` if there is none."""
         before = self._answers.get(order.cmd_id)
         return before[1] if before is not None and before[0] == order else None
 
     def store(self, journal: Journal) -> None:
-        """Write all of it, in the caller's transaction; `clear` once that has come to be."""
+        """Write all of it in the caller's transaction; call `clear` after the commit."""
         for event in self._events:
             journal.append(event)
         for order, answer in self._answers.values():

@@ -1,4 +1,4 @@
-"""A base and a scanner of somebody's own: `stopgo robot --controller package.module:function`."""
+"""A third-party base and scanner: `stopgo robot --controller package.module:function`."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ from stopgo.mission.run.scans import ScanFailed, ScanResult
 T = TypeVar("T")
 
 OURS: dict[str, Any] = {"sim": None, "mavlink:URL": None}
-"""What `--controller` takes besides."""
-NOT_EVERYONES = ("health", "scan_outcome")
-"""What a base or a scanner need not tell."""
+"""Values of `--controller` that need no plugin."""
+OPTIONAL = ("health", "scan_outcome")
+"""Methods that a base or a scanner may lack."""
+FORMER_SCAN_OUTCOME = "what_became"
+"""Older name of `scan_outcome`."""
 
 
 @dataclass(frozen=True)
 class PluginBody:
-    """What another's function gives: `function(state: Path) -> (base, scanner)`."""
+    """Base and scanner that a plugin's function returns: `function(state: Path) -> (base, scanner)`."""
 
     made: Variant[Any]
     state: Path
@@ -42,14 +44,14 @@ class PluginBody:
         made = self.made
         base, scanner = made.several(made.called(self.state), "base, scanner")
         for given, protocol in ((base, Base), (scanner, Scanner)):
-            asked = [name for name in _asked_of(protocol) if name not in NOT_EVERYONES]
-            missing = [name for name in asked if not hasattr(given, name)]
+            required = [name for name in _methods_of(protocol) if name not in OPTIONAL]
+            missing = [name for name in required if not hasattr(given, name)]
             if missing:
                 raise made.wrong(
                     f"its {type(given).__name__} is no {protocol.__name__}: it lacks {', '.join(missing)}"
                 )
         guarded = GuardedBase(made, base)
-        guarded.pose()  # a base that cannot tell where it is at the start is refused
+        guarded.pose()  # a base without a pose at the start is refused
         if guarded.fault:
             raise InputError(guarded.fault)
         on_map = OnMap(guarded, self.to_map)
@@ -57,26 +59,26 @@ class PluginBody:
 
 
 def plugin_body(name: str, state: Path, to_map: Transform | None = None) -> PluginBody:
-    """The body of a controller of this name, loaded; raises InputError if there is none."""
+    """Load the controller of this name; raises InputError if there is none."""
     return PluginBody(variant("controller", name, OURS, said=f"--controller {name}"), state, to_map)
 
 
-def _asked_of(protocol: type) -> list[str]:
+def _methods_of(protocol: type) -> list[str]:
     return [name for name in vars(protocol) if not name.startswith("_")]
 
 
 class GuardedBase:
-    """Another's base. Once it has failed it drives no more, and says why; orders are still heard."""
+    """A third-party base. Once it has failed it drives no more, and reports why."""
 
     def __init__(self, made: Variant[Any], base: Base) -> None:
         self.fault = ""
-        """What went wrong first; empty if nothing has."""
+        """The first failure; empty if there was none."""
         self._made = made
         self._base = base
         self._last = Pose(x=0.0, y=0.0, heading=0.0)
 
     def _tried(self, call: Callable[[], T], otherwise: T, right: Callable[[T], bool]) -> T:
-        """What the base answers, or `otherwise` where it fails or answers nonsense."""
+        """Return the base's answer, or `otherwise` if it fails or the answer is not `right`."""
         try:
             with self._made.named_errors():
                 answer = call()
@@ -88,7 +90,7 @@ class GuardedBase:
             return otherwise
 
     def pose(self) -> Pose:
-        """Where it is; where it last was known to be, if it no longer tells."""
+        """Return the pose; the last known one if the base fails."""
         self._last = self._tried(self._base.pose, self._last, _is_pose)
         return self._last
 
@@ -96,16 +98,18 @@ class GuardedBase:
         return self._tried(self._base.speed, 0.0, _is_number)
 
     def battery(self) -> float:
-        return self._tried(self._base.battery, 0.0, lambda share: _is_number(share) and 0 <= share <= 1)
+        return self._tried(self._base.battery, 0.0, lambda level: _is_number(level) and 0 <= level <= 1)
 
     def health(self) -> BaseHealth:
-        """What it tells of itself; nothing, where it has no such word."""
+        """Return the base's health; an empty one if it has no such method."""
         if not hasattr(self._base, "health"):
             return BaseHealth()
         return self._tried(self._base.health, BaseHealth(), _is_health)
 
     def endurance_s(self) -> float | None:
-        return self._tried(self._base.endurance_s, None, lambda told: told is None or _is_number(told))
+        return self._tried(
+            self._base.endurance_s, None, lambda seconds: seconds is None or _is_number(seconds)
+        )
 
     def rest(self) -> Rest:
         return self._tried(self._base.rest, Rest(), lambda rest: isinstance(rest, Rest))
@@ -113,7 +117,7 @@ class GuardedBase:
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:
-        """Drive, unless it has failed before; a failure on the way stops it and blocks the way."""
+        """Drive, unless the base has failed before; a failure meanwhile stops it, and the path is blocked."""
         if self.fault:
             return "blocked"
         blocked: Outcome = "blocked"
@@ -127,7 +131,7 @@ class GuardedBase:
         return outcome
 
     def stop(self) -> None:
-        """Stand still: asked of it also after it has failed."""
+        """Stop the base, also after it has failed."""
         self._tried(self._base.stop, None, lambda _: True)
 
     def unfit(self, mission: Mission) -> str:
@@ -141,14 +145,14 @@ class GuardedBase:
 
 
 class GuardedScanner:
-    """Another's scanner: a scan in which it fails has failed."""
+    """A third-party scanner. If it raises an error, the scan has failed."""
 
     def __init__(self, made: Variant[Any], scanner: Scanner) -> None:
         self._made = made
         self._scanner = scanner
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
-        """A scan's result, or why there is none."""
+        """Scan, and return the result or the failure."""
         try:
             with self._made.named_errors():
                 result = self._scanner.scan(label, scan, interrupt=interrupt)
@@ -159,12 +163,14 @@ class GuardedScanner:
             return ScanFailed(reason=str(error))
 
     def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
-        """What it says of a scan that was cut off; nothing, where it has no such word."""
-        if not hasattr(self._scanner, "scan_outcome"):
+        """Return the outcome of an interrupted scan; `None` if the scanner has no such method."""
+        former = getattr(self._scanner, FORMER_SCAN_OUTCOME, None)
+        scan_outcome = getattr(self._scanner, "scan_outcome", former)
+        if scan_outcome is None:
             return None
         try:
             with self._made.named_errors():
-                result = self._scanner.scan_outcome(label)
+                result = scan_outcome(label)
         except InputError:
             return None
         return result if isinstance(result, ScanResult | ScanFailed) else None
@@ -174,21 +180,25 @@ class GuardedScanner:
         return self._scanner.profiles
 
 
-def _is_number(told: object) -> bool:
-    return isinstance(told, int | float) and not isinstance(told, bool) and math.isfinite(told)
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _is_health(told: object) -> bool:
-    if not isinstance(told, BaseHealth):
+def _is_health(value: object) -> bool:
+    if not isinstance(value, BaseHealth):
         return False
-    share = told.localisation
-    flags = (told.emergency_stop, told.safety_field)
-    return (share is None or (_is_number(share) and 0 <= share <= 1)) and set(flags) <= {None, True, False}
+    good = value.localisation
+    flags = (value.emergency_stop, value.safety_field)
+    return (good is None or (_is_number(good) and 0 <= good <= 1)) and set(flags) <= {
+        None,
+        True,
+        False,
+    }
 
 
-def _is_text(told: object) -> bool:
-    return isinstance(told, str)
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
 
 
-def _is_pose(told: object) -> bool:
-    return isinstance(told, Pose) and all(map(_is_number, (told.x, told.y, told.heading)))
+def _is_pose(value: object) -> bool:
+    return isinstance(value, Pose) and all(map(_is_number, (value.x, value.y, value.heading)))

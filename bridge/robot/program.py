@@ -1,4 +1,4 @@
-"""The robot's process: journal, body, controller and agent put together on one link."""
+"""The robot's process: journal, hardware, controller and agent on one link."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from stopgo.bridge.link.protocol import KeyExpressions, place_of
 from stopgo.bridge.robot.agent import Agent, on_link, others_of
 from stopgo.bridge.robot.controller import Controller, new_boot_id
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import Journal, open_journal
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.robot.recorder import LIMIT_BYTES, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
 from stopgo.bridge.robot.robot_hardware import OpenBody
@@ -30,45 +31,45 @@ from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.revision import RevisionPolicy
 
-LOOK_S = 1.5
-"""How long a robot that joins a router waits for what that one knows."""
-GONE_S = 5.0
-"""After this a token of a robot that does not answer is not waited for."""
+TOKEN_WAIT_S = 1.5
+"""Wait of a robot that joins a router for the tokens that the router knows."""
+TOKEN_END_S = 5.0
+"""Wait for a token to disappear whose robot does not answer."""
 ASK_AGAIN_S = 0.2
 SWITCH_S = 0.0005
-"""How long one thread computes while another waits to: an order waits for its turn some twenty times."""
+"""Time slice of a thread while others wait; a command waits for some twenty slices."""
 
 
 @dataclass(frozen=True)
 class RobotOptions:
-    """How a robot is set up."""
+    """Options of a robot's process."""
 
     name: str
     listen: str
     state: Path
     body: OpenBody
-    """What it drives."""
+    """The robot's hardware."""
     connect: str | None = None
     """A zenoh router to connect to, instead of listening."""
     site: str | None = None
     speed_up: float = 1.0
     to_map: Transform | None = None
-    """Site to map, if the robot knows it; else as each mission says."""
+    """Transform from the site to the map; if not given, each mission's own."""
     insecure: bool = False
     keys: Path | None = None
     """Folder with the robot's keys; required beyond this machine."""
     revisions: RevisionPolicy = "next-stop"
-    """What becomes of a new revision that is pushed during a run."""
+    """Treatment of a new revision that is pushed during a run."""
     record_bytes: int = LIMIT_BYTES
-    """How much of the disk the record of its runs may take."""
+    """Most disk space for the records of its runs."""
     say: Callable[[str], None] = lambda line: None
-    """Tells the person there, or its service's log, what was refused."""
+    """Prints refusals to the person at the robot, or its service's log."""
     faults: Faults = NO_FAULTS
-    """When its program is to crash; what else goes wrong is its body's."""
+    """Simulated crashes of the program; other faults belong to the hardware."""
 
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
-    """Be a robot until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
+    """Run the robot agent until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
     from stopgo.bridge.link.zenoh_link import Guard, joining, listening
 
     signal.signal(signal.SIGTERM, _leave)
@@ -99,39 +100,39 @@ def _serve(
 def check_name_is_free(link: Link, keys: KeyExpressions, router: str) -> None:
     """Refuse to be a second robot of one name behind a router.
 
-    A token alone is that of a robot that has just ended, perhaps: it is gone when its lease is.
+    A token alone proves nothing: a robot that has just ended leaves it until its lease ends.
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         If a robot of this name answers.
     """
-    shown, gone = threading.Event(), threading.Event()
-    link.watch_presence(keys.alive, lambda key, alive: (shown if alive else gone).set())
-    if not shown.wait(LOOK_S):
+    shown, ended = threading.Event(), threading.Event()
+    link.watch_presence(keys.alive, lambda key, alive: (shown if alive else ended).set())
+    if not shown.wait(TOKEN_WAIT_S):
         return
-    deadline = time.monotonic() + GONE_S
-    while not gone.is_set() and time.monotonic() < deadline:
+    deadline = time.monotonic() + TOKEN_END_S
+    while not ended.is_set() and time.monotonic() < deadline:
         others = others_of(link, keys, "")
         if others:
             raise NegativeResult(
-                f"robot {keys.robot}: is alive behind {router} already (boot {others[0]}); two of one name"
-                " cannot be told apart. End the other, or choose another --name"
+                f"robot {keys.robot}: robot name already in use at {router} (boot {others[0]});"
+                " end the other robot, or choose another --name"
             )
-        gone.wait(ASK_AGAIN_S)
+        ended.wait(ASK_AGAIN_S)
 
 
 @contextmanager
 def robot_on(
     link: Link, keys: KeyExpressions, options: RobotOptions, boot_id: str | None = None
 ) -> Iterator[Agent]:
-    """A robot on `link`, which is sealed with the robot's keys if it has any."""
+    """Run a robot on `link`, which signs with the robot's keys if it has any."""
     with open_journal(options.state, options.name) as journal:
         recorder = RunRecorder(
-            options.state / "record", room=journal.room_for, limit_bytes=options.record_bytes
+            options.state / "record", room=journal.space_shortage, limit_bytes=options.record_bytes
         )
         clock, wall = clocks(journal, speed_up=options.speed_up, newest_ns=recorder.newest_ns)
-        journal.edge = crashing(options.faults)
+        journal.rows.commit_hook = crashing(options.faults)
         with options.body(clock) as body:
             recorder.health = body.base.health
             controller = Controller(
@@ -153,10 +154,10 @@ def robot_on(
 def clocks(
     journal: Journal, *, speed_up: float, newest_ns: int = 0, now_ns: int | None = None
 ) -> tuple[Clock, Clock]:
-    """The run's clock and the one that orders count on.
+    """Return the run's clock and the clock of commands.
 
-    A sped-up clock runs ahead of the wall's, and a wall clock may have been set back: after a reboot the
-    run's goes on behind the newest event, and the newest pose of a record, so that neither goes back in time.
+    A sped-up clock runs ahead of the wall clock, and a wall clock may have been set back. So after a reboot
+    the run's clock continues after the newest event and the newest pose of a record.
     """
     wall = WallClock(origin_ns=now_ns)
     origin_ns = max(wall.now_ns(), journal.newest_ns + 1, newest_ns + 1)
@@ -164,25 +165,26 @@ def clocks(
 
 
 def robots_keys(folder: Path, name: str, state: Path | None = None) -> key_files.HeldKeys:
-    """The robot's own keys; anybody else's are refused."""
+    """Read the robot's own keys; raises InputError if they belong to another holder."""
     held = key_files.read_keys(folder, now=key_files.now_utc(), state=state)
     if (held.holder.role, held.holder.name) != ("robot", name):
         raise InputError(
-            f"--keys {folder}: are those of {held.holder.role} {held.holder.name}, not of robot {name}"
+            f"--keys {folder}: keys of {held.holder.role} {held.holder.name}, not of robot {name};"
+            " give the folder of that robot"
         )
     return held
 
 
 def crashing(faults: Faults) -> Callable[[str], None]:
-    """What dies at the journal entry that the faults name, as if the power had failed."""
+    """Return a commit hook that kills the process at the journal entry that the faults name."""
     seen: Counter[str] = Counter()
 
-    def at_edge(moment: str) -> None:
+    def at_commit(moment: str) -> None:
         seen[moment] += 1
         if faults.due("crash" if moment == "commit" else "crashed", seen[moment]):
             os.kill(os.getpid(), signal.SIGKILL)
 
-    return at_edge
+    return at_commit
 
 
 def _leave(signum: int, frame: object) -> None:

@@ -1,7 +1,7 @@
-"""Writes down where the robot was: poses, states and health of each run, for stations that were away.
+"""Recorder of poses, states and health of each run, for stations that were disconnected meanwhile.
 
-Beside the journal and not in it: poses come many times a second, and a record may be let go where an event
-may not. There is a file for each run. Whatever is not in it is told as missing, with the reason.
+The records are not in the journal: poses come many times a second, and a record may be deleted where an
+event may not. Each run has its own file. Whatever is not in it is reported as missing, with the reason.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from stopgo.mission.files.file_name import file_name
 from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport
 
 ENTRY_S = 0.5
-"""How often an entry is written: what a robot that is killed can lose, with the time that takes."""
+"""Interval of entries. A killed robot loses at most this, and the time of one write."""
 LIMIT_BYTES = 512_000_000
-"""Some two hundred hours of runs."""
-MOST_RUNS = 1000
-"""Of older ones not even the name is kept."""
+"""About two hundred hours of runs."""
+MAX_RUNS = 1000
+"""Runs whose names are stored; older ones are deleted entirely."""
 RETIRED = "let go for want of room, as the oldest run that was over"
-KEPT, GONE = ".record", ".retired"
+RECORD_SUFFIX, RETIRED_SUFFIX = ".record", ".retired"
 _NAME = re.compile(r"[0-9]+-.*\.(record|retired)", re.ASCII)
 
 
 class RunRecorder:
     """The records of one robot's runs; every method may be called from any thread.
 
-    `room` says why so many bytes more are too many for the disk; empty if they are not.
+    `room` returns why a number of bytes is too much for the disk; empty if it is not.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class RunRecorder:
         limit_bytes: int = LIMIT_BYTES,
     ) -> None:
         self.health: Callable[[], BaseHealth] = BaseHealth
-        """Asks the base."""
+        """Returns the base's health."""
         self._folder = folder
         self._room = room
         self._limit_bytes = limit_bytes
@@ -54,7 +54,7 @@ class RunRecorder:
         self._open = ExitStack()
         self._run: RunRecord | None = None
         self._past_lock = threading.Lock()
-        """Held while other runs are read, which takes long; the robot's own threads never wait for it."""
+        """Guards the reading of other runs, which takes long; the robot's own threads never wait for it."""
         self._reading = ExitStack()
         self._read: RunRecord | None = None
         self._read_size = 0
@@ -63,14 +63,14 @@ class RunRecorder:
         self._older: dict[Path, int] = {}
         """Files of other runs, oldest first, and their sizes."""
         self._idle = False
-        """Whether there was a time without a run, so that the begin of the next is seen."""
+        """True if there was no run for a time, so that the next one is recorded from its begin."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{folder}: cannot be used for the record ({error.strerror})") from None
 
     def close(self) -> None:
-        """Write what is left, and close the files."""
+        """Write what is pending, and close the files."""
         self._end_run()
         with self._past_lock:
             self._read = None
@@ -83,48 +83,48 @@ class RunRecorder:
             self._open.close()
 
     def idle(self) -> None:
-        """No run is under way: the begin of the next is seen."""
+        """Note that there is no run, so that the next one is recorded from its begin."""
         self._idle = True
 
     def pose(self, report: PoseReport, *, began_ns: int, over: bool) -> None:
-        """Take a pose, if it is of a run; of one that is `over` only the first."""
+        """Add a pose of a run; of a run that is `over` only the first."""
         with self._lock:
             if report.run_id is None or (over and not self._is_of(report.run_id)):
                 self._idle = True
                 return
-            with suppress(OSError):  # a folder that is gone or full: then it is missing
+            with suppress(OSError):  # without the folder, or with a full disk, it is missing
                 run = self._of(report.run_id)
                 run.pose(report, began_ns=began_ns, over=over, seen=self._idle)
             self._idle = self._idle or over
 
     def state(self, report: StateReport) -> None:
-        """Take a state of the run that is recorded."""
+        """Add a state of the run that is recorded."""
         with self._lock:
             if self._run is not None and report.run_id == self._run.run_id:
                 self._run.state(report)
 
     def look(self, *, battery: float, robot_ns: int) -> Health | None:
-        """Take how the base is now; that, if it is not as it was."""
+        """Add the base's health, and return it if it has changed."""
         base = self.health()
         with self._lock:
             if self._run is None:
                 return None
-            told = Health(
+            health = Health(
                 robot_ns=robot_ns, run_id=self._run.run_id, battery=battery,
                 localisation=base.localisation, emergency_stop=base.emergency_stop,
                 safety_field=base.safety_field,
             )  # fmt: skip
-            return told if self._run.health(told) else None
+            return health if self._run.health(health) else None
 
     def write(self) -> None:
-        """Write down what was taken; if there is no room, it is missing."""
+        """Write an entry with what was added; without disk space it is reported as missing."""
         with self._lock:
             if self._run is not None:
                 self._run.write(self._shortage)
 
     @property
     def newest_ns(self) -> int:
-        """Time of the newest pose of all, 0 if there is none: a clock goes on behind it."""
+        """Time of the newest pose in all records, 0 if there is none; clocks continue after it."""
         with self._lock:
             paths = self._paths()
             if not paths:
@@ -133,14 +133,14 @@ class RunRecorder:
                 return RunRecord(_run_in(paths[-1]), file).newest_ns
 
     def answer(self, request: Request) -> Reply:
-        """Entries of the run that a question names, or the runs that there are records of."""
-        told = request.parameters
+        """Return the entries of the run that a request names, or the list of recorded runs."""
+        parameters = request.parameters
         try:
-            since = None if "time" in told else count_of(told.get("since", "0"))
-            robot_ns = count_of(told.get("time", "0"), digits=19)
+            since = None if "time" in parameters else count_of(parameters.get("since", "0"))
+            robot_ns = count_of(parameters.get("time", "0"), digits=19)
         except ValueError as error:
             return Malformed(message=f"since or time: {error}")
-        run_id = told.get("run")
+        run_id = parameters.get("run")
         try:
             return self.index() if run_id is None else self.page(run_id, since, robot_ns=robot_ns)
         except OSError as error:
@@ -148,7 +148,7 @@ class RunRecorder:
             return Rejected(reason="storage", messages=(why,)) if run_id is None else _nothing(run_id, why)
 
     def page(self, run_id: str, since: int | None = 0, *, robot_ns: int = 0) -> RecordPage:
-        """The entries of a run above a number, or of what is later than a time."""
+        """Return the entries of a run above a number, or after a time."""
         with self._lock:
             if self._is_of(run_id) and self._run is not None:
                 return _page(self._run, since, robot_ns)
@@ -156,12 +156,12 @@ class RunRecorder:
             path = next((path for path in self._paths() if _run_in(path) == file_name(run_id)), None)
             if path is None:
                 return RecordPage(run_id=run_id, since=0, entries=(), newest=0)
-            if path.suffix == GONE:
+            if path.suffix == RETIRED_SUFFIX:
                 return _nothing(run_id, RETIRED)
             return _page(self._past(run_id, path), since, robot_ns)
 
     def _past(self, run_id: str, path: Path) -> RunRecord:
-        """The record of another run, which stays open for its next page unless it grows meanwhile."""
+        """Return the record of another run; it stays open for its next page unless it grows."""
         size = path.stat().st_size
         if self._read is None or (self._read.run_id, self._read_size) != (run_id, size):
             self._reading.close()
@@ -170,7 +170,7 @@ class RunRecorder:
         return self._read
 
     def index(self) -> RecordIndex:
-        """The runs that there are records of."""
+        """Return the list of recorded runs."""
         with self._lock:
             run = self._run
         with self._past_lock:
@@ -183,26 +183,28 @@ class RunRecorder:
         if self._counted.get(path, (-1, 0))[0] != size:
             with read_record_file(path) as file:
                 self._counted[path] = size, file.newest
-        return RunKept(run_id=run_id, entries=self._counted[path][1], bytes=size, retired=path.suffix == GONE)
+        return RunKept(
+            run_id=run_id, entries=self._counted[path][1], bytes=size, retired=path.suffix == RETIRED_SUFFIX
+        )
 
     def _is_of(self, run_id: str) -> bool:
         return self._run is not None and self._run.run_id == run_id
 
     def _of(self, run_id: str) -> RunRecord:
-        """The run's own, opened; the one before is over then."""
+        """Return the record of a run, opened; the record of the run before is closed."""
         if self._run is not None and self._run.run_id == run_id:
             return self._run
         self._end_run()
         paths = self._paths()
         number = int(paths[-1].name.partition("-")[0]) + 1 if paths else 1
-        fresh = self._folder / f"{number:06}-{file_name(run_id)}{KEPT}"
+        fresh = self._folder / f"{number:06}-{file_name(run_id)}{RECORD_SUFFIX}"
         path = next((path for path in paths if _run_in(path) == file_name(run_id)), fresh)
         self._older = {older: older.stat().st_size for older in paths if older != path}
         self._run = RunRecord(run_id, self._open.enter_context(open_record_file(path)))
         return self._run
 
     def _shortage(self, size: int) -> str:
-        """Why so many bytes find no room; the oldest runs make it, up to the limit of the record."""
+        """Return why `size` bytes cannot be written; the oldest runs are deleted to keep the limit."""
         short = self._room(size)
         if short:
             return f"no room on the robot's disk: {short}"
@@ -210,9 +212,9 @@ class RunRecorder:
         for path in tuple(self._older):
             if mine + sum(self._older.values()) + size <= self._limit_bytes:
                 break
-            if path.suffix == KEPT:
+            if path.suffix == RECORD_SUFFIX:
                 self._retire(path)
-        for path in tuple(self._older)[:-MOST_RUNS]:
+        for path in tuple(self._older)[:-MAX_RUNS]:
             path.unlink(missing_ok=True)
             del self._older[path]
         if mine + size > self._limit_bytes:
@@ -220,26 +222,26 @@ class RunRecorder:
         return ""
 
     def _retire(self, path: Path) -> None:
-        """Keep no more of a run than that it was."""
+        """Delete the record of a run, except its name."""
         with path.open("wb"):
-            gone = path.with_suffix(GONE)
-        path.rename(gone)
-        older = {gone if one == path else one: size for one, size in self._older.items()}
-        self._older = {**older, gone: 0}
+            retired = path.with_suffix(RETIRED_SUFFIX)
+        path.rename(retired)
+        older = {retired if one == path else one: size for one, size in self._older.items()}
+        self._older = {**older, retired: 0}
 
     def _paths(self) -> list[Path]:
-        """The files, oldest run first."""
+        """Return the files, oldest run first."""
         return sorted(path for path in self._folder.iterdir() if _NAME.fullmatch(path.name))
 
 
 def _run_in(path: Path) -> str:
-    """The run whose record a file is."""
+    """Return the run that a file records."""
     return path.stem.partition("-")[2]
 
 
 def _nothing(run_id: str, why: str) -> RecordPage:
-    gone = PosesMissing(run_id=run_id, robot_ns=0, until_ns=0, mission_time_s=0.0, reason=why)
-    return RecordPage(run_id=run_id, since=0, entries=(), newest=0, missing=(gone,))
+    missing = PosesMissing(run_id=run_id, robot_ns=0, until_ns=0, mission_time_s=0.0, reason=why)
+    return RecordPage(run_id=run_id, since=0, entries=(), newest=0, missing=(missing,))
 
 
 def _page(run: RunRecord, since: int | None, robot_ns: int) -> RecordPage:

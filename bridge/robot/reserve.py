@@ -1,4 +1,4 @@
-"""Disk space that is kept free for stops and events, whatever else fills the disk."""
+"""Disk space that is reserved for commands and events, whatever else fills the disk."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import shutil
 from pathlib import Path
 
 RESERVE_BYTES = 4 * 1024 * 1024
-"""Hundreds of orders and events, with the log that the journal writes them to first."""
+"""Enough for hundreds of commands and events, with the journal's write-ahead log."""
 LEAST_FREE_BYTES = 1024 * 1024
-"""Below this the reserve is let go."""
+"""With less free space than this, the reserve is given up."""
 
 
 class Reserve:
-    """A file that takes up space until the space is needed."""
+    """A file that occupies space until the space is needed."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def make(self) -> None:
-        """Take up the space, if there is more than enough of it; else the disk is as full as it is."""
+        """Occupy the space, if the disk has enough of it; else do nothing."""
         if self._is_whole() or self._free() < RESERVE_BYTES + LEAST_FREE_BYTES:
             return
         with contextlib.suppress(OSError), self._path.open("wb") as file:
@@ -30,26 +30,26 @@ class Reserve:
                 file.write(bytes(RESERVE_BYTES))
 
     def release_if_needed(self) -> None:
-        """Let the space go when the disk is nearly full."""
+        """Give up the space when the disk is nearly full."""
         if self._free() < LEAST_FREE_BYTES:
             with contextlib.suppress(OSError):
                 self._path.unlink(missing_ok=True)
 
     def shortage(self, size: int) -> str:
-        """Why `size` more bytes are too many; empty if the reserve stays whole beside them."""
+        """Return why `size` more bytes are too many; empty if they leave the reserve whole."""
         self.make()
-        kept = 0 if self._is_whole() else RESERVE_BYTES
+        reserved = 0 if self._is_whole() else RESERVE_BYTES
         free = self._free()
-        if free >= size + kept + LEAST_FREE_BYTES:
+        if free >= size + reserved + LEAST_FREE_BYTES:
             return ""
         megabyte = 1024 * 1024
         return (
-            f"{size / megabyte:.1f} MB are needed beside what is kept free for stops,"
-            f" and {free / megabyte:.1f} MB are free: make room on the robot's disk"
+            f"{size / megabyte:.1f} MB are needed besides the reserve for commands,"
+            f" and {free / megabyte:.1f} MB are free; make room on the robot's disk"
         )
 
     def _is_whole(self) -> bool:
-        """Whether the file takes up its space; one that a killed program began does not."""
+        """True if the file has its full size; one that a killed program began has not."""
         try:
             return self._path.stat().st_size >= RESERVE_BYTES
         except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""What a robot's controller drives: a base, a scanner, and what both must be told of the mission."""
+"""The hardware of a robot, real or simulated: a base and a scanner."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from stopgo.mission.run.events import Pose
 
 @dataclass(frozen=True)
 class Body:
-    """A base and a scanner, and what they must be told of the mission that is to be run."""
+    """A base and a scanner; `take` gives them the mission that will be run."""
 
     base: Base
     scanner: Scanner
@@ -33,19 +33,19 @@ class Body:
 
 
 OpenBody = Callable[[Clock], AbstractContextManager[Body]]
-"""Gives the body while the robot's program runs, on the run's clock."""
+"""Opens the hardware for as long as the robot's program runs, on the run's clock."""
 
 
 @dataclass(frozen=True)
 class SimulatedBody:
-    """A robot that exists only as numbers."""
+    """A simulated robot."""
 
     state: Path
     at: Pose | None = None
-    """Where it stands on its map; else where it last stood, or its first mission's start."""
+    """Pose on its map; if not given, its last pose, or its first mission's start."""
     to_map: Transform | None = None
     endurance_s: float = ENDURANCE_S
-    """How long a full battery lasts; 0: it does not run down."""
+    """Seconds that a full battery lasts; 0: it never runs down."""
     faults: Faults = NO_FAULTS
 
     @contextmanager

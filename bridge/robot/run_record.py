@@ -1,4 +1,4 @@
-"""The record of one run: an entry each half a second, and what is missing between them."""
+"""The record of one run: an entry each half second, and the gaps between entries."""
 
 from __future__ import annotations
 
@@ -11,64 +11,64 @@ from stopgo.bridge.link.protocol import RECORD_PAGE, PoseRow, RecordEntry, Recor
 from stopgo.bridge.record_file import RecordFile
 from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport
 
-ANEW = "the robot's program was started anew"
+RESTARTED = "the robot's program was started anew"
 UNSEEN = "the robot kept no record then"
 DAMAGED = "the robot's disk has changed what was written"
 
 
 class RunRecord:
-    """What is written down of one run, and what waits to be."""
+    """The written entries of one run, and the values for the next entry."""
 
     def __init__(self, run_id: str, file: RecordFile) -> None:
         self.run_id = run_id
         self.file = file
         self.lost: PosesMissing | None = None
-        """What found no room, and is not told in an entry yet."""
+        """Poses that could not be written, and are not in an entry's `missing` yet."""
         last = self._entry(file.newest)
         self._boot_id = None if last is None else last.boot_id
         self._began_ns = 0 if last is None else last.began_ns
         self._until_ns = max((pose.robot_ns for pose in last.poses), default=0) if last else 0
-        """Time of the newest pose that is written down."""
+        """Time of the newest pose that is written."""
         self._over = False
         self._poses: list[PoseRow] = []
         self._states: list[StateReport] = []
         self._health: list[Health] = []
         self._missing: list[PosesMissing] = []
         self._state: StateReport | None = None
-        self._told: Health | None = None
+        self._last_health: Health | None = None
 
     def pose(self, report: PoseReport, *, began_ns: int, over: bool, seen: bool) -> None:
-        """Take a pose, of a run that is over the first; `seen` is a run whose begin was."""
+        """Add a pose; of a run that is over only the first. `seen`: the run was recorded from its begin."""
         if self._over:
             return
         self._over, self._began_ns = over, began_ns
         if report.boot_id != self._boot_id:
             since_ns = self._until_ns or began_ns
             if self._boot_id is not None or not seen:
-                why = UNSEEN if self._boot_id is None else ANEW
+                why = UNSEEN if self._boot_id is None else RESTARTED
                 self._missing.append(self._gap(since_ns, report.robot_ns, why))
             self._boot_id = report.boot_id
         pose = report.pose
         self._poses.append(PoseRow(report.seq, report.robot_ns, pose.x, pose.y, pose.heading, report.speed))
 
     def state(self, report: StateReport) -> None:
-        """Take a state, if it differs from the one before."""
+        """Add a state, if it differs from the one before."""
         same = msgspec.structs.replace(report, seq=0, robot_ns=0)
         if same != self._state and not self._over:
             self._state = same
             self._states.append(report)
 
-    def health(self, told: Health) -> bool:
-        """Take what the base tells, if it differs from what it told before; whether it does."""
-        same = msgspec.structs.replace(told, robot_ns=0)
-        if same == self._told or self._over:
+    def health(self, report: Health) -> bool:
+        """Add the base's health, if it differs from the one before; true if it does."""
+        same = msgspec.structs.replace(report, robot_ns=0)
+        if same == self._last_health or self._over:
             return False
-        self._told = same
-        self._health.append(told)
+        self._last_health = same
+        self._health.append(report)
         return True
 
     def write(self, shortage: Callable[[int], str]) -> None:
-        """Write an entry of what was taken, or note why that was not possible."""
+        """Write an entry with what was added, or note why that was not possible."""
         if not self._poses or self._boot_id is None:
             return
         first_ns, last_ns = self._poses[0].robot_ns, self._poses[-1].robot_ns
@@ -86,7 +86,7 @@ class RunRecord:
         self._poses, self._states, self._health, self._missing = [], [], [], []
 
     def _written(self, entry: RecordEntry, shortage: Callable[[int], str]) -> str:
-        """Why the entry could not be written; empty if it was."""
+        """Write the entry; return why it could not be written, empty if it was."""
         body = encode(entry)
         try:
             why = shortage(len(body))
@@ -99,15 +99,15 @@ class RunRecord:
     def _lose(self, why: str, until_ns: int) -> None:
         since_ns = self.lost.robot_ns if self.lost else self._until_ns or self._began_ns
         self.lost = self._gap(since_ns, until_ns, why)
-        self._state = self._told = None  # so that they are written down when there is room
+        self._state = self._last_health = None  # so that they are written when there is space
 
     @property
     def newest_ns(self) -> int:
-        """Time of the newest pose that is written down, 0 if there is none."""
+        """Time of the newest pose that is written, 0 if there is none."""
         return self._until_ns
 
     def page(self, since: int) -> RecordPage:
-        """The entries above a number; one that was damaged tells that."""
+        """Return the entries above a number; a damaged one is a gap with that reason."""
         numbers = range(since + 1, min(since + RECORD_PAGE, self.file.newest) + 1)
         entries = tuple(self._entry(number) or self._damaged(number) for number in numbers)
         missing = () if self.lost is None else (self.lost,)
@@ -116,7 +116,7 @@ class RunRecord:
         )
 
     def before(self, robot_ns: int) -> int:
-        """The number of the newest entry that holds nothing later than a time."""
+        """Return the number of the newest entry with nothing later than a time."""
         low, high = 0, self.file.newest
         while low < high:
             middle = (low + high + 1) // 2

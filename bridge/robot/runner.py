@@ -1,4 +1,4 @@
-"""What an agent serves: whoever carries out a run, our controller or a follower of an autopilot's own run."""
+"""The interface between an agent and its run: our controller, or a follower of an autopilot's own run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stopgo.mission.run.states import Run, stop_of
 
 @dataclass(frozen=True)
 class Position:
-    """Where a robot is and how fast (m/s), and when that was, on the run's clock."""
+    """Pose and speed (m/s) of a robot, with their time on the run's clock."""
 
     pose: Pose
     speed: float
@@ -22,12 +22,12 @@ class Position:
 
 
 class Runner(Protocol):
-    """Carries out a run, and says how far it is."""
+    """Carries out a run, and reports its progress."""
 
     changed: Callable[[], None]
-    """The agent's: called after every change that others may know of."""
+    """Called after every change that stations may see; the agent sets it."""
     works: tuple[Callable[[], None], ...]
-    """What it does, each in a thread of its own, until it is closed; a robot driven from here then stands."""
+    """Functions, each for its own thread, that run until the runner is closed; it then stops its base."""
 
     @property
     def boot_id(self) -> str: ...
@@ -36,25 +36,25 @@ class Runner(Protocol):
         """The run and its mission at one moment."""
 
     def position(self) -> Position | None:
-        """Where the robot is; `None` if nothing was told of it since this was last asked."""
+        """Return where the robot is; `None` if there is nothing newer than the last call returned."""
 
     def battery(self) -> float:
         """0 to 1."""
 
     def execute(self, order: Order) -> Answer:
-        """Carry out an order once, however often it comes."""
+        """Carry out a command once, however often it comes."""
 
     def on_link_silence(self, silent_s: float) -> None:
-        """Told how long no station has been heard."""
+        """React to `silent_s` seconds without data from any station."""
 
     def close(self) -> None:
         """End all works."""
 
 
 def state_report(runner: Runner, *, robot: str, seq: int, ns: int, newest: int) -> StateReport:
-    """What a robot is doing; `newest`, the number of the newest event, is read before the run is.
+    """Return the robot's state; `newest`, the number of the newest event, must be read before the run is.
 
-    So a state never claims an event that it does not show yet.
+    So a state never names an event that it does not include yet.
     """
     run, mission = runner.snapshot()
     stop = stop_of(run, mission)

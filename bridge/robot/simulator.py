@@ -1,4 +1,4 @@
-"""A robot and a scanner that exist only as numbers, but keep time, drift, and what they did on disk."""
+"""Simulated robot and scanner: they take time, drift, use the battery, and store their state on disk."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ from stopgo.mission.run.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 SLICE_S = 0.5
-"""How often a moving robot's place is written down: what a crash can cost."""
+"""Interval at which a moving robot's pose is stored; a crash loses at most this much."""
 SHAKE_M = 0.005
 ENDURANCE_S = 6 * 3600.0
 POINTS_PER_S = 360_000
-"""What a simulated scanner takes, here and on a simulated vehicle."""
+"""Scan rate of a simulated scanner, here and on a simulated vehicle."""
 BYTES_PER_POINT = 16
 
 
 class World(msgspec.Struct, frozen=True, kw_only=True):
-    """What stays as it is when the robot's program dies: where it stands, and its battery."""
+    """State that outlives the robot's program: pose and battery."""
 
     pose: Pose = Pose(x=0.0, y=0.0, heading=0.0)
     battery: float = 1.0
     placed: bool = False
-    """Whether somebody said where it stands, or it has driven."""
+    """True if the pose was set, or the robot has driven."""
 
 
 @dataclass(frozen=True)
 class Wear:
-    """What the simulated robot gets wrong and uses up."""
+    """Pose errors and battery consumption of a simulated robot."""
 
     noise_m: float = 0.004
-    """Standard deviation of where it ends up, each axis; never more than two of them."""
+    """Standard deviation of the position it reaches, each axis; errors are limited to twice this."""
     noise_rad: float = 0.002
     battery_per_s: float = 1.0 / ENDURANCE_S
     """While it drives; 0 for a battery that does not run down."""
@@ -57,7 +57,7 @@ FaultKind = Literal["slip", "blocked", "shaking", "drain", "scanner", "empty", "
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that goes wrong once, at the n-th drive, scan or journal entry of this process."""
+    """A fault that occurs once, at the n-th drive, scan or journal entry of this process."""
 
     kind: FaultKind
     at: int
@@ -77,7 +77,7 @@ FAULTS: dict[FaultKind, str] = {
 
 
 def read_fault(text: str) -> Fault:
-    """A fault from KIND@N or KIND@N=AMOUNT, such as `slip@2=0.2`."""
+    """Read a fault from KIND@N or KIND@N=AMOUNT, such as `slip@2=0.2`."""
     kind, _, rest = text.partition("@")
     at, _, amount = rest.partition("=")
     try:
@@ -92,7 +92,7 @@ def read_fault(text: str) -> Fault:
 
 @dataclass(frozen=True)
 class Faults:
-    """What is to go wrong."""
+    """The faults to simulate."""
 
     all: tuple[Fault, ...] = ()
 
@@ -149,24 +149,24 @@ class SimulatedBase:
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:
         self._drives += 1
-        path, heading = self._missed(path, heading)
+        path, heading = self._with_errors(path, heading)
         motion = along(
             self.pose(), path, heading,
             speed=limits.speed, turn_rate=limits.turn_rate, acceleration=limits.acceleration,
         )  # fmt: skip
         if self._faults.due("blocked", self._drives):
-            self._follow(motion, interrupt, share=0.5)
+            self._follow(motion, interrupt, fraction=0.5)
             self._brake(limits.acceleration)
             return "blocked"
         if not self._follow(motion, interrupt):
             self._brake(limits.acceleration)
             return "interrupted"
         self._stand(motion.at(motion.duration)[0])
-        self._suffer()
+        self._apply_faults()
         return "arrived"
 
     def stop(self) -> None:
-        if self._world.placed:  # to stop is not to say where the robot stands
+        if self._world.placed:  # a stop does not set the pose
             self._stand(self.pose())
 
     def unfit(self, mission: Mission) -> str:
@@ -187,12 +187,14 @@ class SimulatedBase:
         self._world = msgspec.structs.replace(self._world, battery=1.0)
 
     def stand_at_start(self, start: Pose) -> None:
-        """Put the robot at a mission's start, if nobody ever said where it stands."""
+        """Put the robot at a mission's start, if its pose was never set."""
         if not self._world.placed:
             self._stand(start)
 
-    def _missed(self, path: Sequence[Point], heading: float | None) -> tuple[Sequence[Point], float | None]:
-        """Path and heading as they will be driven, a little beside what was asked."""
+    def _with_errors(
+        self, path: Sequence[Point], heading: float | None
+    ) -> tuple[Sequence[Point], float | None]:
+        """Return path and heading with the errors that will be driven."""
         if not path:
             return path, heading
         x, y = path[-1]
@@ -201,17 +203,17 @@ class SimulatedBase:
             before = path[-2] if len(path) > 1 else (self.pose().x, self.pose().y)
             left = math.atan2(y - before[1], x - before[0]) + math.pi / 2
             x, y = x + slip.amount * math.cos(left), y + slip.amount * math.sin(left)
-        beside = (x + self._error(self._wear.noise_m), y + self._error(self._wear.noise_m))
+        reached = (x + self._error(self._wear.noise_m), y + self._error(self._wear.noise_m))
         turned = None if heading is None else heading + self._error(self._wear.noise_rad)
-        return (*path[:-1], beside), turned
+        return (*path[:-1], reached), turned
 
     def _error(self, deviation: float) -> float:
         return max(-2 * deviation, min(2 * deviation, self._chance.gauss(0.0, deviation)))
 
-    def _follow(self, motion: Motion, interrupt: Event, *, share: float = 1.0) -> bool:
-        """Let the motion, or its first share, take its time; false if it was interrupted."""
+    def _follow(self, motion: Motion, interrupt: Event, *, fraction: float = 1.0) -> bool:
+        """Carry out the motion, or its first fraction; false if it was interrupted."""
         self._motion, self._began_ns = motion, self._clock.now_ns()
-        end_ns = self._began_ns + round(motion.duration * share * 1e9)
+        end_ns = self._began_ns + round(motion.duration * fraction * 1e9)
         while (left := (end_ns - self._clock.now_ns()) / 1e9) > 0:
             if self._clock.wait(min(left, SLICE_S), interrupt):
                 return False
@@ -224,8 +226,8 @@ class SimulatedBase:
         self._follow(braking, Event())
         self._stand(braking.at(braking.duration)[0])
 
-    def _suffer(self) -> None:
-        """What befalls the robot once it has arrived."""
+    def _apply_faults(self) -> None:
+        """Apply the faults that follow an arrival."""
         drain, shaking = self._faults.due("drain", self._drives), self._faults.due("shaking", self._drives)
         if drain:
             self._world = msgspec.structs.replace(self._world, battery=drain.amount)
@@ -247,12 +249,12 @@ class SimulatedBase:
         battery = max(0.0, self._world.battery - used)
         self._world = World(pose=pose, battery=battery, placed=True)
         if self._keep is not None:
-            with contextlib.suppress(OSError):  # a full disk does not end the world
+            with contextlib.suppress(OSError):  # a full disk must not end the simulation
                 write_world(self._keep, self._world)
 
 
 class SimulatedScanner:
-    """Takes its time and answers with a file that was never written; `record` counts what it did."""
+    """Scans take time, and their files do not exist; each begin and end is a line in the file `record`."""
 
     profiles: tuple[str, ...] | None = None
 
@@ -287,7 +289,7 @@ class SimulatedScanner:
         return result
 
     def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
-        """A scanner has a memory of its own: a scan that it does not know of has not ended."""
+        """Return the outcome from the scanner's own memory; a scan that is not in it was interrupted."""
         return self._ended.get(label, ScanFailed(reason="cut off"))
 
     def _remember_scan(self, label: str, result: ScanResult) -> None:
@@ -307,7 +309,7 @@ def _memory(record: Path) -> Path:
 
 
 def _remembered(record: Path | None) -> dict[str, ScanResult]:
-    """Scans that ended, as an earlier process wrote them down; a line that it could not end is none."""
+    """Read the scans that ended in an earlier process; an incomplete last line is ignored."""
     if record is None or not _memory(record).exists():
         return {}
     found: dict[str, ScanResult] = {}
@@ -325,13 +327,12 @@ def read_world(keep: Path | None) -> World:
         return msgspec.json.decode(keep.read_bytes(), type=World)
     except (OSError, msgspec.DecodeError) as error:
         raise InputError(
-            f"{keep}: does not say where the simulated robot stands ({error}); "
-            "remove it to start at the mission's start"
+            f"{keep}: no pose of the simulated robot ({error}); remove it to start at the mission's start"
         ) from None
 
 
 def write_world(keep: Path, world: World) -> None:
     """Replace the file in one step, so that a crash leaves the old or the new."""
-    beside = keep.with_suffix(".new")
-    beside.write_bytes(msgspec.json.encode(world))
-    os.replace(beside, keep)
+    new = keep.with_suffix(".new")
+    new.write_bytes(msgspec.json.encode(world))
+    os.replace(new, keep)

@@ -18,7 +18,8 @@ from stopgo.bridge.link.seals import NO_SEALS, Seals
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import Journal, memory_journal
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.runner import state_report
 from stopgo.bridge.robot.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear

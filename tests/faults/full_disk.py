@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from stopgo.bridge.commands.spawn import robot_process
-from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import NegativeResult

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.mission.errors import InputError
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
@@ -33,7 +33,7 @@ def known(folder: Path) -> object:
     """All that a robot takes from its folder."""
     with open_journal(folder, "r1") as journal:
         field = Field(journal=journal)
-        held = journal.mission(corridor().id, 1)
+        held = journal.missions.read(corridor().id, 1)
         run = field.controller.run
         return held, run.state, run.done, run.at, [type(event) for event in journal.events()]
 

@@ -24,7 +24,7 @@ from stopgo.bridge.robot import agent as agents
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.bridge.station.station import Station
@@ -111,7 +111,7 @@ class Jumping(Trial):
         return answer
 
     def push(self, mission: Mission) -> None:
-        while self.field.journal.mission(mission.id, mission.revision) is None:
+        while self.field.journal.missions.read(mission.id, mission.revision) is None:
             super().push(mission)
 
 

@@ -53,7 +53,7 @@ class Trial:
     def __init__(self, mains: Mains, record: Path) -> None:
         self.mains = mains
         self.field = Field(record=record)
-        self.field.journal.edge = mains
+        self.field.journal.rows.commit_hook = mains
         self.record = record
         self.interrupted: Counter[str] = Counter()
 
@@ -114,7 +114,7 @@ def check(trial: Trial) -> None:
     assert kinds(events, Started) == 1
     assert kinds(events, Finished) == 1
     assert [event.stop for event in events if isinstance(event, Scanned)] == ["s1", "s2", "s3"]
-    stored = trial.field.journal.mission(MISSION.id, 1)
+    stored = trial.field.journal.missions.read(MISSION.id, 1)
     assert stored is not None
     assert stored[1] == encode(MISSION)
     scans = Counter(line.split("-")[1] for line in trial.record.read_text().splitlines() if "end" in line)
@@ -130,7 +130,7 @@ def entries() -> int:
     """How many journal entries an undisturbed mission makes."""
     mains = Mains()
     field = Field()
-    field.journal.edge = mains
+    field.journal.rows.commit_hook = mains
     field.station().push(MISSION)
     field.order("start")
     field.work()

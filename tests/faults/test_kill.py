@@ -26,7 +26,7 @@ from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import now_utc
 from stopgo.bridge.link.protocol import encode
-from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
@@ -246,7 +246,7 @@ def check(folder: Path, ran: Mission, paused: int) -> None:
     """What the journal and the scanner's record must agree on."""
     with open_journal(folder, "r1") as journal:
         events = journal.events()
-        stored = journal.mission(ran.id, ran.revision)
+        stored = journal.missions.read(ran.id, ran.revision)
     stops = [stop.id for stop in ran.stops]
     assert stored is not None
     assert stored[1] == encode(ran)

@@ -15,7 +15,8 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.clock import SimulatedClock
-from stopgo.bridge.robot.journal import Journal, open_journal
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.robot.program import clocks
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import Fault, Faults

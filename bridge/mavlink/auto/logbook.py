@@ -22,7 +22,8 @@ import msgspec
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
 from stopgo.bridge.mavlink.vehicle_link.url import Url
-from stopgo.bridge.robot.journal import Journal, shared_journal
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.journal_file import shared_journal
 from stopgo.mission.document import Mission
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
@@ -115,7 +116,7 @@ class Logbook:
         return self._listed[1]
 
     def _read_listed(self, sent: Sent) -> ListedMission:
-        stored = self.journal.mission(sent.mission_id, sent.revision)
+        stored = self.journal.missions.read(sent.mission_id, sent.revision)
         items = self.journal.fact("items", PackedItems)
         assert stored is not None and items is not None
         mission = msgspec.json.decode(stored[1], type=Mission)
@@ -212,7 +213,7 @@ def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
     record = Sent(mission_id=mission.id, revision=mission.revision, sha256=hashlib.sha256(packed).hexdigest())
     listed_mission(mission, sent)
     with book.journal.transaction():
-        book.journal.store_mission(manifest, document)
+        book.journal.missions.store(manifest, document)
         book.move(lambda run: () if run.over else (_replaced(run, "a mission was pushed to the vehicle"),))
         book.journal.store_fact("run", runs.installed(book.run, mission))
         book.journal.store_fact("sent", record)

@@ -19,7 +19,8 @@ from stopgo.bridge.link.seals import NO_SEALS, KeySeals, Seals
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.robot.controller import Controller, new_boot_id
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import Journal, memory_journal
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.recorder import RunRecorder
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner

@@ -153,10 +153,10 @@ class DrivesWhatItIsSent(Controller):
 
 
 class GoesOnByItself(Controller):
-    def _recover(self) -> None:
-        super()._recover()
+    def __init__(self, **parts: Any) -> None:
+        super().__init__(**parts)
         if self.run.state == "PAUSED":
-            self._run = changed(self.run, state="RUNNING")
+            self._store._run = changed(self.run, state="RUNNING")
 
 
 class ReadsStrictly(Agent):
@@ -184,13 +184,13 @@ class TellsAllStops(Agent):
 
 
 class SaysNothingOfItself(Agent):
-    def _tell_news(self) -> None:
+    def _publish_news(self) -> None:
         self._closing.wait()
 
 
 class TakesDamage(Inbox):
     def _received(self, manifest: Manifest) -> Mission | Rejected:
-        document = b"".join(self._journal.pieces(manifest))
+        document = b"".join(self._journal.missions.chunks(manifest))
         try:
             return self._read(document, manifest)
         except ValueError:
@@ -257,8 +257,8 @@ def changed_parameters(request: Request, **parameters: str) -> Request:
 
 class WantsPiecesInOrder(Inbox):
     def _chunk(self, mission_id: str, number: int, request: Request) -> Any:
-        manifest = self._journal.transfer(mission_id)
-        held = () if manifest is None else self._journal.chunks_held(manifest)
+        manifest = self._journal.missions.transfer(mission_id)
+        held = () if manifest is None else self._journal.missions.received_chunks(manifest)
         if number > len(held):
             return Rejected(reason="incomplete", messages=("in order, please",))
         return super()._chunk(mission_id, number, request)
@@ -317,21 +317,21 @@ def verdicts_on(robot: RobotUnderTest, requirement: str) -> list[ConformVerdict]
 
 
 class BelievesEverybody(KeySeals):
-    def answering(self, answer: Answering) -> SealedAnswering:
-        sealed = super().answering(answer)
+    def seal_answers(self, answer: Answering) -> SealedAnswering:
+        sealed = super().seal_answers(answer)
         own = self
 
         def answered(request: Request) -> tuple[bytes, bytes]:
             reply, seal = sealed(request)
             if b"untrusted" not in reply:
                 return reply, seal
-            return answer(request), own.telling(request.key, b"")
+            return answer(request), own.seal_publication(request.key, b"")
 
         return answered
 
 
 class SealsNoStates(KeySeals):
-    def telling(self, key: str, payload: bytes) -> bytes:
+    def seal_publication(self, key: str, payload: bytes) -> bytes:
         return b""
 
 

@@ -184,8 +184,8 @@ def test_a_station_may_ask_before_it_pushes() -> None:
 
 
 class BelievesEverybody(KeySeals):
-    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
-        super().opened(question, payload, seal)
+    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+        super().verify_answer(question, payload, seal)
         return payload
 
 

@@ -108,18 +108,18 @@ def dialogue(held: dict[str, HeldKeys], monkeypatch: pytest.MonkeyPatch) -> list
         said.append({**message, "signed": by_the_document(message, sealed).decode(), "seal": seal.decode()})
 
     def ask(shows: str, key: str, payload: str, reply: str, **parameters: str) -> None:
-        question = station.question(key, payload.encode(), parameters)
+        question = station.seal_question(key, payload.encode(), parameters)
         say(shows, "question", "alice", key, payload, question.seal, parameters=parameters)
-        answered = robot.answering(lambda request: reply.encode())
+        answered = robot.seal_answers(lambda request: reply.encode())
         got, seal = answered(Request(key, payload.encode(), parameters, question.seal))
-        assert station.opened(question, got, seal) == reply.encode(), station.distrusted
+        assert station.verify_answer(question, got, seal) == reply.encode(), station.distrusted
         more = {"parameters": parameters, "question": payload}
         say(f"the answer to {shows}", "answer", "r1", key, reply, seal, **more)
 
     def tell(shows: str, speaker: KeySeals, by: str, key: str, payload: str, listener: KeySeals) -> None:
         heard: list[bytes] = []
-        seal = speaker.telling(key, payload.encode())
-        listener.hearing(lambda key, payload: heard.append(payload))(key, payload.encode(), seal)
+        seal = speaker.seal_publication(key, payload.encode())
+        listener.verify_publications(lambda key, payload: heard.append(payload))(key, payload.encode(), seal)
         assert heard == [payload.encode()], listener.distrusted
         say(shows, "told", by, key, payload, seal)
 

@@ -170,7 +170,7 @@ def test_viewers_send_no_mission(site: Path) -> None:
     viewer.held = None
     with pytest.raises(NegativeResult, match="vera is a viewer"):
         viewer.push(corridor(revision=2))
-    assert field.journal.transfer(corridor().id) is None
+    assert field.journal.missions.transfer(corridor().id) is None
 
 
 def test_a_robot_hears_only_stations_and_only_at_once(site: Path) -> None:

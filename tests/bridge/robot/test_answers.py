@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from stopgo.bridge.robot.answers import answer_to, answered, remember_answer
-from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.mission.run.orders import Order
 from stopgo.mission.run.states import Run
 

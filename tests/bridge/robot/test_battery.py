@@ -56,7 +56,7 @@ def test_a_mission_longer_than_the_battery_lasts_is_rejected_and_nothing_is_kept
     with pytest.raises(NegativeResult, match=r"infeasible: the mission takes 0\.1 h .* at 100%"):
         field.station().push(corridor())
     assert field.controller.run.state == "IDLE"
-    assert field.journal.mission(corridor().id, 1) is None
+    assert field.journal.missions.read(corridor().id, 1) is None
 
 
 def test_a_battery_that_went_down_since_the_push_refuses_the_start() -> None:

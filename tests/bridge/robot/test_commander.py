@@ -230,7 +230,7 @@ def test_watching_writes_the_lease_down_twice_a_minute() -> None:
     field.station().push(corridor())
     field.order("start")
     written: list[str] = []
-    field.journal.edge = written.append
+    field.journal.rows.commit_hook = written.append
     watched(field, "test", seconds=300)
     assert written.count("committed") == 10
 

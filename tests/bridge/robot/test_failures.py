@@ -270,14 +270,14 @@ def test_a_full_disk_refuses_orders_and_stops_the_robot_until_there_is_room() ->
     field = started(corridor())
 
     def fill() -> None:
-        field.journal.edge = full_disk
+        field.journal.rows.commit_hook = full_disk
         assert field.order("skip").reason == "storage"
 
     field.clock.at(3.0, fill)
     field.work()
     assert field.controller.run.state == "HELD"
     assert field.base.speed() == 0.0
-    field.journal.edge = lambda moment: None
+    field.journal.rows.commit_hook = lambda moment: None
     assert field.order("retry").outcome == "ok"
     field.work()
     assert field.controller.run.done == ("s1", "s2", "s3")
@@ -288,14 +288,14 @@ def test_a_full_disk_refuses_orders_and_stops_the_robot_until_there_is_room() ->
 )
 def test_a_full_disk_keeps_no_stop_from_arriving(verb: Verb, state: str, event: str) -> None:
     field = started(corridor())
-    field.journal.edge = full_disk
+    field.journal.rows.commit_hook = full_disk
     order = field.command(verb)
     answer = field.controller.execute(order)
     assert (answer.outcome, field.controller.run.state, field.base.speed()) == ("ok", state, 0.0)
     assert field.controller.execute(order) == answer
     field.controller.on_link_silence(0.0)
     assert field.told()[-1] == "Started"
-    field.journal.edge = lambda moment: None
+    field.journal.rows.commit_hook = lambda moment: None
     field.controller.on_link_silence(0.0)
     assert field.told()[-1] == event
     assert field.controller.execute(order) == answer
@@ -306,9 +306,9 @@ def test_a_full_disk_keeps_no_stop_from_arriving(verb: Verb, state: str, event: 
 def test_a_push_of_the_mission_that_is_run_stores_once_what_a_full_disk_had_no_room_for() -> None:
     field = started(corridor())
     station = field.station(commander="test")
-    field.journal.edge = full_disk
+    field.journal.rows.commit_hook = full_disk
     field.order("pause")
-    field.journal.edge = lambda moment: None
+    field.journal.rows.commit_hook = lambda moment: None
     station.push(corridor())
     field.controller.on_link_silence(0.0)
     assert field.told() == ["Started", "Paused"]
@@ -328,7 +328,7 @@ def test_a_full_disk_ends_no_simulated_robot(tmp_path: Path) -> None:
 def test_a_full_disk_rejects_a_mission() -> None:
     field = Field()
     station = field.station()
-    field.journal.edge = full_disk
+    field.journal.rows.commit_hook = full_disk
     with pytest.raises(
         NegativeResult, match="storage: the journal cannot be written: database or disk is full"
     ):

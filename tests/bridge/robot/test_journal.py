@@ -13,17 +13,11 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.protocol import Manifest
-from stopgo.bridge.robot.journal import (
-    LOCKED_S,
-    MISSIONS_KEPT,
-    Owner,
-    memory_journal,
-    open_journal,
-    shared_journal,
-)
+from stopgo.bridge.robot.hashed_rows import HASHED_TABLES, write_row
+from stopgo.bridge.robot.journal_file import LOCKED_S, Owner, memory_journal, open_journal, shared_journal
 from stopgo.bridge.robot.journal_format import FORMAT, TABLES
 from stopgo.bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
-from stopgo.bridge.robot.sealed_rows import SEALED, put
+from stopgo.bridge.robot.stored_missions import MISSIONS_KEPT
 from stopgo.bridge.station.watch import event_line
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Started, UnknownKind, event_of
@@ -77,7 +71,7 @@ def test_a_damaged_journal_is_named(tmp_path: Path) -> None:
 
 def test_what_another_process_writes_is_waited_for_on_a_slow_machine_too(tmp_path: Path) -> None:
     with shared_journal(tmp_path, "r1") as journal:
-        assert journal._connection.execute("PRAGMA busy_timeout").fetchone() == (1000 * LOCKED_S,)
+        assert journal.rows.connection.execute("PRAGMA busy_timeout").fetchone() == (1000 * LOCKED_S,)
 
 
 def test_a_disk_too_full_for_the_lock_names_the_state_folder(
@@ -115,7 +109,7 @@ def journal_of_the_second_format(folder: Path) -> None:
     with open_journal(folder, "r1") as journal:
         field = Field(journal=journal)
         field.station().push(corridor(revision=2))
-        stored = journal.mission(corridor().id, 2)
+        stored = journal.missions.read(corridor().id, 2)
     assert stored is not None
     manifest, document = stored
     connection = sqlite3.connect(folder / "journal.sqlite")
@@ -123,10 +117,10 @@ def journal_of_the_second_format(folder: Path) -> None:
         connection.execute(f"DROP TABLE {table}")
     connection.executescript(FORMER_TABLES)
     body = msgspec.json.encode(manifest)
-    put(connection, "missions", manifest.mission_id, 1, body, b"")
-    put(connection, "missions", manifest.mission_id, 2, body, document)
-    put(connection, "transfers", "other", body)
-    put(connection, "chunks", manifest.sha256, 0, document[:100])
+    write_row(connection, "missions", manifest.mission_id, 1, body, b"")
+    write_row(connection, "missions", manifest.mission_id, 2, body, document)
+    write_row(connection, "transfers", "other", body)
+    write_row(connection, "chunks", manifest.sha256, 0, document[:100])
     connection.execute("PRAGMA user_version = 2")
     connection.commit()
     connection.close()
@@ -137,10 +131,10 @@ def journal_of_the_first_format(folder: Path) -> None:
     journal_of_the_second_format(folder)
     connection = sqlite3.connect(folder / "journal.sqlite")
     connection.execute("DROP INDEX events_of_run")
-    for table in SEALED:
+    for table in HASHED_TABLES:
         connection.execute(f"ALTER TABLE {table} RENAME TO new_{table}")
     connection.executescript(re.sub(r",\s*seal BLOB NOT NULL", "", FORMER_TABLES + TABLES))
-    for table in SEALED:
+    for table in HASHED_TABLES:
         columns = ", ".join(name for _, name, *_ in connection.execute(f"PRAGMA table_info({table})"))
         connection.execute(f"INSERT INTO {table} SELECT {columns} FROM new_{table}")
         connection.execute(f"DROP TABLE new_{table}")
@@ -160,8 +154,8 @@ def test_a_journal_of_a_former_format_is_brought_up_to_date(
         with open_journal(tmp_path, "r1") as journal:
             field = Field(journal=journal)
             assert field.controller.run.state == state
-            assert journal.mission(corridor().id, 1) is None
-            assert journal.newest_revision(corridor().id) is not None
+            assert journal.missions.read(corridor().id, 1) is None
+            assert journal.missions.newest_manifest(corridor().id) is not None
             verb: Verb = "start" if state == "READY" else "resume"
             assert field.order(verb, cmd_id=verb).outcome == "ok"
 
@@ -208,9 +202,9 @@ def test_missions_that_no_run_needs_are_retired_and_their_names_kept() -> None:
     station = field.station()
     for revision in range(1, MISSIONS_KEPT + 4):
         station.push(corridor(revision=revision))
-    kept = [field.journal.mission(corridor().id, revision) is not None for revision in range(1, 8)]
+    kept = [field.journal.missions.read(corridor().id, revision) is not None for revision in range(1, 8)]
     assert kept == [False, False, *[True] * (MISSIONS_KEPT + 1)]
-    newest = field.journal.newest_revision(corridor().id)
+    newest = field.journal.missions.newest_manifest(corridor().id)
     assert newest is not None
     assert newest.revision == MISSIONS_KEPT + 3
     with pytest.raises(NegativeResult, match="older_revision"):
@@ -222,7 +216,7 @@ def test_of_what_is_retired_or_no_longer_sent_no_piece_stays() -> None:
     station = field.station()
     for revision in range(1, MISSIONS_KEPT + 4):
         station.push(corridor(revision=revision))
-    ((held,),) = field.journal._rows("SELECT COUNT(DISTINCT document) FROM chunks")
+    ((held,),) = field.journal.rows.select("SELECT COUNT(DISTINCT document) FROM chunks")
     assert held == MISSIONS_KEPT + 1
 
 
@@ -230,12 +224,12 @@ def test_nothing_that_is_announced_touches_a_stored_mission() -> None:
     """Another manifest that claims the same document has pieces of its own."""
     field = Field()
     field.station().push(corridor())
-    stored = field.journal.mission(corridor().id, 1)
+    stored = field.journal.missions.read(corridor().id, 1)
     assert stored is not None
     claims = msgspec.structs.replace(stored[0], revision=2, digest="0" * 64)
-    field.journal.begin_transfer(claims)
-    field.journal.store_chunk(claims, 0, b"x")
-    assert field.journal.mission(corridor().id, 1) == stored
+    field.journal.missions.begin_transfer(claims)
+    field.journal.missions.store_chunk(claims, 0, b"x")
+    assert field.journal.missions.read(corridor().id, 1) == stored
 
 
 def test_any_part_of_a_document_is_given() -> None:
@@ -244,9 +238,9 @@ def test_any_part_of_a_document_is_given() -> None:
     manifest = Manifest(
         mission_id="m", revision=1, digest="d", size=len(document), sha256="s", chunk_bytes=1024
     )
-    journal.store_mission(manifest, document)
+    journal.missions.store(manifest, document)
     for start, size in ((0, 1024), (1000, 2000), (5000, 1000), (6000, 10)):
-        assert journal.part(manifest, start, size) == document[start : start + size]
+        assert journal.missions.part(manifest, start, size) == document[start : start + size]
 
 
 def test_a_push_that_would_take_the_space_kept_for_stops_is_rejected(

@@ -13,7 +13,7 @@ from stopgo.bridge.commands.spawn import robot_process
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.map_frame import OnMap, turned, turned_back, turned_point
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.mission.document import Frame, sealed

@@ -11,7 +11,7 @@ from stopgo.bridge.link.protocol import RECORD_PAGE, PoseRow, RecordPage
 from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.pages import POSES_KEPT
 from stopgo.bridge.robot.recorder import RETIRED, RunRecorder
-from stopgo.bridge.robot.run_record import ANEW, DAMAGED, UNSEEN
+from stopgo.bridge.robot.run_record import DAMAGED, RESTARTED, UNSEEN
 from stopgo.mission.run.events import Pose, PoseReport, PosesMissing
 from tests.disk import small_disk
 from tests.faults.sizes import some
@@ -101,7 +101,7 @@ def test_a_killed_robot_loses_what_it_had_not_written_and_the_record_says_so(tmp
     drive(again, 9, 10, boot_id="c")
     page = again.page("run")
     assert seqs(page) == [1, 2, 3, 9, 10]
-    assert [(gap.robot_ns, gap.until_ns, gap.reason) for gap in gaps(page)] == [(ns(3), ns(9), ANEW)]
+    assert [(gap.robot_ns, gap.until_ns, gap.reason) for gap in gaps(page)] == [(ns(3), ns(9), RESTARTED)]
 
 
 def test_an_entry_that_was_cut_anywhere_is_taken_off_and_the_others_stay(tmp_path: Path) -> None:

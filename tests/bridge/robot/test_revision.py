@@ -165,7 +165,7 @@ def test_a_power_cut_at_any_entry_neither_loses_a_revision_nor_repeats_a_stop(mo
         field = running()
         station = field.station()
         station.push(LONGER)
-        field.journal.edge = Mains((moment, entry))
+        field.journal.rows.commit_hook = Mains((moment, entry))
         while field.controller.run.state != "FINISHED":
             try:
                 if field.controller.run.state == "PAUSED":

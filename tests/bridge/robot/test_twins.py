@@ -86,13 +86,15 @@ def test_a_robot_that_notices_its_twin_holds() -> None:
 
 
 def test_a_name_that_is_alive_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program, "LOOK_S", 0.01)
+    monkeypatch.setattr(program, "TOKEN_WAIT_S", 0.01)
     field = Field()
     field.serve()
     link = field.board.link()
     check_name_is_free(link, KeyExpressions("r1"), "the router")
     field.link.announce(field.keys.alive)
-    with pytest.raises(NegativeResult, match=r"r1: is alive behind the router already .* another --name"):
+    with pytest.raises(
+        NegativeResult, match=r"r1: robot name already in use at the router .* another --name"
+    ):
         check_name_is_free(link, KeyExpressions("r1"), "the router")
 
 

@@ -98,7 +98,7 @@ def test_a_robot_that_finds_its_name_alive_does_not_start(tmp_path: Path) -> Non
     extra = ("--connect", endpoint)
     with router(endpoint):
         first = start_robot("r1", tmp_path / "a", listen=None, extra=extra)
-        with pytest.raises(RobotUnreachable, match=r"r1: is alive behind .*--name"):
+        with pytest.raises(RobotUnreachable, match=r"r1: robot name already in use at .*--name"):
             start_robot("r1", tmp_path / "b", listen=None, extra=extra)
         first.kill()
         first.wait()

@@ -13,7 +13,6 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import RECORD_PAGE, KeyExpressions, encode
 from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.recorder import RunRecorder
-from stopgo.bridge.robot.run_record import ANEW
 from stopgo.bridge.station import logged_run
 from stopgo.bridge.station.logged_run import LoggedReport, LogHistory, LogItem, read_run
 from stopgo.mission.run.events import Health, PoseReport, PosesMissing
@@ -156,7 +155,7 @@ def test_what_a_killed_robot_had_not_written_is_told_as_missing(robot: Robot) ->
     robot.recorder.write()
     robot.catch_up()
     assert [report.seq for report in robot.poses] == [*range(1, 101), *range(200, 300)]
-    assert [(gap.robot_ns, gap.until_ns, gap.reason) for gap in robot.gaps] == [(ns(100), ns(200), ANEW)]
+    assert [(gap.robot_ns, gap.until_ns, gap.reason) for gap in robot.gaps] == [(ns(100), ns(200), RESTARTED)]
 
 
 def test_what_a_full_disk_had_no_room_for_is_told_as_missing(robot: Robot) -> None:

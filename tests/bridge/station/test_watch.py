@@ -20,7 +20,7 @@ from stopgo.bridge.robot import agent as agents
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
-from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.recorder import RunRecorder
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Arrived, Finished, Scanned, Skipped, Started

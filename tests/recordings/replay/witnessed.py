@@ -16,7 +16,7 @@ import shapely
 
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.base import Outcome
-from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.robot.simulator import SHAKE_M, Fault, Faults, SimulatedBase, Wear
 from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.document import Mission, Point, Scan, Stop

@@ -6,7 +6,7 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.logbook import Logbook, remember
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
-from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.telemetry import Message

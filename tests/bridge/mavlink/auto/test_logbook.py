@@ -11,7 +11,7 @@ import pytest
 from stopgo.bridge.mavlink.auto.logbook import Logbook, forget, logbook, name_of, remember, usual_folder
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
 from stopgo.bridge.mavlink.vehicle_link.url import Url
-from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Aborted, Paused

@@ -203,7 +203,7 @@ def test_a_journal_that_cannot_be_written_ends_the_watch_and_says_why(tmp_path: 
     with site.up(), pytest.raises(InputError, match="disk full"), site.reached() as station:
         station.command("start")
         with site.book() as book:
-            book.journal._connection.execute("CREATE TRIGGER full BEFORE INSERT ON events BEGIN SELECT"
+            book.journal.rows.connection.execute("CREATE TRIGGER full BEFORE INSERT ON events BEGIN SELECT"
                                              " RAISE(FAIL, 'disk full'); END")  # fmt: skip
         for _ in station.reports():
             pass

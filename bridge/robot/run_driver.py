@@ -1,0 +1,153 @@
+"""The work of a run, one piece at a time: drive a leg, settle at a stop, scan it, verify it, drive home.
+
+Each stop goes WAITING, NAVIGATING, SETTLING, SCANNING, VERIFYING, DONE. The result of each piece of work is
+stored before the next one begins. All of it runs in the controller's thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.current_task import faces, has_work, label, moved
+from stopgo.bridge.robot.run_store import RunStore
+from stopgo.bridge.robot.work_control import WorkControl
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.run import route_position
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.events import Pose
+from stopgo.mission.run.states import Run
+from stopgo.mission.run.tolerance import deviation, is_outside
+
+SETTLE_SAMPLE_S = 0.1
+SETTLE_LIMIT_S = 30.0
+"""Extra time beyond `settle_s` within which a robot must come to a standstill."""
+
+
+class RunDriver:
+    """Drives the legs of the current run and scans its stops."""
+
+    def __init__(
+        self, store: RunStore, *, control: WorkControl, base: Base, scanner: Scanner, clock: Clock
+    ) -> None:
+        self._store = store
+        self._control = control
+        self._base = base
+        self._scanner = scanner
+        self._clock = clock
+        self.silent_s = 0.0
+        """Seconds without data from any station; written by the link's thread under the run's lock."""
+
+    def step(self) -> bool:
+        """Do the next piece of work; false if there is none."""
+        with self._store.lock:
+            run, mission = self._store.snapshot()
+            if self._control.closing or mission is None or not has_work(run):
+                return False
+            self._control.interrupt.clear()
+        if run.state == "HOMING":
+            self._drive_home(run, mission)
+        else:
+            WORK[run.stop_state](self, run, mission)
+        return True
+
+    def link_is_lost(self, mission: Mission) -> bool:
+        """True if the link is lost by the mission's policy, and the policy wants something of the robot."""
+        policy = mission.policy
+        return policy.link_loss != "continue" and self.silent_s >= policy.link_loss_after_s
+
+    def _leave(self, run: Run, mission: Mission) -> None:
+        """Set out for the stop, unless the link or the battery forbids it."""
+        advance, battery, silent_s = self._store.advance, self._base.battery(), self.silent_s
+        if self.link_is_lost(mission):
+            advance(run, lambda now: runs.link_lost(now, mission, silent_s))
+        elif battery < mission.policy.battery_min:
+            reason = f"battery at {battery:.0%}, below {mission.policy.battery_min:.0%}"
+            advance(run, lambda now: runs.sent_home(now, mission, then="PAUSED", reason=reason))
+        else:
+            advance(run, runs.leaving)
+
+    def _navigate(self, run: Run, mission: Mission) -> None:
+        """Drive the rest of the leg, or the correction to the stop."""
+        stop, pose = mission.stops[run.at], self._base.pose()
+        at_stop = run.leg > run.at
+        path = (
+            ((stop.x, stop.y),) if at_stop else route_position.forward(mission.stops[run.leg].approach, pose)
+        )
+        there = at_stop and not is_outside(deviation(pose, stop), stop.tolerance_m) and faces(pose, stop)
+        heading = stop.heading if run.leg >= run.at else None
+        outcome = "arrived" if there else self._goto(path, mission, heading)
+        here = self._base.pose()
+        if outcome == "blocked":
+            self._hold_blocked(run, f"the way to {stop.id}", here)
+        elif outcome == "arrived":
+            self._store.advance(run, lambda now: runs.reached(now, mission, here, deviation(here, stop)))
+
+    def _drive_home(self, run: Run, mission: Mission) -> None:
+        """Drive one leg of the return, or one approach backwards."""
+        legs, pose = route_position.legs_of(mission), self._base.pose()
+        returning = run.leg == len(mission.stops)
+        leg = legs[run.leg]
+        path = route_position.forward(leg, pose) if returning else route_position.backward(leg, pose)
+        outcome = self._goto(path, mission, None)
+        if outcome == "blocked":
+            self._hold_blocked(run, "the way home", self._base.pose())
+        elif outcome == "arrived":
+            self._store.advance(run, lambda now: runs.home_leg_driven(now, mission))
+
+    def _goto(self, path: tuple[Point, ...], mission: Mission, heading: float | None) -> str:
+        interrupt = self._control.interrupt
+        return self._base.goto(path, heading=heading, limits=mission.robot, interrupt=interrupt)
+
+    def _hold_blocked(self, run: Run, path_name: str, here: Pose) -> None:
+        """Hold the run, for the base could not drive on."""
+        cause = self._base.blocked_by()
+        reason = f"{path_name} is blocked at ({here.x:.2f}, {here.y:.2f})" + (f": {cause}" if cause else "")
+        self._store.advance(run, lambda now: runs.held(now, reason))
+
+    def _settle(self, run: Run, mission: Mission) -> None:
+        """Wait until the robot stands still at the stop."""
+        stop = mission.stops[run.at]
+        still = self._stands_still(stop.settle_s)
+        if still is None:
+            return
+        if not still:
+            reason = f"not still within {stop.settle_s + SETTLE_LIMIT_S:g} s"
+            self._store.advance(run, lambda now: runs.failed(now, mission, reason))
+            return
+        here = self._base.pose()
+        self._store.advance(run, lambda now: runs.settled(now, mission, here, deviation(here, stop)))
+
+    def _stands_still(self, settle_s: float) -> bool | None:
+        """True if the robot stood still for `settle_s`; `None` if interrupted."""
+        waited, still_for, resting = 0.0, 0.0, self._base.pose()
+        while still_for < settle_s:
+            if waited > settle_s + SETTLE_LIMIT_S:
+                return False
+            pause = min(SETTLE_SAMPLE_S, settle_s - still_for)
+            if self._clock.wait(pause, self._control.interrupt):
+                return None
+            waited, still_for, pose = waited + pause, still_for + pause, self._base.pose()
+            if moved(resting, pose, self._base.rest()):
+                still_for, resting = 0.0, pose
+        return True
+
+    def _scan(self, run: Run, mission: Mission) -> None:
+        stop = mission.stops[run.at]
+        result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._control.interrupt)
+        self._store.advance(run, lambda now: runs.scan_ended(now, mission, result))
+
+    def _verify(self, run: Run, mission: Mission) -> None:
+        here = self._base.pose()
+        self._store.advance(run, lambda now: runs.verified(now, mission, here))
+
+
+WORK: dict[str, Callable[[RunDriver, Run, Mission], None]] = {
+    "WAITING": RunDriver._leave,
+    "NAVIGATING": RunDriver._navigate,
+    "SETTLING": RunDriver._settle,
+    "SCANNING": RunDriver._scan,
+    "VERIFYING": RunDriver._verify,
+}
+"""The work of each stage of a stop."""
