@@ -13,6 +13,7 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import RECORD_PAGE, KeyExpressions, encode
 from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.recorder import RunRecorder
+from stopgo.bridge.robot.run_record import RESTARTED
 from stopgo.bridge.station import logged_run
 from stopgo.bridge.station.logged_run import LoggedReport, LogHistory, LogItem, read_run
 from stopgo.mission.run.events import Health, PoseReport, PosesMissing
