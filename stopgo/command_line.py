@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from typer.exceptions import TyperException
     from typer.models import CommandInfo
 
-COMMANDS = ("plan_commands", "bridge_commands", "recording_commands", "document_commands")
+COMMANDS = (
+    "plan_commands", "bridge_commands",
+    "review_command", "runs_command", "importer_command", "replay_command",
+    "document_commands",
+)  # fmt: skip
 """The modules of `stopgo.commands`, in the order of the help; each has
 `add_commands(app)` and imports slow libraries where used."""
 
