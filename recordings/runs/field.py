@@ -29,7 +29,7 @@ from stopgo.recordings.embedded.plan import carry_plan, planned_extent
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.plan.mission import draw_mission, mission_extent
 from stopgo.recordings.rrd.compact import compact
-from stopgo.recordings.rrd.pieces import Pieces
+from stopgo.recordings.rrd.segment_file import Pieces
 from stopgo.recordings.runs.drawing import RunDrawing
 
 Taken = Report | Health | PosesMissing

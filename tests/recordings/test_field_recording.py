@@ -19,7 +19,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Pose, PoseReport, Scanned, StateReport
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.drawing import entities
-from stopgo.recordings.rrd import pieces
+from stopgo.recordings.rrd import segment_file
 from stopgo.recordings.rrd.compact import compact
 from stopgo.recordings.rrd.read import check
 from stopgo.recordings.runs.field import FieldRecording
@@ -260,7 +260,7 @@ def test_what_finds_no_room_to_the_end_is_told_and_keeps_its_partial_name(
 def test_what_is_too_much_for_the_memory_is_not_called_whole(
     tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pieces, "MOST_WAITING", 150_000)
+    monkeypatch.setattr(segment_file, "MOST_WAITING", 150_000)
     path = tmp_path / "field.rrd"
     why = "could not be written whole (too much waited for room); what could be is in"
     with (
