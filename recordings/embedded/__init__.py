@@ -1,1 +1,3 @@
-"""What recordings carry besides pictures: the mission, what its stops see, and runs, as values read back."""
+"""Data embedded in recordings besides pictures: the mission, what its stops see, and runs. It can be read
+back.
+"""

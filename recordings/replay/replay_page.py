@@ -40,7 +40,7 @@ def page_of(replays: Sequence[Replay], plans: Review | None = None) -> ReportSub
         ),
         sight=None if any(one.inferred for one in replays) else plan.sight,  # or walls are drawn as scanned
         judgements={item.run.run_id: judged(item) for item in replays},
-        told={item.run.run_id: tuple(told_of(item)) for item in replays},
+        more={item.run.run_id: tuple(told_of(item)) for item in replays},
     )
 
 

@@ -1,4 +1,4 @@
-"""A recording that is written piece by piece, and waits in memory while the disk has no room for it."""
+"""Recording file written in segments; segments wait in memory while the disk is full."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from io import FileIO
 from pathlib import Path
 
 HEADER = 12
-"""Bytes at the start of a recording: Rerun's mark, its version and options."""
+"""Bytes at the start of a recording: Rerun's mark, version and options."""
 MESSAGE = struct.Struct("<QQ")
-"""What stands before each message: its kind, and how many bytes it has."""
+"""Header of each message: its kind, and its length in bytes."""
 MOST_WAITING = 256 << 20
-"""Bytes that may wait in memory: hours of a run, and less than any machine that watches one has."""
+"""Limit of the bytes that wait in memory: hours of a run, and less than the memory of the machine that
+watches it."""
 END = 0
-"""The kind of a recording's last message; what follows tells where things stand in the file."""
+"""Kind of a recording's last message; an index of the file follows it."""
 
 
 def messages(recording: bytes) -> bytes:
-    """A recording without its header, and without its end, which holds for this recording alone."""
+    """Return a recording without its header, and without its end, which is valid only for this recording."""
     at = HEADER
     while True:
         kind, size = MESSAGE.unpack_from(recording, at)
@@ -28,62 +29,62 @@ def messages(recording: bytes) -> bytes:
         at += MESSAGE.size + size
 
 
-class Pieces:
-    """A file that recordings are added to, one after another; together they are one without an end.
+class SegmentFile:
+    """File to which recordings are added one after another; together they form one recording without an end.
 
-    Pieces that find no room on the disk wait in memory, in their order, as long as they are not too much for
-    it. The file holds whole pieces only.
+    Segments that find no room on the disk wait in memory in their order, up to MOST_WAITING bytes. The file
+    contains whole segments only.
     """
 
     def __init__(self, path: Path, say: Callable[[str], None]) -> None:
         self.path = path
         self.fault: str | None = None
-        """Why the file does not hold all that was added to it, if it does not."""
+        """Reason why the file is not complete; None if it is."""
         self._say = say
         self._file: FileIO | None = None
-        self._whole = 0
+        self._written = 0
         self._waiting: deque[bytes] = deque()
-        self._lost = False
+        self._dropped = False
 
     def add(self, recording: bytes) -> None:
-        """Add a recording, and before it what has waited for room."""
-        if recording and not self._lost:
-            first = self._whole == 0 and not self._waiting
+        """Add a recording; segments that wait for room are written first."""
+        if recording and not self._dropped:
+            first = self._written == 0 and not self._waiting
             self._waiting.append(recording[:HEADER] * first + messages(recording))
         try:
             self._write()
         except OSError as error:
-            self._lost = self._lost or sum(map(len, self._waiting)) > MOST_WAITING
-            self._tell(error.strerror or "unknown")
+            self._dropped = self._dropped or sum(map(len, self._waiting)) > MOST_WAITING
+            self._report(error.strerror or "unknown")
         else:
-            self._tell("too much waited for room" if self._lost else None)
+            self._report("too much data waited for room" if self._dropped else None)
 
     def close(self) -> None:
-        """Try once more to write what waits, and close the file, which goes if nothing could be written."""
+        """Try again to write waiting segments, and close the file; delete it if nothing could be written."""
         self.add(b"")
         if self._file is not None:
             self._file.close()
-        if not self._whole:
+        if not self._written:
             self.path.unlink(missing_ok=True)
 
     def _write(self) -> None:
         if self._file is None:
             self._file = self.path.open("xb", buffering=0)
         try:
-            self._file.seek(self._whole)
+            self._file.seek(self._written)
             while self._waiting:
-                piece = memoryview(self._waiting[0])
-                while piece:
-                    piece = piece[self._file.write(piece) :]
-                self._whole = self._file.tell()
+                segment = memoryview(self._waiting[0])
+                while segment:
+                    segment = segment[self._file.write(segment) :]
+                self._written = self._file.tell()
                 self._waiting.popleft()
         finally:
-            self._file.truncate(self._whole)  # a piece that was only begun is taken back
+            self._file.truncate(self._written)  # remove an incomplete segment
 
-    def _tell(self, fault: str | None) -> None:
-        """Say once that there is no room, and once that there is again."""
+    def _report(self, fault: str | None) -> None:
+        """Report once that the disk is full, and once that it has room again."""
         if fault is not None and self.fault is None:
             self._say(f"{self.path}: cannot be written ({fault}); the recording waits in memory for room")
         if fault is None and self.fault is not None:
-            self._say(f"{self.path}: there is room again; what waited is written")
+            self._say(f"{self.path}: the disk has room again; waiting data was written")
         self.fault = fault
