@@ -24,7 +24,7 @@ from stopgo.recordings.replay.log_placing import PlacedLog, Placing, placed
 from stopgo.recordings.replay.matching import Match, matched, reaches
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.standstills import Standing, standings
-from stopgo.recordings.replay.told_visits import told_visits
+from stopgo.recordings.replay.reported_visits import told_visits
 from stopgo.recordings.replay.uploaded import differences_of
 
 NEAR_ROUTE_M = 2.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stopgo.mission.run.events import Arrived, Failed, Homing, Scanned
-from stopgo.recordings.replay.told_visits import told_visits
+from stopgo.recordings.replay.reported_visits import told_visits
 from tests.mission.comparing.told import SCAN, at, told
 from tests.mission.worlds import square_tour
 
