@@ -13,7 +13,7 @@ from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.replay.judged import judged, missing, outside
 from stopgo.recordings.replay.replay_text import measured_lines, notes_of, truth_lines, way_lines
 from stopgo.recordings.replay.replayed import Replay
-from stopgo.recordings.replay.way_and_time import lost_times, way_track
+from stopgo.recordings.replay.path_and_time import lost_times, way_track
 
 RunLines = tuple[str, tuple[str, ...]]
 """A title and its lines."""

@@ -16,7 +16,7 @@ from stopgo.mission.stages.figures import percent
 from stopgo.recordings.logs.field_log import FieldLog
 from stopgo.recordings.replay.judged import judged
 from stopgo.recordings.replay.replayed import Replay
-from stopgo.recordings.replay.way_and_time import lost_times, way_of
+from stopgo.recordings.replay.path_and_time import lost_times, way_of
 
 MOST_LOST = 5
 """Places where time was lost that are listed on a terminal; --json has all."""

@@ -19,7 +19,7 @@ from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.way_and_time import way_of
+from stopgo.recordings.replay.path_and_time import way_of
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.driving.world import SITE, gateway, rover, site_mission
 from tests.faults.sizes import size

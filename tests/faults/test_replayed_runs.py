@@ -14,7 +14,7 @@ from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.way_and_time import way_of
+from stopgo.recordings.replay.path_and_time import way_of
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import wandering
 from tests.recordings.replay.witnessed import Witness, run_of, troubles_of

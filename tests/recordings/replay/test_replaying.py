@@ -25,7 +25,7 @@ from stopgo.recordings.replay.judged import judged
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.way_and_time import lost_times, way_of
+from stopgo.recordings.replay.path_and_time import lost_times, way_of
 from tests.recordings.logs.writing import Messages, write_bag
 from tests.recordings.replay.driving import Drive, Odd, Senses, driven, logged, wandering
 
