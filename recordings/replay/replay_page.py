@@ -10,7 +10,7 @@ from stopgo.mission.stages.figures import percent
 from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import Review
 from stopgo.recordings.page.subject import ReportSubject
-from stopgo.recordings.replay.judged import judged, missing, outside
+from stopgo.recordings.replay.drive_verdict import judged, missing, outside
 from stopgo.recordings.replay.replay_text import measured_lines, notes_of, truth_lines, way_lines
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.path_and_time import lost_times, way_track

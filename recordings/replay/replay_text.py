@@ -14,7 +14,7 @@ from stopgo.mission.console.table import printable, table
 from stopgo.mission.run.run_log import Alignment
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.logs.field_log import FieldLog
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import judged
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.path_and_time import lost_times, way_of
 

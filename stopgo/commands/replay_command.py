@@ -267,6 +267,6 @@ def _print_json(items: list[dict[str, Any]], name: str) -> None:
 
 def _exit_code(replays: list[Replay]) -> int:
     """Return the exit code of the worst replay."""
-    from stopgo.recordings.replay.judged import judged
+    from stopgo.recordings.replay.drive_verdict import judged
 
     return max(judged(item).exit_code for item in replays)

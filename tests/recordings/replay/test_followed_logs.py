@@ -20,7 +20,7 @@ from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Pose, Scanned, Unconfirmed
 from stopgo.recordings.logs import read_log
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import judged
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_text
 from stopgo.recordings.replay.replayed import Replay

@@ -14,7 +14,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Arrived, Finished, Scanned, Skipped, Started
 from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs import read_log
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import judged
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay

@@ -21,7 +21,7 @@ from stopgo.mission.files.mission_json import write
 from stopgo.mission.frames.transform import SiteOrigin, Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import judged
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
