@@ -19,7 +19,7 @@ from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.logs.field_log import FieldLog, Remark
 from stopgo.recordings.replay.followed import followed_events
-from stopgo.recordings.replay.inferring import events_of
+from stopgo.recordings.replay.inferred_events import events_of
 from stopgo.recordings.replay.log_placing import PlacedLog, Placing, placed
 from stopgo.recordings.replay.matching import Match, matched, reaches
 from stopgo.recordings.replay.replayed import Replay
