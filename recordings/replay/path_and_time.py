@@ -1,4 +1,4 @@
-"""What a replay amounts to beyond its stops: the way driven, and where time was lost."""
+"""Driven path and lost time of a replay."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from stopgo.recordings.replay.matching import Match
 from stopgo.recordings.replay.replayed import Replay
 
 SMOOTHED_S = 0.5
-"""The way is measured between means over as long as this: noise would lengthen it."""
+"""Interval over which positions are averaged before the path is measured: noise would lengthen it."""
 
 
 @dataclass(frozen=True)
-class Way:
-    """The way driven, in metres; distances beside the route are positive to its left."""
+class DrivenPath:
+    """Driven path in metres; cross-track errors are positive to the left of the route."""
 
     driven_m: float | None
-    """None where the log has no poses between the stops; so are all below but the next."""
+    """Length driven; None if the log has no poses between the stops, as are all fields below but the next."""
     planned_m: float
-    """Of the legs up to the last stop that was visited, and of the return if all were."""
+    """Length of the legs up to the last visited stop, and of the return if all were visited."""
     mean_m: float | None
     rms_m: float | None
     median_m: float | None
-    """Of the distances without their signs, as those below."""
+    """Median of the errors without their signs, as are those below."""
     p95_m: float | None
     greatest_m: float | None
     greatest_s: float | None
-    """When it was that far, in seconds since the run began."""
+    """Time of the greatest error, in seconds since the run began."""
 
     @property
     def extra_m(self) -> float | None:
@@ -41,48 +41,54 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Lost:
-    """Time that a run took longer than planned, or won."""
+class LostTime:
+    """Time that a run lost against the plan; negative if it won time."""
 
     where: str
     seconds: float
 
 
-def way_of(replay: Replay) -> Way:
-    """Measured where the robot was on a leg, halts included in the figures beside the route."""
-    beside = replay.comparison.beside
-    metres = replay.beside
+def driven_path(replay: Replay) -> DrivenPath:
+    """Measure the driven path; standstills count for the cross-track error."""
+    cross_track = replay.comparison.beside
+    metres = replay.cross_track
     away = np.abs(metres)
-    at = beside.greatest
-    when = None if at is None else float(replay.run.seconds([beside.ns[at]])[0])
-    told = bool(len(metres))
-    return Way(
-        driven_m=way_track(replay.run.poses, replay.matches).length_m if len(replay.run.poses) else None,
+    at = cross_track.greatest
+    when = None if at is None else float(replay.run.seconds([cross_track.ns[at]])[0])
+    measured = bool(len(metres))
+    return DrivenPath(
+        driven_m=smoothed_track(replay.run.poses, replay.matches).length_m if len(replay.run.poses) else None,
         planned_m=_planned_m(replay.mission, replay.matches),
-        mean_m=float(metres.mean()) if told else None,
-        rms_m=float(np.sqrt((metres**2).mean())) if told else None,
-        median_m=float(np.median(away)) if told else None,
-        p95_m=float(np.percentile(away, 95)) if told else None,
-        greatest_m=float(away.max()) if told else None,
+        mean_m=float(metres.mean()) if measured else None,
+        rms_m=float(np.sqrt((metres**2).mean())) if measured else None,
+        median_m=float(np.median(away)) if measured else None,
+        p95_m=float(np.percentile(away, 95)) if measured else None,
+        greatest_m=float(away.max()) if measured else None,
         greatest_s=when,
     )
 
 
-def way_track(track: Track, matches: tuple[Match, ...]) -> Track:
-    """The way without its noise: means of half a second, and of each halt the place where the robot stood."""
+def smoothed_track(track: Track, matches: tuple[Match, ...]) -> Track:
+    """Return the path without its noise: half-second means, and the position of each standstill."""
     if not len(track):
         return track
-    halts = [match.standing for match in matches]
+    standstills = [match.standstill for match in matches]
     moving = np.ones(len(track), bool)
-    for halt in halts:
-        moving &= (track.ns < halt.begin_ns) | (track.ns > halt.end_ns)
-    rows = [(ns, halt.x, halt.y, halt.heading) for halt in halts for ns in (halt.begin_ns, halt.end_ns)]
-    rows += [_row(track, k) for k in (0, -1) if moving[k]]  # a mean lies behind where the way begins
-    stood = np.array([row[1:] for row in rows]).reshape(-1, 3)
+    for standstill in standstills:
+        moving &= (track.ns < standstill.begin_ns) | (track.ns > standstill.end_ns)
+    rows = [
+        (ns, standstill.x, standstill.y, standstill.heading)
+        for standstill in standstills
+        for ns in (standstill.begin_ns, standstill.end_ns)
+    ]
+    rows += [_row(track, k) for k in (0, -1) if moving[k]]  # a mean lies after the begin of the path
+    standing_poses = np.array([row[1:] for row in rows]).reshape(-1, 3)
     ns, means = _means(track.ns[moving], track.xy[moving], np.unwrap(track.heading)[moving])
     all_ns = np.concatenate([ns, np.array([row[0] for row in rows], np.int64)])
     return Track.of(
-        all_ns, np.concatenate([means[:, :2], stood[:, :2]]), np.concatenate([means[:, 2], stood[:, 2]])
+        all_ns,
+        np.concatenate([means[:, :2], standing_poses[:, :2]]),
+        np.concatenate([means[:, 2], standing_poses[:, 2]]),
     )
 
 
@@ -92,7 +98,7 @@ def _row(track: Track, index: int) -> tuple[int, float, float, float]:
 
 
 def _means(ns: IntArray, xy: FloatArray, heading: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Times and x, y, heading (n, 3) averaged over pieces of SMOOTHED_S."""
+    """Return times and x, y, heading (n, 3) averaged over intervals of SMOOTHED_S."""
     if not len(ns):
         return ns, np.empty((0, 3))
     index = ((ns - ns[0]) / (SMOOTHED_S * 1e9)).astype(np.int64)
@@ -103,7 +109,7 @@ def _means(ns: IntArray, xy: FloatArray, heading: FloatArray) -> tuple[IntArray,
 
 
 def _planned_m(mission: Mission, matches: tuple[Match, ...]) -> float:
-    """Of the legs that were to be driven by then."""
+    """Return the length of the legs planned so far."""
     visited = [match.stop for match in matches if match.stop is not None]
     if not visited:
         return 0.0
@@ -112,38 +118,42 @@ def _planned_m(mission: Mission, matches: tuple[Match, ...]) -> float:
     return sum(float(np.hypot(*np.diff(np.array(leg), axis=0).T).sum()) for leg in legs if len(leg) > 1)
 
 
-def lost_times(replay: Replay) -> tuple[Lost, ...]:
-    """Where the run was slower or faster than planned by a second or more, the slowest first."""
+def lost_times(replay: Replay) -> tuple[LostTime, ...]:
+    """Return where the run was slower or faster than planned by a second or more, the slowest first."""
     found = [item for item in _lost(replay) if abs(item.seconds) >= 1.0]
     return tuple(sorted(found, key=lambda item: -item.seconds))
 
 
-def _lost(replay: Replay) -> Iterator[Lost]:
-    """Legs between stops visited one after another, halts at stops, halts elsewhere, visits once more."""
+def _lost(replay: Replay) -> Iterator[LostTime]:
+    """Yield legs between consecutive stops, dwell times, standstills elsewhere, and repeated visits."""
     mission = replay.mission
     planned = {item.stop: item.planned_s for item in replay.comparison.stops}
     before: Match | None = None
     elsewhere = 0.0
     for match in replay.matches:
-        halt = match.standing
+        standstill = match.standstill
         if match.stop is None:
-            yield Lost(f"halt {halt.seconds:.0f} s at ({halt.x:.2f}, {halt.y:.2f}), at no stop", halt.seconds)
-            elsewhere += halt.seconds
+            yield LostTime(
+                f"standstill {standstill.seconds:.0f} s at ({standstill.x:.2f}, {standstill.y:.2f}),"
+                " not at a stop",
+                standstill.seconds,
+            )
+            elsewhere += standstill.seconds
             continue
         stop = mission.stops[match.stop]
         stay = stop.settle_s + stop.scan.duration_s
         if match.how != "visit":
-            yield Lost(f"once more at {stop.id}", halt.seconds)
+            yield LostTime(f"repeated visit of {stop.id}", standstill.seconds)
         else:
-            yield Lost(f"standing at {stop.id}", halt.seconds - stay)
+            yield LostTime(f"dwell time at {stop.id}", standstill.seconds - stay)
             yield from _leg(before, match, mission, planned, elsewhere)
         before, elsewhere = match, 0.0
 
 
 def _leg(
     before: Match | None, match: Match, mission: Mission, planned: dict[str, float | None], elsewhere: float
-) -> Iterator[Lost]:
-    """Driving from the stop before, without what was stood on the way."""
+) -> Iterator[LostTime]:
+    """Yield the driving time from the stop before, without standstills between."""
     if before is None or before.stop is None or match.stop is None or match.stop != before.stop + 1:
         return
     stop, last = mission.stops[match.stop], mission.stops[before.stop]
@@ -151,5 +161,5 @@ def _leg(
     if arrive is None or arrived is None:
         return
     should = arrive - arrived - last.settle_s - last.scan.duration_s
-    took = (match.standing.begin_ns - before.standing.end_ns) / 1e9 - elsewhere
-    yield Lost(f"driving from {last.id} to {stop.id}", took - should)
+    took = (match.standstill.begin_ns - before.standstill.end_ns) / 1e9 - elsewhere
+    yield LostTime(f"driving from {last.id} to {stop.id}", took - should)

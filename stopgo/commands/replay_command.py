@@ -267,6 +267,6 @@ def _print_json(items: list[dict[str, Any]], name: str) -> None:
 
 def _exit_code(replays: list[Replay]) -> int:
     """Return the exit code of the worst replay."""
-    from stopgo.recordings.replay.drive_verdict import judged
+    from stopgo.recordings.replay.drive_verdict import drive_verdict
 
-    return max(judged(item).exit_code for item in replays)
+    return max(drive_verdict(item).exit_code for item in replays)

@@ -20,7 +20,7 @@ from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Pose, Scanned, Unconfirmed
 from stopgo.recordings.logs import read_log
-from stopgo.recordings.replay.drive_verdict import judged
+from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_text
 from stopgo.recordings.replay.replayed import Replay
@@ -119,12 +119,12 @@ def test_stops_scanned_outside_their_tolerance_are_told_and_not_driven_as_planne
     laid = replayed(path, narrow)
     assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
     assert [item.stop for item in laid.comparison.outside] == ["S1", "S2", "S3"]
-    assert judged(laid).exit_code == 1
+    assert drive_verdict(laid).exit_code == 1
     for item in laid.comparison.stops:
         assert 0.08 < (item.deviation_m or 0.0) < 0.4
-        away = f"{item.stop} was missed by {1000 * (item.deviation_m or 0.0):.0f} mm (50 mm are tolerated)."
-        assert away in judged(laid).text and away in as_text(laid)
-    assert judged(replayed(path, wide)).exit_code == 0
+        away = f"{item.stop}: position error {1000 * (item.deviation_m or 0.0):.0f} mm (tolerance 50 mm)."
+        assert away in drive_verdict(laid).text and away in as_text(laid)
+    assert drive_verdict(replayed(path, wide)).exit_code == 0
 
 
 def test_a_scan_that_failed_is_told_and_the_way_goes_on(tmp_path: Path) -> None:
