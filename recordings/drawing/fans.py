@@ -1,6 +1,4 @@
-"""Outline of what a viewpoint sees: the far ends of its lines of sight, and the viewpoint where it sees
-nothing.
-"""
+"""Outline of what a viewpoint sees: the far ends of its lines of sight, else the viewpoint itself."""
 
 from __future__ import annotations
 
@@ -9,8 +7,7 @@ import numpy as np
 from stopgo.mission.geometry import BoolArray, FloatArray
 
 BRIDGED_M = 0.15
-"""Lines whose ends are nearer than this are joined: a unit is visible or not as a whole, so corners have
-gaps."""
+"""Lines whose ends are nearer than this are joined; units are visible as a whole, so corners have gaps."""
 LEAST = 1e-9
 """Smallest angle, and smallest area in m², that counts."""
 
@@ -64,9 +61,7 @@ def _along(angle: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _closed_line(far_lines: FloatArray, seen: BoolArray) -> FloatArray:
-    """Join the visible far lines (n, 2, 2) into one closed line; where none is visible it passes the
-    viewpoint (0, 0).
-    """
+    """Join the visible far lines (n, 2, 2) into one closed line; gaps pass the viewpoint (0, 0)."""
     first = int(np.flatnonzero(seen)[0])
     order = np.concatenate([np.arange(first, len(seen)), np.arange(first)])
     kept = far_lines[order[seen[order]]]

@@ -47,9 +47,7 @@ def hatch(polygons: Iterable[Polygon], *, spacing: float, angle: float) -> Float
 
 
 def fill(polygons: Iterable[Polygon], *, spacing: float) -> Strokes:
-    """Return strokes that cover the polygons, parallel to each polygon's longest edge; their ends are
-    round.
-    """
+    """Return strokes with round ends that cover the polygons, parallel to each polygon's longest edge."""
     lines, radii = [np.empty((0, 2, 2))], [np.empty(0)]
     for polygon in polygons:
         rotation = _rotation(_longest_direction(polygon))
@@ -75,9 +73,7 @@ def name_point(polygon: Polygon) -> FloatArray:
 
 
 def triangles(polygons: Iterable[Polygon]) -> FloatArray:
-    """Return triangles (k, 3, 2) that cover the polygons: trapezoids between all heights of their
-    vertices.
-    """
+    """Return triangles (k, 3, 2) that cover the polygons: trapezoids between vertex heights."""
     parts = [np.empty((0, 3, 2))]
     for polygon in polygons:
         edges = _edges(polygon)
@@ -103,9 +99,7 @@ def level(flat: NDArray[Any], z: float) -> NDArray[Any]:
 
 
 def lines_by_value(targets: Targets, value: IntArray) -> tuple[FloatArray, IntArray]:
-    """Join neighbouring units of one segment that have one value; return lines (p, 2, 2) and their values
-    (p,).
-    """
+    """Join neighbouring units of a segment with one value; return lines (p, 2, 2) and their values (p,)."""
     segment = targets.unit_segment
     if not len(segment):
         return np.empty((0, 2, 2)), np.empty(0, dtype=np.int64)

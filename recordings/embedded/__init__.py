@@ -1,3 +1,1 @@
-"""Data embedded in recordings besides pictures: the mission, what its stops see, and runs. It can be read
-back.
-"""
+"""Data embedded in recordings besides pictures: the mission, what its stops see, and runs."""

@@ -10,9 +10,7 @@ from stopgo.recordings.embedded.reading import Recording
 
 
 def embed_end(canvas: Canvas) -> None:
-    """Write the number of rows per entity as the last property. A truncated and repaired file is found by
-    it.
-    """
+    """Write the rows per entity as the last property; rows missing from a repaired file are found by it."""
     counts = sorted(canvas.counts.items())
     canvas.describe(
         entities.PROPERTY_END,

@@ -1,6 +1,4 @@
-"""Lines of the floor as a recording contains them, in the drawing's metres: for pictures, not for
-planning.
-"""
+"""Lines of the floor in a recording, in the drawing's metres: for pictures, not for planning."""
 
 from __future__ import annotations
 

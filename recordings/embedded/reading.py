@@ -52,9 +52,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def read_each(paths: Sequence[Path]) -> Iterator[tuple[Path, Recording | InputError]]:
-    """Yield each recording, or the error that prevents reading it; a damaged file does not hide the
-    others.
-    """
+    """Yield each recording, or the error that prevents reading it; one error does not stop the others."""
     fatal = fatal_faults(paths)
     for path in paths:
         try:

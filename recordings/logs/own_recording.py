@@ -1,4 +1,4 @@
-"""A run's recording (field.rrd) as a log: the newest run in it."""
+"""Reader of a run's recording (field.rrd) as a log: the newest run in it."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def read_run_recording(path: Path, reading: Reading) -> FieldLog:
     Raises
     ------
     InputError
-        When it cannot be read, or tells of no run.
+        When it cannot be read, or contains no run.
     """
     recording = read_recording(path)
     if not recording.logs:
-        raise InputError(f"{path}: tells of no run; is it a plan's recording?")
+        raise InputError(f"{path}: contains no run; give the recording of a run")
     run = recording.logs[-1]
     track = run.poses
     poses = (

@@ -95,9 +95,7 @@ class Review:
 
 
 def what_next(run: Comparison, path: Path) -> tuple[str, ...]:
-    """Return the command for a follow-up mission, if a run in `path` is over and acquired less than
-    required.
-    """
+    """Return the command for a follow-up mission, if a finished run in `path` acquired too little."""
     acquired, floor = run.acquired, run.mission.origin.floor
     if acquired is None or acquired.answer != "no" or not run.log.ended or not floor:
         return ()

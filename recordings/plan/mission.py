@@ -117,9 +117,7 @@ def _draw_route(canvas: Canvas, mission: Mission) -> None:
 
 
 def _draw_network(canvas: Canvas, mission: Mission) -> None:
-    """Draw pairs of stops whose scans register with one another; pairs without an alternative have their own
-    colour.
-    """
+    """Draw pairs of stops whose scans register; pairs without an alternative have their own colour."""
     network = network_of(mission)
     if network is None or not network.overlaps:
         return
@@ -149,9 +147,7 @@ def legs_of(mission: Mission) -> tuple[list[Leg], list[Colour]]:
 def route_lines(
     canvas: Canvas, legs: Sequence[Leg], colours: Sequence[Colour], *, above: float = 0.0
 ) -> tuple[rr.LineStrips2D, rr.LineStrips3D]:
-    """Return legs in 2D and 3D, drawn `above` other legs by that fraction of a step of ORDER, and as much
-    wider.
-    """
+    """Return legs in 2D and 3D; `above`, a fraction of a step of ORDER, raises and widens them."""
     lines = [np.array(leg) for leg in legs]
     order, size = ORDER["route"] + above, 1 + above
     flat = rr.LineStrips2D(

@@ -1,6 +1,4 @@
-"""Simulation of a plan's scans as a recording: the floor, the simulated clouds, and which of them
-register.
-"""
+"""Simulation of a plan's scans as a recording: the floor, the clouds, and which of them register."""
 
 from __future__ import annotations
 

@@ -17,9 +17,7 @@ MOST_FANS = 5000
 
 
 def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
-    """Draw what each candidate sees, as rows on the candidate timeline: its position, rays, and visible
-    lines.
-    """
+    """Draw what each candidate sees on the candidate timeline: its position, rays and visible lines."""
     if not visibility.rows:
         return
     index = rr.TimeColumn(entities.CANDIDATE, sequence=np.arange(visibility.rows))

@@ -13,8 +13,7 @@ HEADER = 12
 MESSAGE = struct.Struct("<QQ")
 """Header of each message: its kind, and its length in bytes."""
 MOST_WAITING = 256 << 20
-"""Limit of the bytes that wait in memory: hours of a run, and less than the memory of the machine that
-watches it."""
+"""Limit of the bytes that wait in memory: hours of a run."""
 END = 0
 """Kind of a recording's last message; an index of the file follows it."""
 
