@@ -40,8 +40,9 @@ def sight_outline(eye: FloatArray, lines: FloatArray) -> FloatArray:
 
 def _distinct_angles(angles: FloatArray) -> FloatArray:
     """Return sorted angles without repetitions."""
-    kept = angles[np.concatenate([[True], np.diff(angles) > LEAST])]
-    return kept[:-1] if len(kept) > 1 and kept[0] + 2 * np.pi - kept[-1] < LEAST else kept
+    distinct = angles[np.concatenate([[True], np.diff(angles) > LEAST])]
+    wraps = len(distinct) > 1 and distinct[0] + 2 * np.pi - distinct[-1] < LEAST
+    return distinct[:-1] if wraps else distinct
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -64,11 +65,11 @@ def _closed_line(far_lines: FloatArray, seen: BoolArray) -> FloatArray:
     """Join the visible far lines (n, 2, 2) into one closed line; gaps pass the viewpoint (0, 0)."""
     first = int(np.flatnonzero(seen)[0])
     order = np.concatenate([np.arange(first, len(seen)), np.arange(first)])
-    kept = far_lines[order[seen[order]]]
+    visible = far_lines[order[seen[order]]]
     gap = ~np.roll(seen, -1)[order[seen[order]]]
-    apart = np.hypot(*(np.roll(kept[:, 0], -1, axis=0) - kept[:, 1]).T)
+    apart = np.hypot(*(np.roll(visible[:, 0], -1, axis=0) - visible[:, 1]).T)
     points: list[FloatArray] = []
-    for line_part, open_, far in zip(kept, gap.tolist(), apart.tolist(), strict=True):
+    for line_part, open_, far in zip(visible, gap.tolist(), apart.tolist(), strict=True):
         points += [line_part[0], line_part[1]]
         if open_ and far > BRIDGED_M:
             points.append(np.zeros(2))

@@ -331,8 +331,8 @@ def _item(row: Any) -> Item:
     params = (float(row["Prm1"]), float(row["Prm2"]), float(row["Prm3"]), float(row["Prm4"]))
     frame = int(row["Frame"]) if "Frame" in row.dtype.names else 3
     command = int(row["CId"])
-    place = (int(row["Lat"]), int(row["Lng"]))
-    return Item(command, frame, params, x=place[0], y=place[1], z=float(row["Alt"]))
+    position = (int(row["Lat"]), int(row["Lng"]))
+    return Item(command, frame, params, x=position[0], y=position[1], z=float(row["Alt"]))
 
 
 def _home(row: Any) -> SiteOrigin | None:

@@ -34,7 +34,7 @@ class Reading:
     """Time of a message: its own stamp if it has one (`header`), or the time of logging (`log`)."""
     frame: str | None = None
     """Frame of the poses wanted from transforms; None: `map`, else `odom`."""
-    tick: Tick = lambda share: None
+    tick: Tick = lambda fraction: None
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from stopgo.mission.errors import InputError
 
-PIECE = 1 << 20
+CHUNK = 1 << 20
 
 
 def must_be_readable(path: Path) -> None:
@@ -49,6 +49,6 @@ def digest_of(paths: Sequence[Path]) -> str:
     digest = hashlib.sha256()
     for path in paths:
         with path.open("rb") as file:
-            while piece := file.read(PIECE):
-                digest.update(piece)
+            while chunk := file.read(CHUNK):
+                digest.update(chunk)
     return digest.hexdigest()

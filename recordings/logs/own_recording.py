@@ -26,5 +26,5 @@ def read_run_recording(path: Path, reading: Reading) -> FieldLog:
     poses = (
         poses_of("robot", SITE, track.ns, track.xy, track.heading, robot=run.robot) if len(track) else None
     )
-    told = poses_of_events(run.events)
-    return own_log(path, "stopgo recording", run.events, recording.missions, poses, told)
+    stationary = poses_of_events(run.events)
+    return own_log(path, "stopgo recording", run.events, recording.missions, poses, stationary)

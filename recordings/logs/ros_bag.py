@@ -113,9 +113,9 @@ def _plain(file: Path, folder: Path) -> Path:
     target = folder / file.stem
     unpack = zstd.ZstdDecompressor()
     with file.open("rb") as packed, target.open("wb") as plain:
-        while piece := packed.read(1 << 20):
+        while chunk := packed.read(1 << 20):
             try:
-                plain.write(unpack.decompress(piece))
+                plain.write(unpack.decompress(chunk))
             except (zstd.ZstdError, EOFError):
                 break
     return target

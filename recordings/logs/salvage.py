@@ -188,14 +188,14 @@ LONGEST_HEADER = 1 << 20
 def _fields(header: bytes) -> dict[bytes, bytes]:
     """Return a header's valid fields by name."""
     fields: dict[bytes, bytes] = {}
-    place = 0
-    while place + 4 <= len(header):
-        (size,) = struct.unpack_from("<I", header, place)
-        name, equals, value = header[place + 4 : place + 4 + size].partition(b"=")
+    offset = 0
+    while offset + 4 <= len(header):
+        (size,) = struct.unpack_from("<I", header, offset)
+        name, equals, value = header[offset + 4 : offset + 4 + size].partition(b"=")
         if not equals:
             break
         fields[name] = value
-        place += 4 + size
+        offset += 4 + size
     return fields
 
 
@@ -303,15 +303,15 @@ def _piecewise(unpack: Callable[[bytes], bytes], body: bytes) -> bytes:
     from backports import zstd
 
     plain = bytearray()
-    for at in range(0, len(body), PIECE):
+    for at in range(0, len(body), STEP_BYTES):
         try:
-            plain += unpack(body[at : at + PIECE])
+            plain += unpack(body[at : at + STEP_BYTES])
         except (OSError, RuntimeError, EOFError, ValueError, zstd.ZstdError):
             break
     return bytes(plain)
 
 
-PIECE = 4096
+STEP_BYTES = 4096
 _UNPACKING: dict[str, Callable[[bytes], bytes]] = {"lz4": _lz4, "zstd": _zstd, "bz2": _bz2}
 
 

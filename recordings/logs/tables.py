@@ -120,13 +120,13 @@ class _Columns:
     def __init__(self, names: list[str], path: Path) -> None:
         at = {re.sub(r"[\s\[\]()]+", "_", name.lower()).strip("_"): k for k, name in enumerate(names)}
         self.time = next((name for name in TIMES if name in at), "")
-        self.place: tuple[str, ...] = next((pair for pair in PLACES if set(pair) <= at.keys()), ())
+        self.position: tuple[str, ...] = next((pair for pair in PLACES if set(pair) <= at.keys()), ())
         self.turn = next((name for name in TURNS if name in at), "")
         self.quaternion: tuple[str, ...] = next(
             (names for names in QUATERNIONS if set(names) <= at.keys()), ()
         )
         self.at = at
-        if not self.time or not self.place:
+        if not self.time or not self.position:
             known = ", ".join(names)[:80]
             raise InputError(
                 f"{path}: its header ({known}) has no time with x and y or lat and lon; "
@@ -135,13 +135,13 @@ class _Columns:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        return (self.time, *self.place)
+        return (self.time, *self.position)
 
     def row(self, cells: list[str]) -> tuple[int, Numbers] | None:
         """Return the time in ns, then x and y, and the heading in radians (NaN without one)."""
         try:
             ns = self._ns(cells[self.at[self.time]])
-            x, y = (float(cells[self.at[name]]) for name in self.place)
+            x, y = (float(cells[self.at[name]]) for name in self.position)
             return ns, (x, y, self._heading(cells))
         except (ValueError, IndexError, OverflowError):
             return None
@@ -163,7 +163,7 @@ class _Columns:
 
     def track(self, rows: list[Numbers], ns: list[int]) -> Poses | None:
         table = np.array(rows)
-        if self.place[0].startswith("lat"):
+        if self.position[0].startswith("lat"):
             return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]))
         return poses_of("CSV", "table", ns, table[:, :2], table[:, 2])
 

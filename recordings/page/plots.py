@@ -37,15 +37,15 @@ def plots(comparison: Comparison) -> str:
 
 
 def _plots(comparison: Comparison) -> Iterator[str]:
-    log, beside = comparison.log, comparison.beside
-    finite = np.isfinite(beside.metres)
+    log, cross_track = comparison.log, comparison.beside
+    finite = np.isfinite(cross_track.metres)
     if finite.any():
-        seconds = log.seconds(beside.ns)[finite]
+        seconds = log.seconds(cross_track.ns)[finite]
         tolerance = 1000 * max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
         limits = [
             PlotLine(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3") for side in (tolerance, -tolerance)
         ]
-        curve = PlotLine(*_decimated(seconds, 1000 * beside.metres[finite]), PURPLE)
+        curve = PlotLine(*_decimated(seconds, 1000 * cross_track.metres[finite]), PURPLE)
         yield _plot("cross-track error, mm, left positive; dashed: tolerance", [*limits, curve])
     delays = [(item.arrived_s, item.late_s) for item in comparison.stops if item.late_s is not None]
     if delays:

@@ -143,7 +143,7 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
 
 
 def _tiles(comparison: Comparison) -> Iterator[str]:
-    away, beside = comparison.greatest_deviation_m, comparison.beside.greatest_m
+    deviation_m, cross_track_m = comparison.greatest_deviation_m, comparison.beside.greatest_m
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
     tolerance = max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
     paused, held = (sum(span.state == state for span in comparison.spans) for state in ("PAUSED", "HELD"))
@@ -157,10 +157,10 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
         yield tile("coverage acquired", percent(shares.whole.coverage), planned_text)
     yield tile("run time", driven, f"planned {duration(comparison.planned_s)}")
     limit = f"tolerance {1000 * tolerance:.0f} mm"
-    yield tile("greatest position error at a stop", _millimetres(away), limit)
+    yield tile("greatest position error at a stop", _millimetres(deviation_m), limit)
     poses = comparison.log.poses
     driven_m = f"{poses.length_m:.1f} m driven" if len(poses) else "the path is not in the log"
-    yield tile("greatest cross-track error", _millimetres(beside), driven_m)
+    yield tile("greatest cross-track error", _millimetres(cross_track_m), driven_m)
     stationary_s = comparison.stood_s("PAUSED", "HELD")
     yield tile("stationary", duration(stationary_s), f"paused {paused}, held {held}")
 
@@ -267,7 +267,7 @@ def _bar(share: Share) -> str:
     if share.coverage is None:
         return ""
     colour = BLUE if share.met else VERMILION
-    required = "" if share.required is None else tag("i", style=f"unreached:{100 * share.required:.1f}%")
+    required = "" if share.required is None else tag("i", style=f"left:{100 * share.required:.1f}%")
     inner = tag("div", style=f"width:{100 * share.coverage:.1f}%;background:{colour}")
     return tag("div", inner, required, class_="bar")
 

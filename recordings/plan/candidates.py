@@ -17,11 +17,11 @@ def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:
     if not len(candidates.xy):
         canvas.say("no candidate positions", level="WARN", step=CANDIDATES)
         return
-    kept = candidates.reason == KEPT
+    remaining = candidates.reason == KEPT
     points = rr.Points2D(
         canvas.local(candidates.xy),
         class_ids=[palette.reason(int(number)).number for number in candidates.reason],
-        radii=np.where(kept, on_screen(2.2), on_screen(1.5)),
+        radii=np.where(remaining, on_screen(2.2), on_screen(1.5)),
         show_labels=False,
         draw_order=ORDER["candidate"],
     )

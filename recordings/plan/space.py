@@ -40,8 +40,8 @@ def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
     )
     new = [item for item in space.findings if item not in space.floor.findings]
     log_findings(canvas, new, step=SPACE)
-    told = f"navigable space: {len(space.rooms)} rooms, {targets.total} target units"
-    describe_step(canvas, SPACE, told, "Blue: where the robot may drive. Green: where it may stop and scan.")
+    title = f"navigable space: {len(space.rooms)} rooms, {targets.total} target units"
+    describe_step(canvas, SPACE, title, "Blue: where the robot may drive. Green: where it may stop and scan.")
 
 
 def _hatch_spacing(floor: FloorPlan) -> float:

@@ -79,7 +79,7 @@ def run_texts(replay: Replay) -> Iterator[RunLines]:
 
 
 def to_do(replay: Replay) -> Iterator[str]:
-    """Yield stops to scan, and places to inspect."""
+    """Yield stops to scan, and objects to inspect."""
     for item in missing(replay):
         yield f"{item.stop}: scan it; {item.reason or 'the robot did not reach it'}"
     for item in outside(replay):

@@ -54,16 +54,7 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
     _check_log_matches(log, placed_log.track, mission, matches, placing)
     remarks = [replace(remark, ns=remark.ns + offset) for remark in log.remarks]
     run_events = events or _inferred(log, placed_log, mission, matches, remarks)
-    run = RunLog(
-        robot=run_events[0].robot if run_events else placed_log.source.robot,
-        run_id=run_events[0].run_id if run_events else None,
-        mission_id=mission.id,
-        revision=run_events[-1].revision if run_events else mission.revision,
-        source=_source(log, placed_log),
-        poses=placed_log.driven_track,
-        events=run_events,
-        alignment=placed_log.alignment,
-    )
+    run = _run_log(log, placed_log, mission, run_events)
     return Replay(
         log=log,
         mission=mission,
@@ -73,6 +64,20 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
         comparison=compare(run, [mission], sights),
         uploads=differences_of(log, mission),
         inferred=not events,
+    )
+
+
+def _run_log(log: FieldLog, placed_log: PlacedLog, mission: Mission, events: tuple[AnyEvent, ...]) -> RunLog:
+    """Return the run in the log, with its poses in the mission's frame."""
+    return RunLog(
+        robot=events[0].robot if events else placed_log.source.robot,
+        run_id=events[0].run_id if events else None,
+        mission_id=mission.id,
+        revision=events[-1].revision if events else mission.revision,
+        source=_source(log, placed_log),
+        poses=placed_log.driven_track,
+        events=events,
+        alignment=placed_log.alignment,
     )
 
 

@@ -141,13 +141,13 @@ class RunDrawing:
         fields["body"] = msgspec.json.encode(event).decode()
         self._at(self.names.events, rr.DynamicArchetype("Event", components=fields), event.robot_ns)
         stop = self.stops.get(getattr(event, "stop", ""))
-        beside = scanned_beside(event, stop)
-        level = "WARN" if isinstance(event, WARNINGS) or beside else "INFO"
+        off_stop = scanned_beside(event, stop)
+        level = "WARN" if isinstance(event, WARNINGS) or off_stop else "INFO"
         line = rr.TextLog(f"{type(event).__name__} {_details(event, stop)}".rstrip(), level=level)
         self._at(self.names.log, line, event.robot_ns)
         if isinstance(event, Arrived):
             self._plot_deviation(event.deviation_m, stop, event.robot_ns)
-        elif isinstance(event, Scanned) and stop is not None and beside:
+        elif isinstance(event, Scanned) and stop is not None and off_stop:
             self._plot_deviation(deviation(event.pose, stop), stop, event.robot_ns)
         self._mark(event)
         if self._acquired is not None:
@@ -219,10 +219,10 @@ class RunDrawing:
 
     def measure(self, until_ns: int | None = None) -> None:
         """Plot the cross-track error, up to a time until which all events are known."""
-        ns, beside = self._cross_track.measured(until_ns)
-        known = np.isfinite(beside)
+        ns, errors_m = self._cross_track.measured(until_ns)
+        known = np.isfinite(errors_m)
         if known.any():
-            values = rr.Scalars.columns(scalars=beside[known] * 1000)
+            values = rr.Scalars.columns(scalars=errors_m[known] * 1000)
             self._columns(self.names.metric(entities.METRIC_CROSS_TRACK), ns[known], values)
 
     def _mark(self, event: AnyEvent) -> None:
@@ -230,9 +230,9 @@ class RunDrawing:
         if type(event) not in MARKS or stop is None:
             return
         name, meaning, order = MARKS[type(event)]
-        place = getattr(event, "pose", None) or stop
+        position = getattr(event, "pose", None) or stop
         mark = rr.Points2D(
-            [self.canvas.local(np.array([place.x, place.y]))],
+            [self.canvas.local(np.array([position.x, position.y]))],
             class_ids=meaning.number,
             radii=on_screen(3),
             labels=[f"{type(event).__name__} {_details(event, stop)}"],
@@ -305,7 +305,7 @@ def _details(event: AnyEvent, stop: Stop | None) -> str:
     words = [getattr(event, name, "") for name in ("stop", "reason", "commander", "kind")]
     words.append(scanned_beside(event, stop))
     if isinstance(event, Arrived):
-        words.append(f"{event.deviation_m * 1000:.0f} mm beside")
+        words.append(f"{event.deviation_m * 1000:.0f} mm deviation")
     if isinstance(event, Scanned):
         words.append(f"{event.file}, {event.points} points")
     if isinstance(event, RevisionTaken):

@@ -26,7 +26,7 @@ class StopRecord:
 
     arrived_s: float | None = None
     deviation_m: float | None = None
-    outcome: str = "on the way"
+    outcome: str = "driving there"
     """`arrived`, `scanned`, `unconfirmed`, `skipped` or `failed`, with the reason."""
     scanned: bool = False
 

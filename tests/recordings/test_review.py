@@ -69,7 +69,7 @@ def test_nothing_is_to_be_done_after_a_run_as_planned(
     sighted: Path, field: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["review", str(sighted), str(field)]) == 0
-    assert "a further mission" not in capsys.readouterr().out
+    assert "a follow-up mission" not in capsys.readouterr().out
 
 
 def test_without_its_plan_a_skipped_stop_is_a_no(skipping: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -61,6 +61,13 @@ def test_a_run_tells_its_verdict_and_every_figure() -> None:
     assert "stationary 0:16 paused 1, held 0" in text
 
 
+def test_a_bar_marks_the_required_coverage() -> None:
+    mission, sight = planned()
+    asked = replace(sight, ledger=replace(sight.ledger, kind_required=0.7))
+    page = report_html(ReportSubject((mission,), (), asked)).decode()
+    assert '<i style="left:70.0%"></i>' in page
+
+
 def test_a_plan_alone_has_a_page() -> None:
     mission, sight = planned()
     text = words(report_html(ReportSubject((mission,), sight=sight)))

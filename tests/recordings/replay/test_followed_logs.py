@@ -42,6 +42,12 @@ def mission(**details: Any) -> Mission:
     return msgspec.structs.replace(tour(**{"settle_s": 3.0, **details}), georeference=ORIGIN)
 
 
+def rover_setting(folder: Path, faults: tuple[str, ...]) -> Setting:
+    start = Pose(x=0.0, y=0.0, heading=0.0)
+    found = VehicleFaults(tuple(map(read_vehicle_fault, faults)))
+    return Setting(PROFILES["ardupilot"], folder, ORIGIN, start, found, seed=1)
+
+
 def logged(
     path: Path, plan: Mission, *, faults: tuple[str, ...] = (), orders: dict[float, Any] | None = None
 ) -> Path:
@@ -49,14 +55,7 @@ def logged(
     clock, rows = SimulatedClock(), list[tuple[int, int, Any]]()
     sent = translate(plan, "ardupilot", trigger="auto")
     vehicle = complete_vehicle(
-        Setting(
-            PROFILES["ardupilot"],
-            path.parent / "vehicle",
-            ORIGIN,
-            Pose(x=0.0, y=0.0, heading=0.0),
-            VehicleFaults(tuple(map(read_vehicle_fault, faults))),
-            seed=1,
-        ),
+        rover_setting(path.parent / "vehicle", faults),
         clock=clock,
         wall=clock,
         say=lambda message: rows.append((clock.now_ns(), ROVER, message)),

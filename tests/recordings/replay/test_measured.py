@@ -1,4 +1,4 @@
-"""What scans in a log show: targets hit, deviations, and what stands there unplanned."""
+"""Scans in a log show targets with points, deviations, and unplanned objects."""
 
 from __future__ import annotations
 
