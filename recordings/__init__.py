@@ -1,5 +1,6 @@
-"""What is drawn into Rerun files, read back, and compared. Imports `mission` and nothing else of the project.
+"""Rerun recordings of plans and runs: drawn, read back and compared. Imports only `mission` of the project.
 
-`plan.PlanRecording` takes each noun of a plan, `field.FieldRecording` takes what a robot tells, `read.check`
-reads a file back to its end. Rerun itself is loaded by those modules, so import them where they are used.
+`plan.PlanRecording` draws the results of a plan, `runs.field.FieldRecording` a robot's reports, and
+`rrd.read.check` reads a file to its end. These modules load Rerun itself, so import them only where they are
+used.
 """

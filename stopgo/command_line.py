@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 COMMANDS = (
     "plan_command", "floor_commands", "prove_command", "demo_command",
-    "bridge_commands", "recording_commands", "document_commands",
+    "bridge_commands", "review_command", "runs_command", "importer_command", "replay_command",
+    "document_commands",
 )  # fmt: skip
 """The modules of `stopgo.commands`, in the order of the help; each has
 `add_commands(app)` and imports slow libraries where used."""

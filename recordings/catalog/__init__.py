@@ -1,1 +1,1 @@
-"""Many recordings: the index of runs, their site, and merging."""
+"""Collections of recordings: the index of runs, their web pages, and merging."""

@@ -1,4 +1,4 @@
-"""A plan and its runs -> one recording, laid out for exactly these runs."""
+"""Merge a plan and its runs into one recording, with a layout for exactly these runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import replacing
 from stopgo.recordings.drawing import entities
 from stopgo.recordings.drawing.canvas import Canvas, Sheet, layout_alone, mission_origin, open_canvas
-from stopgo.recordings.embedded.checking import carry_end
+from stopgo.recordings.embedded.checking import embed_end
 from stopgo.recordings.embedded.plan import origin_in, planned_extent
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.page.reviewed import missions_of
@@ -18,7 +18,7 @@ from stopgo.recordings.rrd.read import chunks
 
 
 def merge(recordings: Sequence[Recording], out: Path) -> None:
-    """Write one recording of a mission's plan and runs; of a run that several tell of, the first counts.
+    """Write one recording of a mission's plan and runs; of a run in several files, the first counts.
 
     Raises
     ------
@@ -26,15 +26,17 @@ def merge(recordings: Sequence[Recording], out: Path) -> None:
         When they are of several missions or origins, or `out` is one of them or cannot be written.
     """
     ordered = _plans_first(recordings)
-    _must_fit(ordered, out)
+    _check_same_mission(ordered, out)
     with replacing(out) as (temporary,), open_canvas(_sheet(ordered)) as canvas:
         _fill(canvas, ordered)
-        temporary.write_bytes(canvas.taken())
+        temporary.write_bytes(canvas.drain())
 
 
 def layout_of(recordings: Sequence[Recording]) -> bytes:
-    """The layout of what `merge` writes: a browser draws what it has so far, and makes a layout of its own
-    for a recording that comes before it.
+    """Return the layout of the recording that `merge` writes.
+
+    A browser draws the data it has so far, and would make its own layout for a recording that comes before
+    it.
     """
     return layout_alone(_sheet(_plans_first(recordings)))
 
@@ -55,37 +57,37 @@ def _sheet(recordings: Sequence[Recording]) -> Sheet:
     )
 
 
-def _must_fit(recordings: Sequence[Recording], out: Path) -> None:
+def _check_same_mission(recordings: Sequence[Recording], out: Path) -> None:
     ids = sorted({item.mission_id for item in recordings})
     if len(ids) > 1:
-        raise InputError(f"{out}: one recording is of one mission; these are of {len(ids)}: {', '.join(ids)}")
+        raise InputError(f"{out}: a recording contains one mission, not {len(ids)}: {', '.join(ids)}")
     if len({origin_in(item) for item in recordings}) > 1:
-        raise InputError(f"{out}: the recordings' origins differ: their missions begin at different places")
+        raise InputError(f"{out}: the recordings have different origins, as their missions start elsewhere")
     if not missions_of(recordings):
-        raise InputError(f"{out}: no recording carries its mission; plan and record again")
+        raise InputError(f"{out}: no recording contains its mission; plan and record again")
     if any(out.resolve() == item.path.resolve() for item in recordings):
         raise InputError(f"{out}: is one of the recordings to be merged; give another name")
 
 
 def _fill(canvas: Canvas, recordings: Iterable[Recording]) -> None:
-    """Take everything over once: what a recording has told, a later one does not tell again."""
-    told: set[str] = set(canvas.counts)
+    """Copy each entity once, from the first recording that contains it."""
+    copied: set[str] = set(canvas.counts)
     for recording in recordings:
-        mine: set[str] = set()
+        new: set[str] = set()
         for chunk in chunks(recording.path):
             entity = str(chunk.entity_path)
             if entity.startswith(entities.PROPERTIES):
                 continue
-            if entity not in told or entity == entities.LATEST_REPORT:
-                mine.add(entity)
-                canvas.take(chunk)
-        told |= mine
+            if entity not in copied or entity == entities.LATEST_REPORT:
+                new.add(entity)
+                canvas.copy_chunk(chunk)
+        copied |= new
         for name in (entities.PROPERTY_PLAN, entities.PROPERTY_PARAMETERS, entities.PROPERTY_RUN):
             values = recording.contents.properties.get(name)
-            if values and f"{entities.PROPERTIES}/{name}" not in told:
-                told.add(f"{entities.PROPERTIES}/{name}")
+            if values and f"{entities.PROPERTIES}/{name}" not in copied:
+                copied.add(f"{entities.PROPERTIES}/{name}")
                 canvas.describe(name, {key: _listed(value) for key, value in values.items()})
-    carry_end(canvas)
+    embed_end(canvas)
 
 
 def _listed(value: object) -> object:

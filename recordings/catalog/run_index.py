@@ -1,4 +1,4 @@
-"""What lies in a folder of recordings: plans and runs, from an index that is made anew where it is stale."""
+"""Index of a folder of recordings: plans and runs; files that changed are read again."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 INDEX = ".stopgo-runs.json"
 VERSION = 1
-"""Of the index; one of another version is made anew."""
+"""Version of the index; an index of another version is rebuilt."""
 SUFFIX = ".rrd"
 
 
 class IndexedPlan(msgspec.Struct, frozen=True, kw_only=True):
-    """A plan in a recording."""
+    """Plan in a recording."""
 
     mission_id: str
     revision: int
@@ -40,7 +40,7 @@ class IndexedPlan(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class IndexedRun(msgspec.Struct, frozen=True, kw_only=True):
-    """A run in a recording."""
+    """Run in a recording."""
 
     mission_id: str
     name: str
@@ -58,7 +58,7 @@ class IndexedRun(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class IndexedFile(msgspec.Struct, frozen=True, kw_only=True):
-    """A file as it was when it was read."""
+    """State of a file when it was read."""
 
     size: int
     changed_ns: int
@@ -68,18 +68,18 @@ class IndexedFile(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunIndex(msgspec.Struct, frozen=True):
-    """The recordings of a folder, by their path from there."""
+    """Recordings of a folder, by their path relative to it."""
 
     version: int
     files: dict[str, IndexedFile]
 
     def runs(self) -> list[tuple[str, IndexedRun]]:
-        """Every run and its file, the newest first."""
+        """Return every run and its file, the newest first."""
         found = [(name, run) for name, file in self.files.items() for run in file.runs]
         return sorted(found, key=lambda pair: (-pair[1].began_ns, pair[0]))
 
     def plans(self) -> list[tuple[str, IndexedPlan]]:
-        """Every plan and its file, by name and revision."""
+        """Return every plan and its file, by name and revision."""
         found = [(name, plan) for name, file in self.files.items() for plan in file.plans]
         return sorted(found, key=lambda pair: (pair[1].name, pair[1].revision, pair[0]))
 
@@ -88,7 +88,7 @@ class RunIndex(msgspec.Struct, frozen=True):
 
 
 def index_of(folder: Path, *, say: Callable[[str], None] = lambda line: None) -> RunIndex:
-    """The index of a folder and those below it, read anew where files have come, gone or changed.
+    """Return the index of a folder and its subfolders; new and changed files are read.
 
     Raises
     ------
@@ -96,25 +96,25 @@ def index_of(folder: Path, *, say: Callable[[str], None] = lambda line: None) ->
         When there is no such folder.
     """
     if not folder.is_dir():
-        raise InputError(f"{folder}: is no folder; give one that holds recordings")
+        raise InputError(f"{folder}: not a folder; give a folder of recordings")
     known = _known(folder / INDEX)
     found = dict(sorted(_stamps(folder)))
-    kept = {name: known[name] for name, stamp in found.items() if _is(known.get(name), stamp)}
-    stale = [name for name in found if name not in kept]
-    if not stale and len(kept) == len(known):
-        return RunIndex(VERSION, kept)
+    unchanged = {name: known[name] for name, stamp in found.items() if _is_unchanged(known.get(name), stamp)}
+    stale = [name for name in found if name not in unchanged]
+    if not stale and len(unchanged) == len(known):
+        return RunIndex(VERSION, unchanged)
     say(f"{folder}: reading {len(stale)} of {len(found)} recordings")
-    read = _read(folder, {name: found[name] for name in stale}, kept) if stale else {}
-    index = RunIndex(VERSION, dict(sorted((kept | read).items())))
+    read = _read(folder, {name: found[name] for name in stale}, unchanged) if stale else {}
+    index = RunIndex(VERSION, dict(sorted((unchanged | read).items())))
     try:
         write_atomic(folder / INDEX, msgspec.json.encode(index))
-    except InputError as error:  # it is read anew next time
+    except InputError as error:  # the files are read again next time
         say(str(error))
     return index
 
 
 def _known(path: Path) -> dict[str, IndexedFile]:
-    """What the index says; nothing if it is missing, damaged or of another version."""
+    """Return the entries of the index; none if it is missing, damaged or of another version."""
     try:
         with one_decode_error():
             index = msgspec.json.decode(path.read_bytes(), type=RunIndex)
@@ -124,14 +124,14 @@ def _known(path: Path) -> dict[str, IndexedFile]:
 
 
 Stamp = tuple[int, int]
-"""Size, and time of the last change in nanoseconds."""
+"""File size, and time of the last change in nanoseconds."""
 
 
 def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
-    """Every recording below a folder; files of other kinds are not looked at."""
-    for place, _, names in os.walk(folder):
+    """Yield every recording below a folder; files of other types are ignored."""
+    for folder_path, _, names in os.walk(folder):
         for name in names:
-            path = Path(place, name)
+            path = Path(folder_path, name)
             if name.endswith(SUFFIX) and path.is_file():
                 yield str(path.relative_to(folder)), stamp_of(path)
 
@@ -141,15 +141,15 @@ def stamp_of(path: Path) -> Stamp:
     return state.st_size, state.st_mtime_ns
 
 
-def _is(file: IndexedFile | None, stamp: Stamp) -> bool:
+def _is_unchanged(file: IndexedFile | None, stamp: Stamp) -> bool:
     return file is not None and (file.size, file.changed_ns) == stamp
 
 
-def _read(folder: Path, stale: dict[str, Stamp], kept: dict[str, IndexedFile]) -> dict[str, IndexedFile]:
-    """Read files, together with the plans of the same folder that are known already."""
+def _read(folder: Path, stale: dict[str, Stamp], unchanged: dict[str, IndexedFile]) -> dict[str, IndexedFile]:
+    """Read files, together with the plans of the same folder that are already known."""
     from stopgo.recordings.page.reviewed import reviewed
 
-    known = [name for name, file in kept.items() if file.plans]
+    known = [name for name, file in unchanged.items() if file.plans]
     read, faults = _opened(folder, sorted({*stale, *known}))
     found = reviewed(list(read.values()))
     by_name = dict(zip(read, found.recordings, strict=True))
@@ -160,7 +160,7 @@ def _read(folder: Path, stale: dict[str, Stamp], kept: dict[str, IndexedFile]) -
 
 
 def _opened(folder: Path, names: Iterable[str]) -> tuple[dict[str, Recording], dict[str, str]]:
-    """Recordings by name without their pictures, and why others cannot be read."""
+    """Return recordings by name without their drawings, and the errors of unreadable files."""
     from stopgo.recordings.embedded.reading import read_each
     from stopgo.recordings.embedded.values import Values
 
@@ -187,13 +187,13 @@ def _file(item: RecordingReview, stamp: Stamp) -> IndexedFile:
 
 
 def _plan(item: RecordingReview, mission: Mission) -> IndexedPlan:
-    told = (item.plan or {}).get("coverage")
+    coverage = (item.plan or {}).get("coverage")
     return IndexedPlan(
         mission_id=mission.id,
         revision=mission.revision,
         name=mission.name,
         stops=len(mission.stops),
-        coverage=None if told is None else float(told),
+        coverage=None if coverage is None else float(coverage),
     )
 
 
@@ -219,20 +219,20 @@ def _run(comparison: Comparison) -> IndexedRun:
 
 
 def index_text(index: RunIndex) -> str:
-    """Runs, the newest first, and plans, as tables."""
+    """Return runs, the newest first, and plans, as tables."""
     runs = [{**run_cells(run), "file": name} for name, run in index.runs()]
     plans = [
         (plan.name, plan.mission_id[:12], str(plan.revision), str(plan.stops), percent(plan.coverage), name)
         for name, plan in index.plans()
     ]
-    told = [table(tuple(runs[0]), [tuple(run.values()) for run in runs])] if runs else ["no runs"]
+    lines = [table(tuple(runs[0]), [tuple(run.values()) for run in runs])] if runs else ["no runs"]
     if plans:
-        told += ["", table(("plan", "mission id", "revision", "stops", "coverage", "file"), plans)]
-    return "\n".join(told)
+        lines += ["", table(("plan", "mission id", "revision", "stops", "coverage", "file"), plans)]
+    return "\n".join(lines)
 
 
 def run_cells(run: IndexedRun) -> dict[str, str]:
-    """What a table of runs tells of one, by column."""
+    """Return the cells of a run in a table, by column."""
     moment = datetime.datetime.fromtimestamp(run.began_ns / 1e9, tz=datetime.UTC)
     return {
         "began (UTC)": f"{moment:%Y-%m-%d %H:%M}",
@@ -250,7 +250,7 @@ def run_cells(run: IndexedRun) -> dict[str, str]:
 
 
 def index_json(index: RunIndex) -> dict[str, Any]:
-    """The same for programs."""
+    """Return the index for programs."""
     return {
         "runs": [{"file": name, **msgspec.to_builtins(run)} for name, run in index.runs()],
         "plans": [{"file": name, **msgspec.to_builtins(plan)} for name, plan in index.plans()],

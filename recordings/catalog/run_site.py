@@ -1,7 +1,7 @@
-"""The runs of a folder in a browser: a list, each mission's report, and Rerun's web viewer.
+"""Web pages of a folder's runs: a list, each mission's report, and Rerun's web viewer.
 
-All of it listens on this machine only, and answers only who calls it by this machine's name: a page of
-somebody else's that the same browser shows gets nothing.
+The server listens on this machine only, and answers only requests addressed to this machine's own name.
+So a foreign page in the same browser gets nothing.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ MergedFiles = tuple[tuple[str, int, int], ...]
 
 @dataclass(frozen=True)
 class SentPage:
-    """What is sent back."""
+    """Response to a request."""
 
     body: bytes
     kind: str = "text/html; charset=utf-8"
@@ -51,29 +51,29 @@ class SentPage:
 
 @dataclass
 class RunSite:
-    """The pages; they are made when they are asked for, of the folder as it is then."""
+    """Pages of a folder; each is made on request, from the folder's present content."""
 
     folder: Path
     viewer: str
-    """Where Rerun's web viewer is, such as http://127.0.0.1:9090."""
-    kept: Path
+    """Address of Rerun's web viewer, such as http://127.0.0.1:9090."""
+    merged_folder: Path
     """Folder for merged recordings."""
     address: str = ""
-    """Where these pages are."""
+    """Address of these pages."""
     _one_at_a_time: threading.Lock = field(default_factory=threading.Lock)
     _merged: dict[str, MergedFiles] = field(default_factory=dict)
-    """What each merged recording was made of."""
+    """Source files of each merged recording."""
 
     def answer(self, path: str) -> SentPage:
-        """The page, report or recording at a path."""
+        """Return the page, report or recording at a path."""
         try:
             with self._one_at_a_time:
                 return self._answer(path)
         except InputError as error:
-            told = str(error)
-        except OSError as error:  # a file that has just gone, a full disk
-            told = f"{error.filename or self.folder}: {error.strerror}"
-        return SentPage(whole_page(NAME, tag("p", shown(told))), status=HTTPStatus.CONFLICT)
+            message = str(error)
+        except OSError as error:  # for example, a file was just deleted, or the disk is full
+            message = f"{error.filename or self.folder}: {error.strerror}"
+        return SentPage(whole_page(NAME, tag("p", shown(message))), status=HTTPStatus.CONFLICT)
 
     def _answer(self, path: str) -> SentPage:
         index = index_of(self.folder)
@@ -108,9 +108,10 @@ class RunSite:
         return f"{opened} · {tag('a', 'report', href=f'/{name}.html')} ·"
 
     def _recording(self, name: str, files: Sequence[str]) -> SentPage:
-        """The mission's plan and runs as one; merged anew where a file has come, gone or changed."""
+        """Return the mission's plan and runs as one recording; merge again if a file has changed."""
         paths = [self.folder / file for file in files]
-        out, stamps = self.kept / f"{name}.rrd", tuple((str(path), *stamp_of(path)) for path in paths)
+        out = self.merged_folder / f"{name}.rrd"
+        stamps = tuple((str(path), *stamp_of(path)) for path in paths)
         if self._merged.get(name) != stamps:
             read = [item.recording for item in _read(paths).recordings]
             merge(read, out)
@@ -123,12 +124,12 @@ class RunSite:
 
 
 def name_of(mission_id: str) -> str:
-    """What a mission's pages are called: its id may be any text."""
+    """Return the name of a mission's pages: its id may be any text."""
     return hashlib.sha256(mission_id.encode()).hexdigest()[:32]
 
 
 def files_of(index: RunIndex) -> dict[str, list[str]]:
-    """The recordings of each mission, those of the newest run's mission first; plans before runs."""
+    """Return the recordings of each mission, the newest run's mission first; plans before runs."""
     found: dict[str, list[str]] = {run.mission_id: [] for _, run in index.runs()}
     for name, plan in index.plans():
         found.setdefault(plan.mission_id, []).append(name)
@@ -149,19 +150,19 @@ COLUMNS = ("began (UTC)", "run", "robot", "ended", "stops", "worst mm", "coverag
 
 
 def _cells(run: IndexedRun) -> tuple[str, ...]:
-    told = run_cells(run)
-    return tuple(told[column] for column in COLUMNS)
+    cells = run_cells(run)
+    return tuple(cells[column] for column in COLUMNS)
 
 
 class _Server(ThreadingHTTPServer):
     def handle_error(self, request: object, client_address: object) -> None:
-        """A browser that goes away in the middle of an answer is none."""
+        """Ignore a browser that disconnects during an answer."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)  # type: ignore[arg-type]
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Answers GET and HEAD; everything else is refused by the base."""
+    """Answers GET and HEAD; the base class refuses all other methods."""
 
     def __init__(self, site: RunSite, *given: object) -> None:
         self._site = site
@@ -189,13 +190,13 @@ class _Handler(BaseHTTPRequestHandler):
         if with_body:
             self.wfile.write(answer.body)
 
-    def log_message(self, *told: object) -> None:
-        """Nothing: what a browser asks for is nobody's business."""
+    def log_message(self, *arguments: object) -> None:
+        """Log nothing: requests of a browser are private."""
 
 
 @contextmanager
 def serving(folder: Path, *, port: int | None = None) -> Iterator[str]:
-    """The pages' address; they and the viewer are there until the block ends.
+    """Yield the pages' address; they and the viewer run until the block ends.
 
     Raises
     ------
@@ -205,9 +206,9 @@ def serving(folder: Path, *, port: int | None = None) -> Iterator[str]:
     index_of(folder)
     if not VIEWER.exists():
         raise InputError(f"--web: there is no Rerun viewer at {VIEWER}; install rerun-sdk again")
-    with TemporaryDirectory(prefix="stopgo-runs-") as kept:
+    with TemporaryDirectory(prefix="stopgo-runs-") as merged_folder:
         viewer_port = free_port()
-        site = RunSite(folder, f"http://{HERE}:{viewer_port}", Path(kept))
+        site = RunSite(folder, f"http://{HERE}:{viewer_port}", Path(merged_folder))
         server = listening(site, free_port() if port is None else port)
         thread = threading.Thread(target=server.serve_forever, daemon=True)
         thread.start()
@@ -222,25 +223,25 @@ def serving(folder: Path, *, port: int | None = None) -> Iterator[str]:
 
 
 def listening(site: RunSite, port: int) -> ThreadingHTTPServer:
-    """A server of the pages, which has still to be started; the site is told its address.
+    """Return a server of the pages, not yet started; the site gets its address.
 
     Raises
     ------
     InputError
-        When the port is taken, or is none.
+        When the port is taken or invalid.
     """
     try:
         server = _Server((HERE, port), partial(_Handler, site))
     except (OSError, OverflowError) as error:
         why = getattr(error, "strerror", None) or error
-        told = f"--port {port}: cannot listen there ({why}); leave it out, or give a free one"
-        raise InputError(told) from None
+        message = f"--port {port}: cannot listen there ({why}); leave it out, or give a free one"
+        raise InputError(message) from None
     site.address = f"http://{HERE}:{port}"
     return server
 
 
 def _web_viewer(port: int, address: str) -> subprocess.Popen[bytes]:
-    """Rerun's web viewer; given an address to open it starts no server for recordings of its own."""
+    """Start Rerun's web viewer; with an address to open it starts no recording server."""
     command = [
         str(VIEWER),
         "--bind",

@@ -1,7 +1,7 @@
-"""Point clouds of the scanner itself -> points in the mission's frame, piece by piece.
+"""Point clouds of the scanner itself, as points in the mission's frame, chunk by chunk.
 
-A reader is a function `(path) -> pieces`, and one line in `CLOUD_READERS`. Clouds are taken to be registered
-to the drawing's metres; only what lies between ankle and head height is of walls.
+A reader is a function `(path) -> chunks`, and one line in `CLOUD_READERS`. Clouds must be registered to the
+drawing's metres; only points between ankle and head height count as walls.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ import numpy as np
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray
 
-CloudPieces = Iterator[FloatArray]
+CloudChunks = Iterator[FloatArray]
 """Points (n, 3), one station or one part of a file at a time."""
-CloudReader = Callable[[Path], CloudPieces]
+CloudReader = Callable[[Path], CloudChunks]
 LOW_M, HIGH_M = 0.3, 2.0
 """Heights above the floor between which points count."""
-FLOOR_SHARE = 0.5
-"""Percent of points that lie below the floor's height: it is told from the first piece."""
+FLOOR_PERCENTILE = 0.5
+"""Percentile of point heights that is the floor; it is measured in the first chunk."""
 
 
-def _e57(path: Path) -> CloudPieces:
+def _e57(path: Path) -> CloudChunks:
     from stopgo.recordings.clouds.e57 import read_e57
 
     return read_e57(path)
 
 
-def _las(path: Path) -> CloudPieces:
+def _las(path: Path) -> CloudChunks:
     from stopgo.recordings.clouds.las import read_las
 
     return read_las(path)
 
 
-def _ply(path: Path) -> CloudPieces:
+def _ply(path: Path) -> CloudChunks:
     from stopgo.recordings.clouds.ply import read_ply
 
     return read_ply(path)
@@ -45,7 +45,7 @@ CLOUD_READERS: dict[str, CloudReader] = {".e57": _e57, ".las": _las, ".laz": _la
 
 
 def clouds_in(folder: Path) -> tuple[Path, ...]:
-    """The clouds in a folder, or the one that is named, by name.
+    """Return the clouds in a folder, or the given file, sorted by name.
 
     Raises
     ------
@@ -58,12 +58,12 @@ def clouds_in(folder: Path) -> tuple[Path, ...]:
     files = sorted(folder.iterdir()) if folder.is_dir() else [folder]
     found = tuple(path for path in files if path.suffix.lower() in CLOUD_READERS)
     if not found:
-        raise InputError(f"--clouds {folder}: holds no cloud; known are {known}")
+        raise InputError(f"--clouds {folder}: contains no cloud; give files of {known}")
     return found
 
 
 def levels(paths: tuple[Path, ...]) -> Iterator[FloatArray]:
-    """Points (n, 2) of every piece of every cloud that lie between ankle and head height.
+    """Yield points (n, 2) between ankle and head height, of every chunk of every cloud.
 
     Raises
     ------
@@ -72,9 +72,9 @@ def levels(paths: tuple[Path, ...]) -> Iterator[FloatArray]:
     """
     for path in paths:
         floor: float | None = None
-        for piece in CLOUD_READERS[path.suffix.lower()](path):
-            good = piece[np.isfinite(piece).all(axis=1)]
-            if len(good):
-                floor = float(np.percentile(good[:, 2], FLOOR_SHARE)) if floor is None else floor
-                height = good[:, 2] - floor
-                yield good[(height >= LOW_M) & (height <= HIGH_M), :2]
+        for chunk in CLOUD_READERS[path.suffix.lower()](path):
+            finite = chunk[np.isfinite(chunk).all(axis=1)]
+            if len(finite):
+                floor = float(np.percentile(finite[:, 2], FLOOR_PERCENTILE)) if floor is None else floor
+                height = finite[:, 2] - floor
+                yield finite[(height >= LOW_M) & (height <= HIGH_M), :2]

@@ -1,4 +1,4 @@
-"""E57 files, by pye57: one piece per station, at the station's own pose."""
+"""E57 files, read with pye57: one chunk per station, at the station's own pose."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stopgo.mission.geometry import FloatArray
 
 
 def read_e57(path: Path) -> Iterator[FloatArray]:
-    """Points (n, 3) of each station.
+    """Yield points (n, 3) of each station.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""LAS and LAZ files, by laspy."""
+"""LAS and LAZ files, read with laspy."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray
 
-PIECE = 1_000_000
-"""Points that are in memory at a time."""
+CHUNK = 1_000_000
+"""Number of points in memory at a time."""
 
 
 def read_las(path: Path) -> Iterator[FloatArray]:
-    """Points (n, 3), a million at a time.
+    """Yield points (n, 3), a million at a time.
 
     Raises
     ------
@@ -26,7 +26,7 @@ def read_las(path: Path) -> Iterator[FloatArray]:
 
     try:
         with laspy.open(path) as file:
-            for piece in file.chunk_iterator(PIECE):
-                yield np.stack([np.asarray(piece.x), np.asarray(piece.y), np.asarray(piece.z)], axis=-1)
+            for chunk in file.chunk_iterator(CHUNK):
+                yield np.stack([np.asarray(chunk.x), np.asarray(chunk.y), np.asarray(chunk.z)], axis=-1)
     except (laspy.errors.LaspyException, RuntimeError, ValueError, OSError) as error:
         raise InputError(f"{path}: cannot be read as LAS ({' '.join(str(error).split())[:100]})") from None

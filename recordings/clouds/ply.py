@@ -1,4 +1,4 @@
-"""PLY files: a header of text, then vertices as text or as numbers of either byte order."""
+"""PLY files: a text header, then vertices as text or as numbers of either byte order."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ TYPES = {
     "double": "f8", "float64": "f8",
 }  # fmt: skip
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
-PIECE = 1_000_000
+CHUNK = 1_000_000
 LONGEST_HEADER = 1000
 """Lines."""
 
 
 @dataclass(frozen=True)
 class Vertices:
-    """What the header says of the vertices, which come first."""
+    """Description of the vertices in the header; they are the first element."""
 
     order: str
     """`<` or `>`; empty for text."""
@@ -35,7 +35,7 @@ class Vertices:
 
 
 def read_ply(path: Path) -> Iterator[FloatArray]:
-    """Vertices (n, 3), a million at a time.
+    """Yield vertices (n, 3), a million at a time.
 
     Raises
     ------
@@ -43,15 +43,15 @@ def read_ply(path: Path) -> Iterator[FloatArray]:
         When it cannot be read, or its vertices have no x, y, z.
     """
     with path.open("rb") as file:
-        about = _header(file, path)
-        if set("xyz") - set(about.names):
+        header = _header(file, path)
+        if set("xyz") - set(header.names):
             raise InputError(f"{path}: its vertices have no x, y, z")
-        yield from _text(file, about, path) if not about.order else _numbers(file, about, path)
+        yield from _text(file, header, path) if not header.order else _numbers(file, header, path)
 
 
 def _header(file: BinaryIO, path: Path) -> Vertices:
     if file.readline(8).strip() != b"ply":
-        raise InputError(f"{path}: does not begin as a PLY does")
+        raise InputError(f"{path}: invalid PLY header; incomplete copy?")
     order, count, element = "", 0, ""
     names: list[str] = []
     kinds: list[str] = []
@@ -71,30 +71,32 @@ def _header(file: BinaryIO, path: Path) -> Vertices:
                 break
             names.append(words[2])
             kinds.append(TYPES[words[1]])
-    raise InputError(f"{path}: its header is none of a PLY with vertices first")
+    raise InputError(f"{path}: PLY header does not have vertices first; convert the file")
 
 
-def _numbers(file: BinaryIO, about: Vertices, path: Path) -> Iterator[FloatArray]:
-    kind = np.dtype([(name, about.order + code) for name, code in zip(about.names, about.kinds, strict=True)])
-    left = about.count
+def _numbers(file: BinaryIO, header: Vertices, path: Path) -> Iterator[FloatArray]:
+    kind = np.dtype(
+        [(name, header.order + code) for name, code in zip(header.names, header.kinds, strict=True)]
+    )
+    left = header.count
     while left > 0:
-        data = file.read(min(left, PIECE) * kind.itemsize)
+        data = file.read(min(left, CHUNK) * kind.itemsize)
         rows = np.frombuffer(data[: len(data) // kind.itemsize * kind.itemsize], kind)
         if not len(rows):
-            raise InputError(f"{path}: ends {left} vertices too early")
+            raise InputError(f"{path}: {left} vertices are missing at its end; incomplete copy?")
         left -= len(rows)
         yield np.stack([rows[axis].astype(float) for axis in "xyz"], axis=-1)
 
 
-def _text(file: BinaryIO, about: Vertices, path: Path) -> Iterator[FloatArray]:
-    at = [about.names.index(axis) for axis in "xyz"]
-    left = about.count
+def _text(file: BinaryIO, header: Vertices, path: Path) -> Iterator[FloatArray]:
+    at = [header.names.index(axis) for axis in "xyz"]
+    left = header.count
     while left > 0:
-        lines = [line for line in (file.readline() for _ in range(min(left, PIECE))) if line]
+        lines = [line for line in (file.readline() for _ in range(min(left, CHUNK))) if line]
         if not lines:
-            raise InputError(f"{path}: ends {left} vertices too early")
+            raise InputError(f"{path}: {left} vertices are missing at its end; incomplete copy?")
         left -= len(lines)
         try:
             yield np.array([[float(line.split()[k]) for k in at] for line in lines])
         except (ValueError, IndexError):
-            raise InputError(f"{path}: a vertex in it is no numbers") from None
+            raise InputError(f"{path}: a vertex is not made of numbers") from None

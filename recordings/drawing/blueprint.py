@@ -1,4 +1,4 @@
-"""The blueprint of every recording: what a viewer shows when it opens a plan, a field run, or both."""
+"""Blueprint of every recording: the viewer's layout for a plan, a field run, or both."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ BACKGROUND = (18, 20, 26, 255)
 
 
 Bounds = tuple[float, float, float, float]
-"""Least x, least y, greatest x, greatest y in local metres, y up."""
+"""Least x, least y, greatest x, greatest y in local metres; y points up."""
 STEPS_PER_SECOND = 4.0
-"""How fast the candidates and the selection are played."""
+"""Playback speed of the candidates and of the selection."""
 MARGIN = 0.04
-"""Empty space around the drawing, as a share of its size."""
+"""Empty space around the drawing, as a fraction of its size."""
 
 
 def blueprint(bounds: Bounds | None = None, runs: Sequence[str] = ()) -> rrb.Blueprint:
-    """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`.
+    """Return tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`.
 
-    It is the same for plans and runs, so that it does not matter which is opened last: all is shown at its
-    newest moment, a live run as it goes on, a recorded one at its end. With `runs`, for exactly these: each
-    has a colour and a report of its own.
+    Plans and runs have the same blueprint, so the order of opening them does not matter. Views show the
+    newest moment: a live run while it goes on, a recorded run at its end. `runs` names the runs that are
+    shown together; each gets its own colour and report.
     """
     return rrb.Blueprint(
         rrb.Tabs(
@@ -80,7 +80,7 @@ def _run_report(run: str) -> rrb.TextDocumentView:
 
 
 def _run_colours(runs: Sequence[str]) -> Any:
-    """A colour of its own for what each of several runs drove."""
+    """Return a colour for the driven path of each of several runs."""
     if len(runs) < 2:
         return {}
     return {
@@ -103,7 +103,7 @@ def _colour(number: int) -> Colour:
 
 
 def _story(bounds: Bounds | None) -> rrb.Horizontal:
-    """How the plan was made, in one place; on the mission's time, what it came to."""
+    """Show in one view how the plan was made; on mission time, show the result."""
     adding = {entity: _rows_so_far() for entity in (at.SELECTION_SEEN, at.SELECTION_STOPS)}
     contents = (at.FLOOR, at.NAVIGABLE, at.TARGETS, at.CANDIDATES, at.SELECTION)
     return rrb.Horizontal(
@@ -118,7 +118,7 @@ def _story(bounds: Bounds | None) -> rrb.Horizontal:
 
 
 def _rows_so_far() -> rrb.VisibleTimeRanges:
-    """All rows up to now, of what adds up along the story."""
+    """All rows up to now, for entities that accumulate along the planning steps."""
     return rrb.VisibleTimeRanges([_until_now(timeline) for timeline in (at.STEP, at.MISSION_TIME)])
 
 
@@ -156,7 +156,7 @@ def _log() -> rrb.TextLogView:
 
 
 def _visible(bounds: Bounds | None) -> rrb.VisualBounds2D | None:
-    """Rerun's bounds are y-down."""
+    """Bounds for Rerun, whose 2D y axis points down."""
     if bounds is None:
         return None
     left, low, right, high = bounds
@@ -169,7 +169,7 @@ def _visible(bounds: Bounds | None) -> rrb.VisualBounds2D | None:
 def _flat(
     name: str, area: rrb.VisualBounds2D | None, *contents: str, time_ranges: Any = None, overrides: Any = None
 ) -> rrb.Spatial2DView:
-    """A y-up 2D view: its origin lies above the flip."""
+    """2D view with y up: its origin is above the entity that flips y."""
     return rrb.Spatial2DView(
         origin=at.ROOT,
         contents=[under(entity) for entity in contents],
@@ -194,7 +194,7 @@ def _solid(bounds: Bounds | None) -> rrb.Spatial3DView:
 
 
 def _from_the_south(bounds: Bounds) -> rrb.EyeControls3D:
-    """An eye that looks down into the rooms, north at the top."""
+    """Camera that looks down into the rooms, with north at the top."""
     left, low, right, high = bounds
     x, y, size = (left + right) / 2, (low + high) / 2, max(right - left, high - low, 1.0)
     return rrb.EyeControls3D(
@@ -217,13 +217,13 @@ def _plot(
 
 
 def _whole() -> rrb.TimeAxis:
-    """All of the timeline; Rerun's own choice is a minute around the cursor."""
+    """Whole timeline; Rerun's default is a minute around the cursor."""
     everything = rrb.TimeRange(start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite())
     return rrb.TimeAxis(view_range=everything)
 
 
 def _so_far() -> list[rr.VisibleTimeRange]:
-    """The driven path is rows of short pieces: show all of them up to now."""
+    """All rows up to now: the driven path consists of many short strips."""
     return [_until_now(timeline) for timeline in (at.MISSION_TIME, at.ROBOT_TIME)]
 
 

@@ -1,4 +1,33 @@
-"""A Rerun stream to draw on: opened strictly, in metres from a local origin, static or at given times."""
+"""Canvas: an open Rerun recording, and the methods by which all drawing functions write to it.
+
+Data. A `Canvas` has three things: the Rerun stream, the local origin, and the number of rows written per
+entity. A `Sheet` is known before anything is drawn: recording id, name, origin and extent.
+
+Coordinates. Callers give positions in the drawing's metres, x right and y up. Rerun stores float32, so far
+from zero a millimetre is lost. `local` therefore subtracts the local origin in float64 before it converts.
+All recordings of a mission have the same local origin (`mission_origin`), so a plan and its runs overlay.
+Rerun's 2D views have y down: a transform at PLAN and FIELD flips y once, and every 2D view has its origin
+above it. 3D entities below WORLD are not flipped.
+
+Time. A row is either static or has at least one time:
+
+- `show` writes a static row. It is valid at every time of every timeline, and replaces the last one.
+- `at` writes one row at the given times. Rerun makes a row without a time static, so `at` refuses that.
+- `since` writes a row that is visible from a planning step on, and always on the other plan timelines.
+- `columns` writes many rows at once, one per time of its index.
+- `copy_chunk` copies rows of another recording; that must have the same local origin.
+
+The timelines are named in `entities`: planning step, candidate, stop, mission time and robot time.
+
+Invariants:
+
+- `counts` has an entry for every entity that was drawn: 1 or more. The recording's last property lists it,
+  so a reader finds rows that are missing from a truncated file. Write only through the methods above.
+- A property (`describe`) has the same type in every recording: Rerun refuses to merge other types.
+- Rerun runs in strict mode: a wrong argument raises an error, and does not only print a warning.
+- The recording stays in memory. The caller takes its bytes with `drain` and writes the file. Rerun's own
+  file writer may block forever when the disk is full.
+"""
 
 from __future__ import annotations
 
@@ -21,32 +50,32 @@ from stopgo.recordings.drawing import entities, palette
 from stopgo.recordings.drawing.blueprint import Bounds, blueprint
 
 FAR = 1000.0
-"""Rerun stores float32; beyond this distance a millimetre is lost, and a local origin is used."""
+"""Limit in metres: Rerun stores float32, so beyond it a millimetre is lost and a local origin is used."""
 GRID = 100.0
 
 LocalOrigin = tuple[float, float]
 
 
 def local_origin(x: float, y: float) -> LocalOrigin:
-    """The drawing's own origin, or for far coordinates a round point near (x, y)."""
+    """Return the drawing's own origin, or for far coordinates a round point near (x, y)."""
     if max(abs(x), abs(y)) <= FAR:
         return (0.0, 0.0)
     return (round(x / GRID) * GRID, round(y / GRID) * GRID)
 
 
 def mission_origin(mission: Mission) -> LocalOrigin:
-    """The local origin of every recording of this mission, so that they overlay."""
+    """Return the local origin of every recording of this mission, so that they overlay."""
     return local_origin(mission.start.x, mission.start.y)
 
 
 def on_screen(points: float) -> float:
-    """A radius in points of the screen, whatever the zoom: Rerun tells them from metres by the sign."""
+    """Return a radius in points of the screen at any zoom; Rerun takes negative radii as points."""
     return -points
 
 
 @dataclass(frozen=True)
 class Canvas:
-    """What drawing functions draw on; positions are given in the drawing's metres."""
+    """Open recording that drawing functions write to; positions are in the drawing's metres."""
 
     stream: rr.RecordingStream
     origin: LocalOrigin
@@ -54,20 +83,20 @@ class Canvas:
     counts: Counter[str] = field(default_factory=Counter)
     """Rows drawn so far, by entity."""
 
-    def taken(self) -> bytes:
-        """All that was drawn since it was last taken, as a recording in Rerun's format."""
+    def drain(self) -> bytes:
+        """Return the bytes drawn since the last call, as a recording in Rerun's format."""
         return self.drawn.read() or b""
 
     def local(self, xy: FloatArray) -> NDArray[Any]:
-        """Points (…, 2) relative to the local origin, as Rerun stores them."""
+        """Return points (…, 2) relative to the local origin, as Rerun stores them."""
         return (np.asarray(xy, dtype=np.float64) - self.origin).astype(np.float32)
 
     def strips(self, strips: Iterable[FloatArray]) -> list[NDArray[Any]]:
-        """Line strips relative to the local origin."""
+        """Return line strips relative to the local origin."""
         return [self.local(strip) for strip in strips]
 
     def show(self, entity: str, *archetypes: Any) -> None:
-        """Draw at every time of every timeline."""
+        """Draw a static row: it is visible at every time of every timeline."""
         self.counts[entity] = max(1, self.counts[entity])
         self.stream.log(entity, *archetypes, static=True)
 
@@ -82,7 +111,7 @@ class Canvas:
         mission_s: float | None = None,
         robot_ns: int | None = None,
     ) -> None:
-        """Draw at the given times, of which there must be one: Rerun makes rows without a time static."""
+        """Draw a row at the given times, at least one: Rerun makes a row without a time static."""
         if step is candidate is stop is mission_s is robot_ns is None:
             raise ValueError(f"{entity}: no time given")
         self.stream.reset_time()
@@ -100,27 +129,27 @@ class Canvas:
         self.stream.log(entity, archetype)
 
     def since(self, entity: str, *archetypes: Any, step: int, planning_only: bool = False) -> None:
-        """Draw from a planning step on, and all the time on the other timelines of a plan.
+        """Draw from a planning step on, and always on the other timelines of a plan.
 
-        With `planning_only` not on the mission's time, where all that planning came to is shown at once.
+        With `planning_only` not on mission time, where only the result of planning is visible.
         """
         mission_s = None if planning_only else 0.0
         for archetype in archetypes:
             self.at(entity, archetype, step=step, candidate=0, stop=1, mission_s=mission_s)
 
-    def take(self, chunk: Chunk) -> None:
-        """Take a part of another recording of the same origin as it is."""
+    def copy_chunk(self, chunk: Chunk) -> None:
+        """Copy rows of another recording that has the same local origin."""
         entity = str(chunk.entity_path)
         self.counts[entity] += 0 if chunk.is_static else chunk.num_rows
         self.counts[entity] = max(1, self.counts[entity])
         self.stream.send_chunks([chunk])
 
     def say(self, text: str, *, level: str = "INFO", step: int = 0) -> None:
-        """One line of the plan's log, at this planning step and at the mission's start."""
+        """Write one line of the plan's log, at this planning step and at the mission's start."""
         self.at(entities.LOG_PLAN, rr.TextLog(text, level=level), step=step, mission_s=0.0)
 
     def describe(self, name: str, values: dict[str, Any]) -> None:
-        """A property of the recording; each value must be of one type wherever this name is used."""
+        """Write a property of the recording; a value must have one type in all recordings."""
         self.stream.send_property(name, rr.DynamicArchetype(name, components=values))
 
     def columns(self, entity: str, index: rr.TimeColumn | Sequence[rr.TimeColumn], *groups: Any) -> None:
@@ -132,15 +161,15 @@ class Canvas:
 
 @dataclass(frozen=True, kw_only=True)
 class Sheet:
-    """What a recording is of, known before anything is drawn."""
+    """Identity and extent of a recording, known before anything is drawn."""
 
     recording_id: str
     name: str
     origin: LocalOrigin
     extent: Bounds
-    """What 2D views show, in the drawing's metres."""
+    """Visible area of 2D views, in the drawing's metres."""
     runs: tuple[str, ...] = ()
-    """Runs that are looked at together, each with a colour and a report of its own."""
+    """Runs that are shown together, each with its own colour and report."""
 
     @property
     def local_extent(self) -> Bounds:
@@ -150,11 +179,11 @@ class Sheet:
 
 @contextmanager
 def open_canvas(sheet: Sheet, *, port: int | None = None) -> Iterator[Canvas]:
-    """A recording in memory, with the blueprint that all recordings share.
+    """Open a recording in memory, with the blueprint that all recordings share.
 
-    Who opens it writes it: Rerun's own writers end in a thread of theirs when the disk is full, and whoever
-    waits for them waits for ever. With a port, viewers of this machine can follow there what is drawn;
-    until it is closed, all of it is kept for those that come later.
+    The caller writes the bytes to a file: Rerun's own writer runs in a thread, and may block forever when the
+    disk is full. With a port, viewers on this machine can follow the drawing there. Until the canvas is
+    closed, all data stays in memory for viewers that connect later.
     """
     rr.set_strict_mode(True)
     with rr.RecordingStream(
@@ -172,7 +201,7 @@ def open_canvas(sheet: Sheet, *, port: int | None = None) -> Iterator[Canvas]:
 
 
 def layout_alone(sheet: Sheet) -> bytes:
-    """The blueprint of a recording, in Rerun's format."""
+    """Return the blueprint of a recording, in Rerun's format."""
     with TemporaryDirectory() as folder:
         path = Path(folder, "layout.rbl")
         blueprint(sheet.local_extent, sheet.runs).save(entities.APPLICATION, path)
@@ -180,7 +209,7 @@ def layout_alone(sheet: Sheet) -> bytes:
 
 
 def _prepare(canvas: Canvas) -> None:
-    """The flip that makes 2D views y-up, and the classes."""
+    """Draw the flip that makes 2D views y-up, and the classes."""
     flip = rr.Transform3D(scale=[1, -1, 1])
     canvas.show(entities.PLAN, flip)
     canvas.show(entities.FIELD, flip)

@@ -1,7 +1,7 @@
-"""Names inside a recording: its application, timelines and entity paths, which exist nowhere else.
+"""Names inside a recording: application, timelines and entity paths, which are defined only here.
 
 Everything under `PLAN` and `FIELD` is 2D, everything under `WORLD` 3D; both are metres from the same local
-origin. `SPACE` carries the flip that turns Rerun's y-down 2D views into y-up drawings.
+origin. `PLAN` and `FIELD` have the flip that turns Rerun's y-down 2D views into y-up drawings.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from dataclasses import dataclass
 APPLICATION = "stopgo"
 
 STEP = "stage_step"
-"""Sequence: the planning story: floor, space, candidates, each choice of a stop, and at last the route."""
+"""Sequence of planning steps: floor, space, candidates, each choice of a stop, and the route at the end."""
 STOP_NUMBER = "stop"
 """Sequence: the stops in the order of driving, from 1."""
 CANDIDATE = "candidate"
-"""Sequence: the row of `Visibility` whose view is drawn."""
+"""Sequence: row of `Visibility` whose view is drawn."""
 MISSION_TIME = "mission_time"
-"""Duration since the mission began: the axis that the planned and the driven run share."""
+"""Duration since the mission began: common axis of the planned and the driven run."""
 ROBOT_TIME = "robot_time"
 """Timestamp on the robot's clock."""
 
@@ -93,11 +93,11 @@ LOG_PLAN = "/log/plan"
 LOG_FIELD = "/log/field"
 REPORT = "/report"
 LATEST_REPORT = "/latest_report"
-"""What is to be read first: the plan's report, and from a run's start on that of the run."""
+"""Report to read first: the plan's, and from the start of a run the run's."""
 STORY = "/story"
-"""What a planning step did, in words."""
+"""Description of a planning step."""
 STOP_STORY = "/stop_story"
-"""What a stop is for, in words."""
+"""Description of a stop's purpose."""
 PLANNED_STATE = "/plan/schedule/planned"
 
 MISSION = "/carried/mission"
@@ -114,27 +114,27 @@ PROPERTY_END = "end"
 
 
 def under(entity: str) -> str:
-    """The expression that takes an entity and everything below it into a view."""
+    """Return the expression that puts an entity and everything below it into a view."""
     return f"{entity}/**"
 
 
-def part(entity: str, name: str) -> str:
-    """One of several alike below an entity, such as the elements of a kind."""
+def child(entity: str, name: str) -> str:
+    """Return one of several similar entities below an entity, such as the elements of a kind."""
     return f"{entity}/{name}"
 
 
 def headings(stops: str) -> str:
-    """Where the scanner faces at stops."""
+    """Headings of the scanner at stops."""
     return f"{stops}/heading"
 
 
 def poles(stops: str) -> str:
-    """What stops stand on in 3D."""
+    """Poles below the stops in 3D."""
     return f"{stops}/poles"
 
 
 def shape(robot: str) -> str:
-    """What is drawn of a robot; the robot's own entity is its pose."""
+    """Shape of a robot; the robot's own entity is its pose."""
     return f"{robot}/shape"
 
 
@@ -145,23 +145,23 @@ class RunEntities:
     run_id: str
 
     def flat(self, name: str) -> str:
-        """In 2D; also states and texts, which are in no space."""
+        """Entity in 2D; also for states and texts, which have no space."""
         return f"{FIELD}/{self.run_id}/{name}"
 
     def solid(self, name: str) -> str:
-        """In 3D."""
+        """Entity in 3D."""
         return f"{WORLD_FIELD}/{self.run_id}/{name}"
 
     def metric(self, metric: str) -> str:
-        """Of the METRIC_s that are of runs."""
+        """Entity of a METRIC_ that runs have."""
         return f"{metric}/{self.run_id}"
 
     def tolerance(self, metric: str) -> str:
-        """What is tolerated of a metric."""
+        """Tolerance of a metric."""
         return f"{self.metric(metric)}/tolerance"
 
     def revision(self, number: int) -> Revision:
-        """Of what a revision changed while the run was under way."""
+        """Entities of what a revision changed during the run."""
         return Revision(self, number)
 
     @property
@@ -175,23 +175,23 @@ class RunEntities:
 
     @property
     def health(self) -> str:
-        """How the base was, as values."""
+        """Health reports of the base as values."""
         return self.flat(HEALTH)
 
 
 @dataclass(frozen=True)
 class Revision:
-    """What a revision changed while a run was under way."""
+    """Entities of what a revision changed during a run."""
 
     run: RunEntities
     number: int
 
     def flat(self, name: str) -> str:
-        """In 2D."""
+        """Entity in 2D."""
         return self.run.flat(f"revision_{self.number}/{name}")
 
     def solid(self, name: str) -> str:
-        """In 3D."""
+        """Entity in 3D."""
         return self.run.solid(f"revision_{self.number}/{name}")
 
 
@@ -219,17 +219,17 @@ NEW_ROUTE = "route"
 
 
 def mission(revision: int) -> str:
-    """The document of a revision."""
+    """Document of a revision."""
     return f"{MISSION}/revision_{revision}"
 
 
 def sight(revision: int) -> str:
-    """What the stops of a revision see."""
+    """Visibility of a revision's stops."""
     return f"{SIGHT}/revision_{revision}"
 
 
-def carries(entity: str) -> bool:
-    """Whether values of the entity are read back."""
+def is_embedded(entity: str) -> bool:
+    """True if values of the entity are read back."""
     parts = entity.split("/")
     if entity in (FINDINGS, REASONS) or entity.startswith((f"{MISSION}/", f"{SIGHT}/", f"{FLOOR}/")):
         return True
@@ -237,6 +237,6 @@ def carries(entity: str) -> bool:
 
 
 def run_of_events(entity: str) -> str | None:
-    """The run whose events the entity holds, if it does."""
+    """Return the run whose events the entity contains; None for other entities."""
     parts = entity.split("/")
     return parts[2] if len(parts) == 4 and entity == RunEntities(parts[2]).events else None

@@ -1,4 +1,4 @@
-"""A plan and a run in words: the markdown reports and the properties that travel inside recordings."""
+"""Markdown reports of a plan, and the properties that recordings contain."""
 
 from __future__ import annotations
 
@@ -14,41 +14,46 @@ from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, 
 from stopgo.mission.stages.figures import Figures, percent
 from stopgo.recordings.drawing.canvas import LocalOrigin
 
-Nouns = dict[type, Any]
+StageResults = dict[type, Any]
 
 
-def plan_results(nouns: Nouns) -> dict[str, Any]:
-    """What the stages of a plan came to, by name; stages that were not reached are left out."""
+def plan_results(stages: StageResults) -> dict[str, Any]:
+    """Return the results of a plan's stages by name; stages that were not reached are left out."""
     results: dict[str, Any] = {}
     for kind, summarise in _RESULTS.items():
-        if kind in nouns:
-            results.update(summarise(nouns[kind]))
+        if kind in stages:
+            results.update(summarise(stages[kind]))
     return results
 
 
-def parameters(nouns: Nouns) -> dict[str, Any] | None:
-    """The settings the plan was made with, by name, if any noun tells them."""
-    if NavigableSpace in nouns:
-        settings: dict[str, Any] = msgspec.to_builtins(nouns[NavigableSpace].settings)
+def parameters(stages: StageResults) -> dict[str, Any] | None:
+    """Return the parameters of the plan by name, if a stage result has them."""
+    if NavigableSpace in stages:
+        settings: dict[str, Any] = msgspec.to_builtins(stages[NavigableSpace].settings)
         return settings
-    return nouns[Mission].origin.parameters if Mission in nouns else None
+    return stages[Mission].origin.parameters if Mission in stages else None
 
 
 def parameter_values(values: dict[str, Any]) -> dict[str, str]:
-    """The settings as texts, so that a parameter has one type whatever its value."""
+    """Return the parameters as texts, so that each has one type whatever its value."""
     return {
         name: value if isinstance(value, str) else msgspec.json.encode(value).decode()
         for name, value in values.items()
     }
 
 
-def plan_report(nouns: Nouns, origin: LocalOrigin) -> str:
-    """The plan in markdown."""
-    results = plan_results(nouns)
-    title = nouns[Mission].name if Mission in nouns else results.get("floor", "plan")
+def plan_report(stages: StageResults, origin: LocalOrigin) -> str:
+    """Return the plan as markdown."""
+    results = plan_results(stages)
+    title = stages[Mission].name if Mission in stages else results.get("floor", "plan")
     lines = [f"# {title}", "", "| | |", "|---|---|"]
     lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in _ordered(results)]
-    lines += ["", *_coverage_table(nouns.get(Figures)), *_stop_table(nouns.get(Mission)), *_findings(nouns)]
+    lines += [
+        "",
+        *_coverage_table(stages.get(Figures)),
+        *_stop_table(stages.get(Mission)),
+        *_findings(stages),
+    ]
     lines += ["## Colours", "", *_COLOURS, "", "## Looking around", "", *_GUIDE, *_origin_note(origin)]
     return "\n".join(lines)
 
@@ -57,7 +62,7 @@ FIRST = (
     *("stops", "stops_bound", "coverage", "coverage_required", "route_m", "route_bound_m"),
     *("planned_s", "least_time_bound_s", "two_step_s"),
 )
-"""What a reader looks for first."""
+"""Results listed first."""
 
 
 def _ordered(results: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -171,7 +176,7 @@ def _stop_table(mission: Mission | None) -> list[str]:
 
 
 def _coverage_table(figures: Figures | None) -> list[str]:
-    """What the stops see of everything, least seen first, and what is left out."""
+    """Return the coverage by room and kind, lowest first, and the rooms left out."""
     if figures is None:
         return []
     unit = figures.unit
@@ -191,15 +196,15 @@ def _coverage_table(figures: Figures | None) -> list[str]:
 
 
 def plain(content: str) -> str:
-    """Text from outside as markdown shows it letter by letter: nothing in it marks up anything."""
+    """Escape text from outside, so that markdown shows it letter by letter."""
     return "".join(f"\\{letter}" if letter in _MARKS else letter for letter in printable(content))
 
 
 _MARKS = frozenset("\\`*_{}[]<>()#+-!|~")
 
 
-def _findings(nouns: Nouns) -> list[str]:
-    holder = nouns.get(Figures) or nouns.get(NavigableSpace) or nouns.get(FloorPlan)
+def _findings(stages: StageResults) -> list[str]:
+    holder = stages.get(Figures) or stages.get(NavigableSpace) or stages.get(FloorPlan)
     if holder is None or not holder.findings:
         return []
     return ["## Findings", "", *(f"- **{item.code}** {plain(item.message)}" for item in holder.findings), ""]
@@ -209,19 +214,19 @@ _COLOURS = (
     "- targets: blue seen by a stop, light grey not seen, dark grey seen from no candidate, yellow new",
     "- of a run: bold blue was scanned, thick orange-red was planned and lost; a cross is a stop left out",
     "- stops light green with their number, doorway stops light blue",
-    "- route yellow, way back dark yellow; run purple",
-    "- grey: stops and ways that a revision has withdrawn during a run",
+    "- route yellow, return path dark yellow; run purple",
+    "- grey: stops and legs that a revision has withdrawn during a run",
     "- openings: white passable, orange-red not",
-    "- candidates: yellow kept, reddish dropped; point at one to see why",
+    "- candidates: yellow kept, reddish dropped; point at one for the reason",
     "- walls grey, columns orange, beams purple, stairs teal, windows and railings blue, holes rose",
 )
 
 _GUIDE = (
     "- timeline `mission_time`: the planned drive, and the field run when its recording is open too",
     "- timeline `candidate`: what each candidate sees (tab *Candidates*)",
-    "- timeline `stage_step`: how the plan was made, step by step (tab *Planning*); the log tells each",
+    "- timeline `stage_step`: how the plan was made, step by step (tab *Planning*); the log describes each",
     "- timeline `stop`: why each stop is there (tab *Stops*); on `mission_time`, the stop that is driven to",
-    "- walls in 3D are cut at a nominal 1.2 m: the drawing tells no heights",
+    "- walls in 3D are cut at a nominal 1.2 m: the drawing contains no heights",
 )
 
 

@@ -1,4 +1,4 @@
-"""Colours and classes: one meaning, one colour, in every view of every recording."""
+"""Colours and classes: one colour per meaning, in every view of every recording."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ GREEN: Colour = (0, 158, 115, 255)
 YELLOW: Colour = (240, 228, 66, 255)
 VERMILION: Colour = (213, 94, 0, 255)
 PURPLE: Colour = (204, 121, 167, 255)
-"""Okabe and Ito's colours: told apart whatever colours an eye sees."""
+"""Okabe and Ito's colours, which people with colour blindness can distinguish."""
 RUNS = (PURPLE, SKY, ORANGE, GREEN, YELLOW, VERMILION)
-"""Colours of runs that are looked at together."""
+"""Colours of runs that are shown together."""
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """A class id of Rerun: hovering shows its label."""
+    """Class id of Rerun: hovering shows its label."""
 
     number: int
     label: str
@@ -51,11 +51,11 @@ _REASON_COLOURS: dict[int, Colour] = {
     stages.AT_EDGE: (200, 105, 60, 255),
     stages.OTHER_PART: (110, 95, 150, 255),
 }
-"""Dropped candidates are dim, and reddish for every reason without a colour of its own."""
+"""Colours of dropped candidates: dim, and reddish for a reason without its own colour."""
 
 
 def reason(number: int) -> Meaning:
-    """The class of candidates whose reason is `DROP_REASONS[number]`."""
+    """Return the class of candidates whose reason is `DROP_REASONS[number]`."""
     label = DROP_REASONS[number]
     verb = "candidate" if number == 0 else "dropped candidate"
     return Meaning(_FIRST_REASON + number, f"{verb}: {label}", _REASON_COLOURS.get(number, _DROPPED))
@@ -75,7 +75,7 @@ KIND_COLOURS: dict[str, Colour] = {
     "railings": (110, 135, 225, 255),
     "other": (150, 130, 105, 255),
 }
-"""Every element kind of `stopgo.mission.settings.element_kinds.KINDS`."""
+"""Colour of every element kind of `stopgo.mission.settings.element_kinds.KINDS`."""
 
 OUTLINE: Colour = (110, 118, 135, 255)
 HOLE: Colour = (175, 95, 120, 255)
@@ -99,9 +99,9 @@ LOST: Colour = VERMILION
 SLAB: Colour = (62, 68, 80, 255)
 
 LABEL_GROUNDS: tuple[Colour, ...] = ((18, 20, 26, 255), (121, 122, 125, 255))
-"""What Rerun draws the letters of a label on, in its dark and in its light theme, as measured on pictures.
+"""Background of a label's letters in Rerun's dark and light theme, as measured on pictures.
 
-The letters have the colour of what is named: what has a name is light."""
+The letters have the colour of the named object, so named objects are light."""
 ROOM_NAME: Colour = (216, 219, 225, 255)
 STOP: Colour = (116, 243, 182, 255)
 RUNNER_UP: Colour = (255, 212, 140, 255)
@@ -127,9 +127,9 @@ STATE_COLOURS: dict[str, Colour] = {
     "SKIPPED": ORANGE,
     "FAILED": VERMILION,
 }
-"""Every state of a robot and of a stop."""
+"""Colour of every state of a robot and of a stop."""
 
 
 def class_rows() -> list[tuple[Any, ...]]:
-    """Rows for Rerun's annotation context: class id, label, colour."""
+    """Return the rows of Rerun's annotation context: class id, label, colour."""
     return [(item.number, item.label, item.colour) for item in MEANINGS]

@@ -1,4 +1,4 @@
-"""Pens: with what colour, how wide, and above what else lines are drawn in 2D."""
+"""Pens: colour, width and drawing order of lines in 2D."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from stopgo.recordings.drawing.canvas import Canvas, on_screen
 from stopgo.recordings.drawing.palette import Colour
 
 ORDER = {
-    name: float(place)
-    for place, name in enumerate(
+    name: float(rank)
+    for rank, name in enumerate(
         (
             *("room", "area", "floor", "solid", "line", "target", "seen", "ray", "route"),
             *("candidate", "stop", "arrival", "scan", "robot"),
         )
     )
 }
-"""What lies above what; Rerun's own defaults are 20 for lines and 30 for points."""
+"""Drawing order from low to high; Rerun's own defaults are 20 for lines and 30 for points."""
 
 HAIR, THIN, THICK, BOLD = (on_screen(width) for width in (0.5, 0.8, 1.6, 2.5))
 
 
 @dataclass(frozen=True)
 class Pen:
-    """How lines look: `order` is a key of ORDER, `radius` as Rerun takes it."""
+    """Look of lines: `order` is a key of ORDER, `radius` as Rerun takes it."""
 
     colour: Colour
     order: str
@@ -45,9 +45,9 @@ def draw(
     step: int | None = None,
     planning_only: bool = False,
 ) -> None:
-    """Draw line strips, if there are any, from a planning step on if one is given.
+    """Draw line strips, if there are any; with `step`, from that planning step on.
 
-    `names`, one for each, are shown where the mouse points.
+    `names`, one per strip, are shown at the mouse pointer.
     """
     local = canvas.strips(strips)
     if local:
@@ -61,6 +61,6 @@ def draw(
 
 
 def style(canvas: Canvas, entity: str, pen: Pen) -> None:
-    """Give lines that change their unchanging look."""
+    """Set the static look of lines whose positions change."""
     fields = rr.LineStrips2D.from_fields(colors=pen.colour, radii=pen.radius, draw_order=ORDER[pen.order])
     canvas.show(entity, fields)

@@ -1,4 +1,4 @@
-"""The robot's shape, which its pose moves about, in 2D and 3D."""
+"""Shape of the robot in 2D and 3D; the pose moves it."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Draw = Callable[[str, Any], None]
 
 
 def draw_robot(draw: Draw, flat: str, solid: str, *, radius: float, colour: Colour) -> None:
-    """The robot's shape in 2D and 3D; its pose is the transform of the entities `flat` and `solid`.
+    """Draw the robot's shape in 2D and 3D; its pose is the transform of the entities `flat` and `solid`.
 
-    Before the first pose it would be shown at the origin: `draw` draws it at the time of that pose.
+    Before the first pose, Rerun would show it at the origin: `draw` draws it at the time of that pose.
     """
     body, nose = strokes.circle(radius), np.array([[0.0, 0.0], [radius * 1.6, 0.0]])
     lines = rr.LineStrips2D([body, nose], colors=colour, radii=on_screen(1.5), draw_order=ORDER["robot"])
@@ -32,6 +32,6 @@ def draw_robot(draw: Draw, flat: str, solid: str, *, radius: float, colour: Colo
 
 
 def quaternions(heading: FloatArray) -> FloatArray:
-    """Turns about z as quaternions (n, 4), x y z w."""
+    """Return rotations about z as quaternions (n, 4), x y z w."""
     half = np.asarray(heading) / 2
     return np.stack([np.zeros_like(half), np.zeros_like(half), np.sin(half), np.cos(half)], axis=-1)

@@ -1,4 +1,4 @@
-"""Polygons as what Rerun can draw: outlines, hatches and fills for 2D, triangles for 3D. Numpy only.
+"""Polygons as shapes that Rerun can draw: outlines, hatches and fills for 2D, triangles for 3D. Numpy only.
 
 Rerun's 2D views fill no polygons, so a solid is filled with parallel chords as wide as their spacing.
 """
@@ -26,43 +26,43 @@ class Strokes:
 
 
 def outlines(polygons: Iterable[Polygon]) -> list[FloatArray]:
-    """Every ring of the polygons as a closed line strip."""
+    """Return every ring of the polygons as a closed line strip."""
     return [closed(ring) for polygon in polygons for ring in polygon.rings]
 
 
 def closed(ring: FloatArray) -> FloatArray:
-    """The ring with its first point repeated at the end."""
+    """Return the ring with its first point repeated at the end."""
     return np.vstack([ring, ring[:1]])
 
 
 def hatch(polygons: Iterable[Polygon], *, spacing: float, angle: float) -> FloatArray:
-    """Chords (k, 2, 2) of the polygons at `angle`, on one raster, so that neighbours line up."""
-    turn = _turn(angle)
+    """Return chords (k, 2, 2) of the polygons at `angle`, on one raster, so that neighbours line up."""
+    rotation = _rotation(angle)
     lines = [np.empty((0, 2, 2))]
     for polygon in polygons:
-        edges = _edges(polygon) @ turn
+        edges = _edges(polygon) @ rotation
         first, last = (np.floor(edges[..., 1].min() / spacing), np.ceil(edges[..., 1].max() / spacing))
         lines.extend(_chords(edges, (row + 0.5) * spacing) for row in np.arange(first, last))
-    return np.concatenate(lines) @ turn.T
+    return np.concatenate(lines) @ rotation.T
 
 
 def fill(polygons: Iterable[Polygon], *, spacing: float) -> Strokes:
-    """Strokes that cover the polygons, each polygon along its longest edge; their ends are round."""
+    """Return strokes with round ends that cover the polygons, parallel to each polygon's longest edge."""
     lines, radii = [np.empty((0, 2, 2))], [np.empty(0)]
     for polygon in polygons:
-        turn = _turn(_longest_direction(polygon))
-        edges = _edges(polygon) @ turn
+        rotation = _rotation(_longest_direction(polygon))
+        edges = _edges(polygon) @ rotation
         low, high = edges[..., 1].min(), edges[..., 1].max()
         count = max(1, int(np.ceil((high - low) / spacing)))
         step = (high - low) / count
         chords = np.concatenate([_chords(edges, low + (row + 0.5) * step) for row in range(count)])
-        lines.append(_shortened(chords, step / 2) @ turn.T)
+        lines.append(_shortened(chords, step / 2) @ rotation.T)
         radii.append(np.full(len(chords), step / 2))
     return Strokes(np.concatenate(lines), np.concatenate(radii))
 
 
 def name_point(polygon: Polygon) -> FloatArray:
-    """Where a room's name is out of the way: inside, near the top, where the room is wide."""
+    """Return a free position for a room's name: inside, near the top, where the room is wide."""
     height = max(float(np.ptp(polygon.exterior[:, 1])), 1e-3)
     chords = hatch([polygon], spacing=height / 9, angle=0.0)
     length = np.ptp(chords[:, :, 0], axis=1)
@@ -73,7 +73,7 @@ def name_point(polygon: Polygon) -> FloatArray:
 
 
 def triangles(polygons: Iterable[Polygon]) -> FloatArray:
-    """Triangles (k, 3, 2) that cover the polygons: trapezoids between all heights of their vertices."""
+    """Return triangles (k, 3, 2) that cover the polygons: trapezoids between vertex heights."""
     parts = [np.empty((0, 3, 2))]
     for polygon in polygons:
         edges = _edges(polygon)
@@ -84,7 +84,7 @@ def triangles(polygons: Iterable[Polygon]) -> FloatArray:
 
 
 def walls(strips: Iterable[FloatArray], *, low: float, high: float) -> FloatArray:
-    """Upright faces (k, 3, 3) under line strips, two triangles for each of their segments."""
+    """Return upright faces (k, 3, 3) below line strips, two triangles per segment."""
     a, b = _ends(strips)
     floor, top = np.full((len(a), 1), low), np.full((len(a), 1), high)
     a0, a1, b0, b1 = (np.hstack([xy, z]) for xy in (a, b) for z in (floor, top))
@@ -94,23 +94,23 @@ def walls(strips: Iterable[FloatArray], *, low: float, high: float) -> FloatArra
 
 
 def level(flat: NDArray[Any], z: float) -> NDArray[Any]:
-    """Flat triangles or points (…, 2) at the height `z` (…, 3)."""
+    """Return flat triangles or points (…, 2) at the height `z` (…, 3)."""
     return np.concatenate([flat, np.full((*flat.shape[:-1], 1), z)], axis=-1)
 
 
-def pieces(targets: Targets, value: IntArray) -> tuple[FloatArray, IntArray]:
-    """Neighbouring units of one segment with one value, as lines (p, 2, 2) and their values (p,)."""
+def lines_by_value(targets: Targets, value: IntArray) -> tuple[FloatArray, IntArray]:
+    """Join neighbouring units of a segment with one value; return lines (p, 2, 2) and their values (p,)."""
     segment = targets.unit_segment
     if not len(segment):
         return np.empty((0, 2, 2)), np.empty(0, dtype=np.int64)
     new = np.flatnonzero(np.diff(segment) | np.diff(value)) + 1
     first = np.concatenate([[0], new])
     last = np.concatenate([new - 1, [len(segment) - 1]])
-    return runs(targets, segment[first], first, last), value[first]
+    return range_lines(targets, segment[first], first, last), value[first]
 
 
-def runs(targets: Targets, segment: IntArray, first: IntArray, last: IntArray) -> FloatArray:
-    """Runs of units, `first` to `last` inclusive on `segment`, as lines (k, 2, 2)."""
+def range_lines(targets: Targets, segment: IntArray, first: IntArray, last: IntArray) -> FloatArray:
+    """Return ranges of units, `first` to `last` inclusive on `segment`, as lines (k, 2, 2)."""
     offset, count = targets.first_unit[:-1][segment], targets.units[segment]
     t = np.stack([(first - offset) / count, (last + 1 - offset) / count], axis=1)
     a, b = targets.a[segment], targets.b[segment]
@@ -118,13 +118,13 @@ def runs(targets: Targets, segment: IntArray, first: IntArray, last: IntArray) -
 
 
 def circle(radius: float, points: int = 32) -> FloatArray:
-    """A closed circle (points + 1, 2) around the origin."""
+    """Return a closed circle (points + 1, 2) around the origin."""
     angle = np.linspace(0.0, 2 * np.pi, points + 1)
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def _turn(angle: float) -> FloatArray:
-    """Matrix M such that `xy @ M` lies along x when xy lies along `angle`."""
+def _rotation(angle: float) -> FloatArray:
+    """Return the matrix M that rotates lines at `angle` onto the x axis by `xy @ M`."""
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
@@ -133,7 +133,7 @@ def _edges(polygon: Polygon) -> FloatArray:
 
 
 def _chords(edges: FloatArray, y: float) -> FloatArray:
-    """Pieces (k, 2, 2) of the horizontal line at `y` inside the edges, by the even-odd rule."""
+    """Return the parts (k, 2, 2) of the horizontal line at `y` inside the edges, by the even-odd rule."""
     a, b = edges[:, 0], edges[:, 1]
     hit = (a[:, 1] <= y) != (b[:, 1] <= y)
     a, b = a[hit], b[hit]
@@ -142,7 +142,7 @@ def _chords(edges: FloatArray, y: float) -> FloatArray:
 
 
 def _shortened(chords: FloatArray, by: float) -> FloatArray:
-    """Horizontal chords without `by` at each end, or without what they have."""
+    """Shorten horizontal chords by `by` at each end, at most to their middle."""
     cut = np.minimum(by, np.ptp(chords[:, :, 0], axis=1) / 2)
     return chords + np.stack([np.stack([cut, -cut], axis=1), np.zeros((len(chords), 2))], axis=2)
 

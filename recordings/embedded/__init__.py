@@ -1,1 +1,1 @@
-"""What recordings carry besides pictures: the mission, what its stops see, and runs, as values read back."""
+"""Data embedded in recordings besides pictures: the mission, what its stops see, and runs."""

@@ -1,4 +1,4 @@
-"""What was odd about a floor and what its plan leaves out, inside a recording."""
+"""Findings about a floor, and rooms that its plan leaves out, embedded in a recording."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from stopgo.recordings.embedded.values import Cells, Values
 
 
 @dataclass(frozen=True)
-class CarriedFindings:
-    """Findings as (rank, code, message), and rooms left out as (room, area in m², why)."""
+class EmbeddedFindings:
+    """Findings as (rank, code, message), and rooms left out as (room, area in m², reason)."""
 
     findings: tuple[tuple[str, str, str], ...] = ()
     unreached: tuple[tuple[str, float, str], ...] = ()
 
 
-def carry_findings(canvas: Canvas, figures: Figures) -> None:
-    """Put what a plan found and leaves out into its recording."""
+def embed_findings(canvas: Canvas, figures: Figures) -> None:
+    """Embed the findings of a plan, and the rooms that it leaves out."""
     values: dict[str, Sized] = {
         "rank": [item.rank.name.lower() for item in figures.findings],
         "code": [item.code for item in figures.findings],
@@ -32,15 +32,15 @@ def carry_findings(canvas: Canvas, figures: Figures) -> None:
         "area_m2": np.array([float(item.area_m2) for item in figures.unreached]),
         "why": [item.why for item in figures.unreached],
     }
-    told = {name: value for name, value in values.items() if len(value)}
-    if told:
-        canvas.show(entities.FINDINGS, rr.DynamicArchetype("Findings", components=told))
+    present = {name: value for name, value in values.items() if len(value)}
+    if present:
+        canvas.show(entities.FINDINGS, rr.DynamicArchetype("Findings", components=present))
 
 
-def findings_in(values: Values) -> CarriedFindings:
-    """What a recording's plan found and leaves out."""
+def findings_in(values: Values) -> EmbeddedFindings:
+    """Return the findings of a recording's plan, and the rooms that it leaves out."""
     rows = list(values.rows(entities.FINDINGS))
-    return CarriedFindings(
+    return EmbeddedFindings(
         tuple(item for row in rows for item in _texts(row, "rank", "code", "message")),
         tuple(
             (room, float(area), why)

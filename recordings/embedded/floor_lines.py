@@ -1,4 +1,4 @@
-"""The floor's lines as a recording has them, in the drawing's metres: for pictures, not for planning."""
+"""Lines of the floor in a recording, in the drawing's metres: for pictures, not for planning."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Polylines = tuple[FloatArray, ...]
 
 @dataclass(frozen=True, eq=False)
 class FloorLines:
-    """Polylines (n, 2) each; what was filled ends where it began."""
+    """Lines of a floor, each a polyline (n, 2); the outline of a filled shape ends where it begins."""
 
     outline: Polylines
     rooms: Polylines
@@ -24,11 +24,11 @@ class FloorLines:
     """By kind of element."""
     openings: Polylines
     names: tuple[tuple[str, float, float], ...]
-    """Room names and where they stand."""
+    """Room names with their label positions."""
 
 
 def floor_lines(values: Values, origin: tuple[float, float]) -> FloorLines | None:
-    """What a recording tells of the floor; None if it has none."""
+    """Return the lines of the floor in a recording; None if it contains no floor."""
 
     def lines(entity: str) -> Polylines:
         strips = [row["strips"] for row in values.rows(entity) if "strips" in row]
@@ -37,7 +37,7 @@ def floor_lines(values: Values, origin: tuple[float, float]) -> FloorLines | Non
     outline = lines(entities.OUTLINE)
     if not outline:
         return None
-    kinds = {kind: lines(entities.part(entities.FLOOR, kind)) for kind in KINDS}
+    kinds = {kind: lines(entities.child(entities.FLOOR, kind)) for kind in KINDS}
     return FloorLines(
         outline, lines(entities.ROOMS), kinds, lines(entities.OPENINGS), tuple(_names(values, origin))
     )
@@ -46,8 +46,8 @@ def floor_lines(values: Values, origin: tuple[float, float]) -> FloorLines | Non
 def _names(values: Values, origin: tuple[float, float]) -> list[tuple[str, float, float]]:
     found = []
     for row in values.rows(entities.ROOM_NAMES):
-        for name, place in zip(row.get("labels", ()), row.get("positions", ()), strict=False):
-            x, y = _polyline([place])[0] + origin
+        for name, position in zip(row.get("labels", ()), row.get("positions", ()), strict=False):
+            x, y = _polyline([position])[0] + origin
             found.append((str(name), float(x), float(y)))
     return found
 

@@ -1,4 +1,4 @@
-"""The mission inside a recording: the document itself, one entity per revision."""
+"""Missions embedded in a recording: the whole document, one entity per revision."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from stopgo.recordings.drawing.canvas import Canvas
 from stopgo.recordings.embedded.values import Values
 
 
-def carry_mission(canvas: Canvas, mission: Mission) -> None:
-    """Put the mission.json of a revision into the recording."""
+def embed_mission(canvas: Canvas, mission: Mission) -> None:
+    """Embed the mission.json of a revision."""
     document = {"document": encode(mission).decode()}
     canvas.show(entities.mission(mission.revision), rr.DynamicArchetype("Mission", components=document))
 
 
 def missions_in(values: Values, name: str) -> tuple[Mission, ...]:
-    """The revisions that a recording carries, in ascending order; `name` stands in error messages.
+    """Return the embedded revisions in ascending order; error messages begin with `name`.
 
     Raises
     ------
     InputError
-        When one of them is not the mission that its digest says it is.
+        When a mission does not match its digest.
     """
     documents = [row["document"][0] for row in values.below(entities.MISSION)]
-    found = [parse(document.encode(), f"{name}: the mission in it") for document in documents]
+    found = [parse(document.encode(), f"{name}: embedded mission") for document in documents]
     return tuple(sorted(found, key=lambda mission: mission.revision))

@@ -1,4 +1,4 @@
-"""A plan's floor, planned coverage and sight, taken from its recording into that of a run."""
+"""Floor, planned coverage and visibility of a plan, copied from its recording into the recording of a run."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from stopgo.recordings.embedded.floor_lines import floor_lines
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.rrd.read import chunks
 
-TAKEN = (
+COPIED = (
     *(entities.FLOOR, entities.COVERAGE, entities.WORLD_FLOOR, entities.REPORT),
     *(entities.SIGHT, entities.FINDINGS),
 )
-"""What is taken, with all below it."""
+"""Copied entities, with all entities below them."""
 
 
-def carry_plan(canvas: Canvas, plan: Recording, mission: Mission) -> None:
-    """Put what a plan's recording tells of the floor into the run's, if it is a plan of this mission."""
-    of = plan.contents.properties.get(entities.PROPERTY_PLAN, {})
-    if plan.mission_id != mission.id or tuple(of.get("local_origin", ())) != canvas.origin:
+def embed_plan(canvas: Canvas, plan: Recording, mission: Mission) -> None:
+    """Copy the floor of a plan's recording into the run's, if it is a plan of this mission."""
+    properties = plan.contents.properties.get(entities.PROPERTY_PLAN, {})
+    if plan.mission_id != mission.id or tuple(properties.get("local_origin", ())) != canvas.origin:
         return
     for chunk in chunks(plan.path):
         entity = str(chunk.entity_path)
-        if any(entity == name or entity.startswith(f"{name}/") for name in TAKEN):
-            canvas.take(chunk)
+        if any(entity == name or entity.startswith(f"{name}/") for name in COPIED):
+            canvas.copy_chunk(chunk)
 
 
 def planned_extent(plan: Recording | None) -> Bounds | None:
-    """Bounds of the floor that a plan's recording shows, in the drawing's metres; None if it shows none."""
+    """Return the bounds of the floor in a plan's recording, in the drawing's metres; None without a floor."""
     if plan is None:
         return None
     floor = floor_lines(plan.values, origin_in(plan))
@@ -38,7 +38,7 @@ def planned_extent(plan: Recording | None) -> Bounds | None:
 
 
 def origin_in(recording: Recording) -> tuple[float, float]:
-    """Where the recording's own origin lies in the drawing."""
+    """Return the position of the recording's local origin in the drawing."""
     for name in (entities.PROPERTY_PLAN, entities.PROPERTY_RUN):
         origin = recording.contents.properties.get(name, {}).get("local_origin")
         if origin is not None:

@@ -1,4 +1,4 @@
-"""A recording -> all that it carries: contents, missions, what stops see, runs."""
+"""Read a recording and all data embedded in it: contents, missions, what stops see, runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stopgo.recordings.rrd.subprocess_read import fatal_faults
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A recording that was read to its end."""
+    """Recording that was read to its end."""
 
     path: Path
     contents: Contents
@@ -33,7 +33,7 @@ class Recording:
 
     @property
     def mission_id(self) -> str:
-        """Plan and field recordings carry the mission's id as their own."""
+        """Id of the mission, which is also the id of its plan and field recordings."""
         return self.contents.recording_id
 
 
@@ -43,7 +43,7 @@ def read_recording(path: Path) -> Recording:
     Raises
     ------
     InputError
-        When the file cannot be read, was not written by stopgo, or holds what contradicts itself.
+        When the file cannot be read, was not written by stopgo, or contradicts itself.
     """
     ((_, found),) = read_each([path])
     if isinstance(found, InputError):
@@ -52,7 +52,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def read_each(paths: Sequence[Path]) -> Iterator[tuple[Path, Recording | InputError]]:
-    """Each of several, or why it cannot be read; no file hides another, whatever its damage."""
+    """Yield each recording, or the error that prevents reading it; one error does not stop the others."""
     fatal = fatal_faults(paths)
     for path in paths:
         try:

@@ -1,4 +1,4 @@
-"""Why the stops of a plan stand where they do, inside its recording."""
+"""Reasons for the stops of a plan, embedded in its recording."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from stopgo.recordings.drawing.canvas import Canvas
 from stopgo.recordings.embedded.values import Values
 
 
-def carry_reasons(canvas: Canvas, reasons: Sequence[StopReason]) -> None:
-    """Put them into the recording, as one document."""
+def embed_reasons(canvas: Canvas, reasons: Sequence[StopReason]) -> None:
+    """Embed the reasons as one document."""
     document = {"document": msgspec.json.encode(reasons).decode()}
     canvas.show(entities.REASONS, rr.DynamicArchetype("Reasons", components=document))
 
 
 def reasons_in(values: Values, name: str) -> tuple[StopReason, ...]:
-    """Those that a recording carries, in the order of driving; `name` stands in error messages.
+    """Return the embedded reasons in the order of driving; error messages begin with `name`.
 
     Raises
     ------
@@ -36,4 +36,4 @@ def reasons_in(values: Values, name: str) -> tuple[StopReason, ...]:
         with one_decode_error():
             return msgspec.json.decode(rows[-1]["document"][0], type=tuple[StopReason, ...])
     except (KeyError, msgspec.DecodeError) as error:
-        raise InputError(f"{name}: what its stops are for is damaged ({error}); plan again") from None
+        raise InputError(f"{name}: reasons of its stops are damaged ({error}); plan again") from None

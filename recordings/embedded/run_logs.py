@@ -1,4 +1,4 @@
-"""Runs inside a recording, read back as logs: their events whole, their poses as they were told."""
+"""Runs inside a recording, read back as run logs with their events and poses."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from stopgo.recordings.rrd.read import Contents
 
 
 def logs_in(values: Values, contents: Contents, path: Path) -> tuple[RunLog, ...]:
-    """Every run that a recording tells of, the one begun first before others.
+    """Return every run in a recording, the earliest first.
 
     Raises
     ------
     InputError
-        When an event in it cannot be read.
+        When an embedded event cannot be read.
     """
     runs = [run for run in map(entities.run_of_events, values.chunks) if run is not None]
     if not runs:
@@ -33,7 +33,7 @@ def logs_in(values: Values, contents: Contents, path: Path) -> tuple[RunLog, ...
 
 
 def _source(path: Path, digest: str, contents: Contents) -> LogSource:
-    notes = () if contents.complete else ("the recording was not closed: what came last may be missing",)
+    notes = () if contents.complete else ("the recording was not closed: its end may be missing",)
     return LogSource(path.name, "rrd", digest, messages=contents.total_rows, notes=notes)
 
 
@@ -41,8 +41,8 @@ def _log(run_id: str, values: Values, source: LogSource) -> RunLog:
     names = entities.RunEntities(run_id)
     events = {event.number: event for event in _events(values, names.events, source.name)}
     ns, poses = values.columns(names.flat(entities.ROBOT), "x", "y", "heading")
-    told = tuple(events[number] for number in sorted(events))
-    last = told[-1] if told else None
+    ordered = tuple(events[number] for number in sorted(events))
+    last = ordered[-1] if ordered else None
     return RunLog(
         robot="" if last is None else last.robot,
         run_id=run_id,
@@ -50,7 +50,7 @@ def _log(run_id: str, values: Values, source: LogSource) -> RunLog:
         revision=None if last is None else last.revision,
         source=source,
         poses=Track.of(ns, poses[:, :2], poses[:, 2]),
-        events=told,
+        events=ordered,
     )
 
 
@@ -58,4 +58,4 @@ def _events(values: Values, entity: str, name: str) -> list[AnyEvent]:
     try:
         return [event_of(row["body"][0]) for row in values.rows(entity) if "body" in row]
     except msgspec.DecodeError as error:
-        raise InputError(f"{name}: an event in it cannot be read ({error})") from None
+        raise InputError(f"{name}: embedded event cannot be read ({error})") from None

@@ -1,4 +1,4 @@
-"""What the stops of a mission see, inside a recording: arrays of one entity per revision."""
+"""Visibility of a mission's stops, embedded in a recording: arrays in one entity per revision."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from stopgo.recordings.drawing import entities
 from stopgo.recordings.drawing.canvas import Canvas
 from stopgo.recordings.embedded.values import Cells, Values
 
-NOT_ASKED = -1.0
-"""Stands where no share is asked."""
+NOT_REQUIRED = -1.0
+"""Value for a fraction that is not required."""
 
 
-def carry_sight(canvas: Canvas, sight: Sight) -> None:
-    """Put what the stops of a revision see into the recording."""
+def embed_sight(canvas: Canvas, sight: Sight) -> None:
+    """Embed what the stops of a revision see."""
     values = {name: value for name, value in _values(sight).items() if len(value)}
     canvas.show(entities.sight(sight.revision), rr.DynamicArchetype("Sight", components=values))
 
 
 def sights_in(values: Values, name: str) -> tuple[Sight, ...]:
-    """What the stops of each revision see, in ascending order; `name` stands in error messages.
+    """Return what the stops of each revision see, in ascending order; error messages begin with `name`.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def sights_in(values: Values, name: str) -> tuple[Sight, ...]:
         try:
             found.append(_sight(row))
         except (KeyError, ValueError, IndexError) as error:
-            raise InputError(f"{name}: what its stops see is damaged ({error}); plan again") from None
+            raise InputError(f"{name}: visibility of its stops is damaged ({error}); plan again") from None
     return tuple(sorted(found, key=lambda sight: sight.revision))
 
 
@@ -49,7 +49,7 @@ def _values(sight: Sight) -> dict[str, Sized]:
     asked = np.broadcast_to(ledger.asked, len(ledger.weight))
     change = _changes(np.stack([ledger.room, ledger.visible, asked], axis=1))
     more = {"asked": asked[change].astype(np.int32)} if (asked > 1).any() else {}
-    shares = [ledger.required, _asked(ledger.kind_required)]
+    shares = [ledger.required, _encoded_fraction(ledger.kind_required)]
     return {
         "mission": [sight.mission_id, sight.digest, ledger.rule],
         "revision": np.array([sight.revision]),
@@ -67,7 +67,7 @@ def _values(sight: Sight) -> dict[str, Sized]:
         **more,
         "room_names": [group.name for group in ledger.rooms],
         "room_why": [group.why for group in ledger.rooms],
-        "room_shares": np.array([_asked(group.required) for group in ledger.rooms]),
+        "room_shares": np.array([_encoded_fraction(group.required) for group in ledger.rooms]),
         "stop_ids": [stop.id for stop in sight.stops],
         "stop_xy": np.array([(stop.x, stop.y) for stop in sight.stops]).ravel(),
         "pointer": sight.pointer.astype(np.int32),
@@ -77,18 +77,18 @@ def _values(sight: Sight) -> dict[str, Sized]:
 
 
 def _changes(rows: np.ndarray) -> IntArray:
-    """Where a row differs from the one before, the first one included."""
+    """Return the rows that differ from the row before, including the first."""
     if not len(rows):
         return frozen([], np.int64)
     return frozen(np.flatnonzero(np.concatenate([[True], np.any(rows[1:] != rows[:-1], axis=1)])), np.int64)
 
 
-def _asked(share: float | None) -> float:
-    return NOT_ASKED if share is None else share
+def _encoded_fraction(fraction: float | None) -> float:
+    return NOT_REQUIRED if fraction is None else fraction
 
 
-def _told(share: float) -> float | None:
-    return None if share == NOT_ASKED else float(share)
+def _decoded_fraction(fraction: float) -> float | None:
+    return None if fraction == NOT_REQUIRED else float(fraction)
 
 
 def _sight(row: Cells) -> Sight:
@@ -106,13 +106,13 @@ def _sight(row: Cells) -> Sight:
     first, last = (frozen(row.get(name, []), np.int64) for name in ("first", "last"))
     pointer = frozen(row["pointer"], np.int64)
     if len(first) != len(last) or pointer[-1] != len(first) or not _within(first, last, targets.total):
-        raise ValueError("runs of units that do not fit")
+        raise ValueError("ranges of units do not fit")
     return Sight(
         mission_id=mission_id,
         revision=int(row["revision"][0]),
         digest=digest,
         targets=targets,
-        ledger=_ledger(row, targets, "paper" if rule == "paper" else "length"),
+        ledger=_coverage_totals(row, targets, "paper" if rule == "paper" else "length"),
         stops=tuple(SeenFrom(name, float(xy[0]), float(xy[1])) for name, xy in stops),
         pointer=pointer,
         first=first,
@@ -124,7 +124,7 @@ def _within(first: IntArray, last: IntArray, total: int) -> bool:
     return bool(np.all(first >= 0) and np.all(first <= last) and np.all(last < total))
 
 
-def _ledger(row: Cells, targets: Targets, rule: str) -> CoverageTotals:
+def _coverage_totals(row: Cells, targets: Targets, rule: str) -> CoverageTotals:
     total = targets.total
     change = np.asarray(row["change"], dtype=np.int64)
     counts = np.diff(np.concatenate([change, [total]]))
@@ -135,9 +135,9 @@ def _ledger(row: Cells, targets: Targets, rule: str) -> CoverageTotals:
         visible=frozen(np.repeat(row["visible"], counts), np.bool_),
         room=frozen(np.repeat(row["room"], counts), np.int64),
         element=frozen(targets.element[targets.unit_segment], np.int64),
-        rooms=tuple(Group(name, _told(share), why) for name, share, why in rooms),
+        rooms=tuple(Group(name, _decoded_fraction(fraction), why) for name, fraction, why in rooms),
         elements=tuple(Seen(*pair) for pair in zip(row["element_ids"], row["element_kinds"], strict=True)),
         required=float(row["shares"][0]),
-        kind_required=_told(row["shares"][1]),
+        kind_required=_decoded_fraction(row["shares"][1]),
         asked=frozen(np.repeat(row["asked"], counts) if "asked" in row else [1], np.int64),
     )

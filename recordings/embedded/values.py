@@ -1,4 +1,4 @@
-"""What a recording carries as values, gathered in one pass: rows by entity, columns as arrays."""
+"""Embedded values of a recording, gathered in one pass: rows by entity, columns as arrays."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ Cells = dict[str, Any]
 
 @dataclass(frozen=True)
 class Values:
-    """Chunks of the entities that carry something, by entity."""
+    """Chunks of the entities with embedded values, by entity."""
 
     chunks: dict[str, list[Chunk]] = field(default_factory=dict)
 
     def take(self, chunk: Chunk) -> None:
-        """Keep a chunk, if its entity is one that is read back."""
+        """Keep a chunk if values of its entity are read back."""
         entity = str(chunk.entity_path)
-        if entities.carries(entity):
+        if entities.is_embedded(entity):
             self.chunks.setdefault(entity, []).append(chunk)
 
     def below(self, parent: str) -> Iterator[Cells]:
-        """The rows of every entity right below `parent`."""
+        """Yield the rows of every entity right below `parent`."""
         for entity in sorted(self.chunks):
             if entity.rpartition("/")[0] == parent:
                 yield from self.rows(entity)
 
     def rows(self, entity: str) -> Iterator[Cells]:
-        """Every row of an entity, in the order of the file."""
+        """Yield every row of an entity, in the order of the file."""
         for chunk in self.chunks.get(entity, ()):
             batch = chunk.to_record_batch()
             columns = _components(batch)
@@ -44,7 +44,7 @@ class Values:
                 yield {name: _array(cell) for name, cell in cells.items() if cell is not None}
 
     def columns(self, entity: str, *components: str) -> tuple[IntArray, FloatArray]:
-        """Single numbers of all rows that have these components: robot time (n,), and values (n, k)."""
+        """Return the single numbers of all rows with these components: robot time (n,), and values (n, k)."""
         parts = [_columns(chunk.to_record_batch(), components) for chunk in self.chunks.get(entity, ())]
         times = np.concatenate([np.empty(0, np.int64), *(ns for ns, _ in parts)])
         return times, np.concatenate([np.empty((0, len(components))), *(table for _, table in parts)])

@@ -1,7 +1,7 @@
-"""A robot's own log, whatever it is -> what it holds (`FieldLog`).
+"""Readers of robots' own logs: each returns the log's content as a `FieldLog`.
 
-A reader is a function `(path, reading) -> FieldLog`, and one line in `READERS`. Installed packages bring
-more: entry points in the group `stopgo.log`, each a `LogFormat`.
+A reader is a function `(path, reading) -> FieldLog`, and one line in `READERS`. Installed packages add more:
+entry points in the group `stopgo.log`, each a `LogFormat`.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ LogReader = Callable[[Path, Reading], FieldLog]
 
 @dataclass(frozen=True)
 class LogFormat:
-    """One kind of log."""
+    """Format of a log."""
 
     name: str
     suffixes: tuple[str, ...]
     begins: tuple[bytes, ...]
-    """How such a file begins; () where its beginning does not tell."""
+    """First bytes of such a file; () if they do not identify it."""
     reader: Callable[[], LogReader]
-    """Loads the reader: some need libraries that others do not."""
+    """Loader of the reader: some readers need libraries that others do not."""
 
 
 def _ros() -> LogReader:
@@ -88,11 +88,11 @@ READERS = (
     LogFormat("MAVLink telemetry", (".tlog",), (), _telemetry),
     LogFormat("trajectory", (".tum", ".txt", ".csv", ".tsv"), (), _table),
 )
-"""Every kind of log that is read; a folder is a rosbag2's."""
+"""Formats that can be read; a folder is a rosbag2."""
 
 
 def read_log(path: Path, reading: Reading | None = None) -> FieldLog:
-    """Read a log to its end, by what it is; it is opened to be read and never changed.
+    """Read a log to its end, by its format; the file is opened for reading and never changed.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def read_log(path: Path, reading: Reading | None = None) -> FieldLog:
 
 
 def _reader_for(path: Path) -> LogReader:
-    """By name and content; by content alone where the name says nothing."""
+    """Return the reader by name and content; by content alone if the name is unknown."""
     if path.is_dir():
         return _of_folder(path)
     begin = head(path, 16)
@@ -118,7 +118,7 @@ def _reader_for(path: Path) -> LogReader:
     if chosen:
         return chosen[0].reader()
     if named:
-        raise InputError(f"{path}: does not begin as a {named[0].name} does; was it copied whole?")
+        raise InputError(f"{path}: invalid {named[0].suffixes[0]} header; incomplete copy?")
     others = list(foreign_formats(LogFormat))
     for other in others:
         form = other.what
@@ -126,7 +126,7 @@ def _reader_for(path: Path) -> LogReader:
             return partial(_read_foreign, other)
     forms = (*READERS, *(other.what for other in others))
     known = ", ".join(suffix for form in forms for suffix in form.suffixes)
-    raise InputError(f"{path}: neither its name nor its content is that of a log; known are {known}")
+    raise InputError(f"{path}: unknown log format; known are {known}")
 
 
 def _read_foreign(other: Variant[LogFormat], path: Path, how: Reading) -> FieldLog:
@@ -136,7 +136,7 @@ def _read_foreign(other: Variant[LogFormat], path: Path, how: Reading) -> FieldL
 
 
 def _of_folder(path: Path) -> LogReader:
-    """A robot's state directory, or a rosbag2."""
+    """Return the reader of a robot's state directory, or of a rosbag2."""
     if not (path / JOURNAL).exists():
         return _ros()
     read = _journal()

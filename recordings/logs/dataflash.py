@@ -1,6 +1,6 @@
-"""ArduPilot's own logs (.BIN, DataFlash): columns of each kind of message, straight from the bytes.
+"""ArduPilot's own logs (.BIN, DataFlash): columns of each kind of message, read from the bytes.
 
-The file describes itself: FMT messages say how long each kind is and what its columns are called.
+The file describes itself: FMT messages give the length and the column names of each kind of message.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ TYPES = {
     "c": ("<i2", 1), "C": ("<u2", 1), "e": ("<i4", 1), "E": ("<u4", 1), "L": ("<i4", 1), "M": ("u1", 1),
     "q": ("<i8", 1), "Q": ("<u8", 1), "g": ("<f2", 1),
 }  # fmt: skip
-"""Letters of a message's format: numpy's name, and how many."""
+"""Letters of a message's format: numpy's type name, and the number of values."""
 HUNDREDTHS = frozenset("cCeE")
 WANTED = frozenset(
     {"POS", "XKF1", "NKF1", "SIM", "ATT", "ORGN", "CMD", "MISE", "MODE", "MSG", "BAT", "GPS", "CAM", "TRIG"}
@@ -56,7 +56,7 @@ TICK_EVERY = 200_000
 
 
 def read_dataflash(path: Path, reading: Reading) -> FieldLog:
-    """Read a .BIN to its end; bytes between messages that make no sense are passed over and counted.
+    """Read a .BIN to its end; invalid bytes between messages are skipped and counted.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def read_dataflash(path: Path, reading: Reading) -> FieldLog:
     """
     scan = _scanned(path, reading)
     if not scan.counts:
-        raise InputError(f"{path}: no message in it can be read; is it an ArduPilot .BIN?")
+        raise InputError(f"{path}: no readable message; check that it is an ArduPilot .BIN")
     tables = _Tables(path, scan)
     poses = tuple(_poses(tables))
     begin, end = tables.span()
@@ -89,38 +89,40 @@ def read_dataflash(path: Path, reading: Reading) -> FieldLog:
 
 @dataclass(frozen=True)
 class _Kind:
-    """What FMT says of one kind of message."""
+    """Kind of message, as its FMT message describes it."""
 
     name: str
     dtype: np.dtype[Any]
-    """Of the whole message, its head of three bytes included."""
+    """Type of the whole message, with its header of three bytes."""
     hundredths: frozenset[str]
 
 
 @dataclass
 class _Scan:
-    """Where in a file the messages are that are wanted."""
+    """Positions of the wanted messages in a file."""
 
     kinds: dict[str, _Kind] = field(default_factory=dict)
-    places: dict[str, array[int]] = field(default_factory=dict)
+    offsets: dict[str, array[int]] = field(default_factory=dict)
     counts: Counter[str] = field(default_factory=Counter)
     lost_bytes: int = 0
     size: int = 0
 
     tail_bytes: int = 0
-    """Of a last message that was cut off, as when the vehicle is switched off."""
+    """Bytes of a last message that is truncated, as when the vehicle is switched off."""
 
     @property
     def lost(self) -> str:
         if not self.lost_bytes:
             return ""
-        return f"{self.lost_bytes} of {self.size} bytes make no sense"
+        return f"{self.lost_bytes} of {self.size} bytes are invalid"
 
     @property
     def oddities(self) -> tuple[str, ...]:
         if not self.tail_bytes:
             return ()
-        return (f"the last message is cut off ({self.tail_bytes} bytes), as when a vehicle is switched off",)
+        return (
+            f"the last message is truncated ({self.tail_bytes} bytes), as when a vehicle is switched off",
+        )
 
 
 def _scanned(path: Path, reading: Reading) -> _Scan:
@@ -129,7 +131,7 @@ def _scanned(path: Path, reading: Reading) -> _Scan:
 
 
 def _walk(data: mmap, reading: Reading) -> _Scan:
-    """One step per message; FMT messages are taken in on the way, as they come before what they describe."""
+    """Read one message per step; an FMT message comes before the messages that it describes."""
     scan = _Scan(size=len(data))
     lengths = [0] * 256
     lengths[FMT] = FMT_LENGTH
@@ -142,20 +144,20 @@ def _walk(data: mmap, reading: Reading) -> _Scan:
         kind = data[at + 2]
         length = lengths[kind] if data[at] == HEAD[0] and data[at + 1] == HEAD[1] else 0
         if not length or at + length > end:
-            there = data.find(HEAD, at + 1)
-            if there < 0 and length:
+            next_head = data.find(HEAD, at + 1)
+            if next_head < 0 and length:
                 scan.tail_bytes, at = end - at, end
                 break
-            there = end if there < 0 else there
-            scan.lost_bytes += there - at
-            at = there
+            next_head = end if next_head < 0 else next_head
+            scan.lost_bytes += next_head - at
+            at = next_head
             continue
         if kind == FMT:
             _describe(data[at : at + length], scan, lengths, names, wanted)
         seen[kind] += 1
-        places = wanted[kind]
-        if places is not None:
-            places.append(at)
+        offsets = wanted[kind]
+        if offsets is not None:
+            offsets.append(at)
         at += length
         steps += 1
         if steps % TICK_EVERY == 0:
@@ -168,7 +170,7 @@ def _walk(data: mmap, reading: Reading) -> _Scan:
 def _describe(
     message: bytes, scan: _Scan, lengths: list[int], names: list[str], wanted: list[array[int] | None]
 ) -> None:
-    """Take in what a FMT message says of a kind; one that contradicts itself is not read."""
+    """Add the kind that a FMT message describes; a contradictory one is ignored."""
     number, length = message[3], message[4]
     name, form, columns = (_text(message[a:b]) for a, b in ((5, 9), (9, 25), (25, 89)))
     kind = _kind(name, form, columns.split(","))
@@ -177,7 +179,7 @@ def _describe(
     lengths[number], names[number] = length, name
     if name in WANTED:
         scan.kinds[name] = kind
-        wanted[number] = scan.places.setdefault(name, array("q"))
+        wanted[number] = scan.offsets.setdefault(name, array("q"))
 
 
 def _text(raw: bytes) -> str:
@@ -196,7 +198,7 @@ def _kind(name: str, form: str, columns: list[str]) -> _Kind | None:
 
 
 class _Tables:
-    """Columns of the wanted kinds, read when they are asked for."""
+    """Columns of the wanted kinds, read on demand."""
 
     def __init__(self, path: Path, scan: _Scan) -> None:
         self._data = np.memmap(path, np.uint8, "r")
@@ -205,19 +207,19 @@ class _Tables:
         self.offset_ns = self._since_1970()
 
     def rows(self, name: str) -> np.ndarray | None:
-        """The messages of a kind as a structured array (n,); None if there is none."""
+        """Return the messages of a kind as a structured array (n,); None if next_head is none."""
         if name not in self._known:
-            places = np.array(self._scan.places.get(name, ()), np.int64)
-            self._known[name] = self._cut(name, places) if len(places) else None
+            offsets = np.array(self._scan.offsets.get(name, ()), np.int64)
+            self._known[name] = self._rows_at(name, offsets) if len(offsets) else None
         return self._known[name]
 
-    def _cut(self, name: str, places: IntArray) -> np.ndarray:
+    def _rows_at(self, name: str, offsets: IntArray) -> np.ndarray:
         kind = self._scan.kinds[name].dtype
-        raw = self._data[places[:, None] + np.arange(kind.itemsize)]
+        raw = self._data[offsets[:, None] + np.arange(kind.itemsize)]
         return np.ascontiguousarray(raw).view(kind)[:, 0]
 
     def numbers(self, name: str, column: str) -> FloatArray:
-        """A column in its own unit (n,)."""
+        """Return a column in its own unit (n,)."""
         rows = self.rows(name)
         assert rows is not None
         scale = 0.01 if column in self._scan.kinds[name].hundredths else 1.0
@@ -228,18 +230,18 @@ class _Tables:
         return rows is not None and not {"TimeUS", *columns} - set(rows.dtype.names or ())
 
     def ns(self, name: str) -> IntArray:
-        """When each message of a kind was written (n,)."""
+        """Return the time of each message of a kind (n,)."""
         rows = self.rows(name)
         assert rows is not None
         return rows["TimeUS"].astype(np.int64) * 1000 + self.offset_ns
 
     def span(self) -> tuple[int, int]:
-        times = [self.ns(name) for name in self._scan.places if self.has(name)]
+        times = [self.ns(name) for name in self._scan.offsets if self.has(name)]
         full = [ns for ns in times if len(ns)]
         return (min(int(ns[0]) for ns in full), max(int(ns[-1]) for ns in full)) if full else (0, 0)
 
     def _since_1970(self) -> int:
-        """What to add to times since boot, where a GPS receiver told the date; else 0."""
+        """Return the offset from boot time to 1970, if a GPS receiver gave the date; else 0."""
         self.offset_ns = 0
         if not self.has("GPS", "GMS", "GWk"):
             return 0
@@ -253,7 +255,7 @@ class _Tables:
 
 
 def _poses(tables: _Tables) -> Iterator[Poses]:
-    """What the vehicle took for its position, in metres and in degrees; and a simulator's truth."""
+    """Yield the vehicle's estimated poses, in metres and in degrees, and a simulator's true poses."""
     found = [
         *(_filtered(tables, name) for name in ("XKF1", "NKF1")),
         _placed(tables, "POS", truth=False),
@@ -263,7 +265,7 @@ def _poses(tables: _Tables) -> Iterator[Poses]:
 
 
 def _filtered(tables: _Tables, name: str) -> Poses | None:
-    """The first core of the filter, in metres from its origin."""
+    """Return the poses of the filter's first core, in metres from its origin."""
     if not tables.has(name, "PN", "PE", "Yaw"):
         return None
     rows = tables.rows(name)
@@ -277,14 +279,14 @@ def _filtered(tables: _Tables, name: str) -> Poses | None:
 
 
 def _origin(tables: _Tables) -> SiteOrigin | None:
-    """Where the filter counts from."""
+    """Return the origin of the filter."""
     if not tables.has("ORGN", "Lat", "Lng"):
         return None
     return _site(*(float(tables.numbers("ORGN", column)[-1]) for column in ("Lat", "Lng")))
 
 
 def _site(lat: float, lon: float, alt: float = 0.0) -> SiteOrigin | None:
-    """A place in steps of 1e-7 degrees; 0, 0 is none."""
+    """Return a position given in steps of 1e-7 degrees; None for 0, 0."""
     return (
         SiteOrigin(lat=lat / 1e7, lon=lon / 1e7, alt=alt, heading_deg=0.0) if (lat, lon) != (0, 0) else None
     )
@@ -301,15 +303,15 @@ def _placed(tables: _Tables, name: str, *, truth: bool) -> Poses | None:
 
 
 def _bearing_at(tables: _Tables, ns: IntArray) -> FloatArray:
-    """Degrees clockwise from north at given times, as the attitude tells."""
+    """Return degrees clockwise from north at given times, from the attitude."""
     if not tables.has("ATT", "Yaw"):
         return np.full(len(ns), np.nan)
-    turn = np.unwrap(tables.numbers("ATT", "Yaw"), period=360.0)
-    return np.interp(ns, tables.ns("ATT"), turn)
+    bearing = np.unwrap(tables.numbers("ATT", "Yaw"), period=360.0)
+    return np.interp(ns, tables.ns("ATT"), bearing)
 
 
 def _uploads(tables: _Tables) -> Iterator[LoggedMission]:
-    """Missions as they were written down, each from its item 0 (home) on."""
+    """Yield logged missions, each from its item 0 (home) on."""
     if not tables.has("CMD", "CTot", "CNum", "CId"):
         return
     rows, ns = tables.rows("CMD"), tables.ns("CMD")
@@ -317,11 +319,11 @@ def _uploads(tables: _Tables) -> Iterator[LoggedMission]:
     number = rows["CNum"].astype(int)
     starts = [0, *(np.flatnonzero(np.diff(number) <= 0) + 1).tolist(), len(rows)]
     for begin, end in pairwise(starts):
-        part = rows[begin:end]
-        items = tuple(_item(row) for row in part if row["CNum"] > 0)
+        logged_items = rows[begin:end]
+        items = tuple(_item(row) for row in logged_items if row["CNum"] > 0)
         if items:
-            home = _home(part[0]) if part[0]["CNum"] == 0 else None
-            whole = len(part) == int(part[0]["CTot"])
+            home = _home(logged_items[0]) if logged_items[0]["CNum"] == 0 else None
+            whole = len(logged_items) == int(logged_items[0]["CTot"])
             yield LoggedMission(int(ns[begin]), items, "ardupilot", complete=whole, home=home)
 
 
@@ -329,8 +331,8 @@ def _item(row: Any) -> Item:
     params = (float(row["Prm1"]), float(row["Prm2"]), float(row["Prm3"]), float(row["Prm4"]))
     frame = int(row["Frame"]) if "Frame" in row.dtype.names else 3
     command = int(row["CId"])
-    place = (int(row["Lat"]), int(row["Lng"]))
-    return Item(command, frame, params, x=place[0], y=place[1], z=float(row["Alt"]))
+    position = (int(row["Lat"]), int(row["Lng"]))
+    return Item(command, frame, params, x=position[0], y=position[1], z=float(row["Alt"]))
 
 
 def _home(row: Any) -> SiteOrigin | None:
@@ -359,7 +361,7 @@ def _remarks(tables: _Tables) -> Iterator[Remark]:
 
 
 def _executed(tables: _Tables) -> Iterator[Remark]:
-    """Items as the vehicle began them."""
+    """Yield items when the vehicle began them."""
     rows = tables.rows("MISE")
     assert rows is not None
     for ns, row in zip(tables.ns("MISE").tolist(), rows, strict=True):
@@ -370,8 +372,8 @@ def _executed(tables: _Tables) -> Iterator[Remark]:
 
 def _battery(tables: _Tables) -> Iterator[tuple[int, float]]:
     if tables.has("BAT", "RemPct"):
-        for ns, share in zip(
+        for ns, percentage in zip(
             tables.ns("BAT").tolist(), tables.numbers("BAT", "RemPct").tolist(), strict=True
         ):
-            if 0 <= share <= 100:
-                yield ns, share / 100
+            if 0 <= percentage <= 100:
+                yield ns, percentage / 100

@@ -1,7 +1,7 @@
-"""What a robot's own log holds, in the log's own frames and times: the noun that every reader makes.
+"""Content of a robot's own log, in the log's own frames and times: the result of every reader.
 
 Times are nanoseconds on the clock that `FieldLog.clock` names, lengths metres, angles radians
-counter-clockwise from +x. Nothing here knows a mission: `stopgo.recordings.replay` lays a log beside one.
+counter-clockwise from +x. Nothing here depends on a mission: `stopgo.recordings.replay` compares the two.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from stopgo.mission.run.events import AnyEvent
 Stamps = Literal["header", "log"]
 RemarkKind = Literal["mode", "command", "trigger", "reached", "text"]
 Tick = Callable[[float], None]
-"""Is told now and then which share of a file has been read, 0 to 1."""
+"""Progress callback; its argument is the fraction of the file read so far, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a log is to be read."""
+    """Options for reading a log."""
 
     stamps: Stamps = "header"
-    """Whether a message's own stamp counts, where it has one, or when the log took it in."""
+    """Time of a message: its own stamp if it has one (`header`), or the time of logging (`log`)."""
     frame: str | None = None
     """Frame of the poses wanted from transforms; None: `map`, else `odom`."""
-    tick: Tick = lambda share: None
+    tick: Tick = lambda fraction: None
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One kind of message in a log."""
+    """Kind of message in a log."""
 
     name: str
-    """The topic, or what the message is called."""
+    """Topic, or name of the message."""
     kind: str
-    """Its type; empty where name and type are one."""
+    """Type; empty if name and type are the same."""
     count: int
 
 
@@ -53,56 +53,56 @@ class Poses:
     """Poses of one robot from one source, ordered by time."""
 
     source: str
-    """The topic or message they are from."""
+    """Topic or message that contains the poses."""
     frame: str
-    """What the positions are relative to, as the log calls it."""
+    """Frame of the positions, as the log calls it."""
     ns: IntArray
     """(n,)."""
     xy: FloatArray
     """(n, 2)."""
     heading: FloatArray
-    """(n,); NaN where the source tells none."""
+    """Headings (n,); NaN where the source has none."""
     robot: str = ""
-    """Which robot, where a log may hold several."""
+    """Name of the robot, if a log may contain several."""
     rank: int = 0
-    """Of several sources the one with the least rank is taken, unless the user names another."""
+    """Priority of the source: the least rank is used, unless the user names another source."""
     origin: SiteOrigin | None = None
-    """Where on earth (0, 0) is, where the source tells that; x is then east and y north."""
+    """Position of (0, 0) on the earth, if the source gives it; x is then east and y north."""
     rule: str = "wgs84"
-    """One of `stopgo.mission.frames.geodesy.RULES`: how whoever measured them turns degrees into metres."""
+    """Key of `stopgo.mission.frames.geodesy.RULES`: the source's conversion of degrees into metres."""
     truth: bool = False
-    """From a simulator, which knows where the robot was; never taken for what the robot knew."""
+    """True for a simulator's true poses; they are never used as the robot's own estimate."""
     oddities: tuple[str, ...] = ()
 
     @property
     def seconds(self) -> float:
-        """From the first pose to the last."""
+        """Duration from the first pose to the last."""
         return float(self.ns[-1] - self.ns[0]) / 1e9 if len(self.ns) else 0.0
 
     @property
     def metres(self) -> float:
-        """Along the poses, noise included."""
+        """Length along the poses, noise included."""
         return float(np.hypot(*np.diff(self.xy, axis=0).T).sum()) if len(self.xy) > 1 else 0.0
 
 
 @dataclass(frozen=True)
 class Remark:
-    """Something a log tells at one moment."""
+    """Text or event in a log at one moment."""
 
     ns: int
     kind: RemarkKind
     text: str
     number: int | None = None
-    """Of the stop or the mission's item, where it carries one."""
+    """Number of the stop or mission item, if there is one."""
 
 
 @dataclass(frozen=True)
 class LoggedMission:
-    """A MAVLink mission that the vehicle was given."""
+    """MAVLink mission that was uploaded to the vehicle."""
 
     ns: int
     items: tuple[Item, ...]
-    """Without home."""
+    """Items without home."""
     autopilot: str
     complete: bool = True
     home: SiteOrigin | None = None
@@ -120,22 +120,22 @@ class Sweep:
 
 
 Sweeps = Callable[[], Iterator[Sweep]]
-"""Reads the log again for its scans: they may be larger than memory."""
+"""Function that reads the log again for its scans: they may be larger than memory."""
 
 
 def no_sweeps() -> Iterator[Sweep]:
-    """Of a log without scans."""
+    """Return the scans of a log without scans."""
     return iter(())
 
 
 @dataclass(frozen=True, eq=False)
 class FieldLog:
-    """Everything of a log that a replay needs; arrays are read-only."""
+    """Content of a log that a replay needs; arrays are read-only."""
 
     path: str
     format: str
     digest: str
-    """sha256 of the bytes, of several files one after another."""
+    """sha256 of the bytes; of several files, one after another."""
     messages: int
     clock: str
     """`wall`, `since boot` or `simulated`."""
@@ -146,16 +146,16 @@ class FieldLog:
     uploads: tuple[LoggedMission, ...] = ()
     remarks: tuple[Remark, ...] = ()
     events: tuple[AnyEvent, ...] = ()
-    """Of stopgo's own logs."""
+    """Events, only in stopgo's own logs."""
     missions: tuple[Mission, ...] = ()
-    """That stopgo's own logs carry."""
+    """Missions, only in stopgo's own logs."""
     battery: tuple[tuple[int, float], ...] = ()
-    """Times, and shares of 0 to 1."""
+    """Times, and charges as fractions from 0 to 1."""
     mounts: tuple[tuple[str, float, float, float], ...] = ()
-    """Sensors' frames, and where each sits on the robot: x, y, heading."""
+    """Frames of sensors, and the pose of each on the robot: x, y, heading."""
     sweeps: Sweeps = field(default=no_sweeps)
     lost: str = ""
-    """What of a damaged log could not be read; empty if nothing."""
+    """Unreadable part of a damaged log; empty if everything could be read."""
     oddities: tuple[str, ...] = ()
 
     @property
@@ -164,44 +164,44 @@ class FieldLog:
 
 
 def poses_of(
-    source: str, frame: str, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike, **told: Any
+    source: str, frame: str, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike, **more: Any
 ) -> Poses | None:
-    """Poses in order of time, without those that are no numbers; None if none is left.
+    """Return the finite poses in order of time; None if there is none.
 
-    `told` are further fields of `Poses`.
+    `more` are further fields of `Poses`.
     """
-    times, places = np.asarray(ns, np.int64), np.asarray(xy, float).reshape(-1, 2)
-    good = np.isfinite(places).all(axis=1) & (np.abs(places) < FARTHEST).all(axis=1)
-    oddities = oddities_of(times, places, good)
-    order = np.flatnonzero(good)[np.argsort(times[good], kind="stable")]
+    times, positions = np.asarray(ns, np.int64), np.asarray(xy, float).reshape(-1, 2)
+    finite = np.isfinite(positions).all(axis=1) & (np.abs(positions) < FARTHEST).all(axis=1)
+    oddities = oddities_of(times, positions, finite)
+    order = np.flatnonzero(finite)[np.argsort(times[finite], kind="stable")]
     if not len(order):
         return None
     headings = frozen(np.asarray(heading, float)[order])
     return Poses(
-        source, frame, frozen(times[order], np.int64), frozen(places[order]), headings,
-        **{"oddities": oddities, **told},
+        source, frame, frozen(times[order], np.int64), frozen(positions[order]), headings,
+        **{"oddities": oddities, **more},
     )  # fmt: skip
 
 
 FARTHEST = 1e9
-"""Metres, as in a plan's settings."""
+"""Limit of coordinates in metres, as in a plan's parameters."""
 GAP_S = 1.0
-"""A silence as long as this, and ten times as long as usual, is told."""
+"""Shortest gap that is reported; it must also be ten times as long as usual."""
 JUMP_M, JUMP_M_S = 0.5, 5.0
-"""A pose that is farther from the one before than this, at more than this speed, has jumped."""
+"""Distance and speed from which on the step between two poses is a jump."""
 
 
-def oddities_of(ns: IntArray, xy: FloatArray, good: np.ndarray) -> tuple[str, ...]:
-    """Gaps, jumps, times that run back and poses that are no numbers, a line each."""
+def oddities_of(ns: IntArray, xy: FloatArray, finite: np.ndarray) -> tuple[str, ...]:
+    """Return gaps, jumps, times that run back and poses that are not finite, one line each."""
     lines = []
-    if not good.all():
-        lines.append(f"{int((~good).sum())} of {len(good)} poses are no numbers, left out")
-    step = np.diff(ns[good]) / 1e9
+    if not finite.all():
+        lines.append(f"{int((~finite).sum())} of {len(finite)} poses are not finite; left out")
+    step = np.diff(ns[finite]) / 1e9
     back = int((step < 0).sum())
     if back:
         lines.append(f"time runs back {back} times, by up to {-step.min():.3f} s; ordered by time")
-    order = np.argsort(ns[good], kind="stable")
-    times, places = ns[good][order], xy[good][order]
+    order = np.argsort(ns[finite], kind="stable")
+    times, positions = ns[finite][order], xy[finite][order]
     step = np.diff(times) / 1e9
     usual = float(np.median(step)) if len(step) else 0.0
     gaps = step[step > max(GAP_S, 10 * usual)]
@@ -209,7 +209,7 @@ def oddities_of(ns: IntArray, xy: FloatArray, good: np.ndarray) -> tuple[str, ..
         lines.append(
             f"{len(gaps)} gaps without poses, {gaps.sum():.1f} s together, the longest {gaps.max():.1f} s"
         )
-    moved = np.hypot(*np.diff(places, axis=0).T) if len(places) > 1 else np.empty(0)
+    moved = np.hypot(*np.diff(positions, axis=0).T) if len(positions) > 1 else np.empty(0)
     jumps = moved[(moved > JUMP_M) & (moved > JUMP_M_S * np.maximum(step, 1e-9))]
     if len(jumps):
         lines.append(f"{len(jumps)} jumps of position, the largest {jumps.max():.2f} m")
@@ -217,28 +217,28 @@ def oddities_of(ns: IntArray, xy: FloatArray, good: np.ndarray) -> tuple[str, ..
 
 
 def fixes_of(
-    source: str, rule: str, ns: ArrayLike, degrees: ArrayLike, bearing: ArrayLike, **told: Any
+    source: str, rule: str, ns: ArrayLike, degrees: ArrayLike, bearing: ArrayLike, **more: Any
 ) -> Poses | None:
-    """Places on the earth as poses, metres east and north of the first of them.
+    """Return positions on the earth as poses, in metres east and north of the first one.
 
     Parameters
     ----------
     degrees
-        Latitudes and longitudes (n, 2); those that are no place, 0, 0 among them, are left out.
+        Latitudes and longitudes (n, 2); invalid ones, such as 0, 0, are left out.
     bearing
         Degrees clockwise from north (n,).
     """
-    places = np.asarray(degrees, float).reshape(-1, 2)
-    good = (
-        np.isfinite(places).all(axis=1)
-        & (np.abs(places) <= (90, 180)).all(axis=1)
-        & (places != 0).any(axis=1)
+    positions = np.asarray(degrees, float).reshape(-1, 2)
+    finite = (
+        np.isfinite(positions).all(axis=1)
+        & (np.abs(positions) <= (90, 180)).all(axis=1)
+        & (positions != 0).any(axis=1)
     )
-    if not good.any():
+    if not finite.any():
         return None
-    lat, lon = places[good][0]
+    lat, lon = positions[finite][0]
     origin = SiteOrigin(lat=float(lat), lon=float(lon), alt=0.0, heading_deg=0.0)
-    xy = np.full(places.shape, np.nan)
-    xy[good] = [from_geodetic(origin, Geodetic(lat=a, lon=b), rule) for a, b in places[good].tolist()]
+    xy = np.full(positions.shape, np.nan)
+    xy[finite] = [from_geodetic(origin, Geodetic(lat=a, lon=b), rule) for a, b in positions[finite].tolist()]
     heading = np.radians(90.0 - np.asarray(bearing, float))
-    return poses_of(source, "earth", ns, xy, heading, origin=origin, rule=rule, **told)
+    return poses_of(source, "earth", ns, xy, heading, origin=origin, rule=rule, **more)

@@ -1,4 +1,4 @@
-"""A log's files: whether they can be read, how they begin, their digest. They are never changed."""
+"""Files of a log: checks, first bytes and digest. The files are never changed."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from pathlib import Path
 
 from stopgo.mission.errors import InputError
 
-PIECE = 1 << 20
+CHUNK = 1 << 20
 
 
 def must_be_readable(path: Path) -> None:
-    """Refuse what is not there or holds nothing.
+    """Refuse a path that does not exist or is empty.
 
     Raises
     ------
     InputError
-        Naming the path and what is wrong with it.
+        When the path cannot be read; the message gives the reason.
     """
     if not path.exists():
         raise InputError(f"{path}: no such log")
     if path.is_dir():
         return
     if not path.is_file():
-        raise InputError(f"{path}: is no file but a device or the like; give a log")
+        raise InputError(f"{path}: not a regular file; give a log")
     if head(path, 1) == b"":
         raise InputError(f"{path}: is empty")
 
 
 def head(path: Path, count: int) -> bytes:
-    """The first bytes of a file.
+    """Return the first bytes of a file.
 
     Raises
     ------
@@ -45,10 +45,10 @@ def head(path: Path, count: int) -> bytes:
 
 
 def digest_of(paths: Sequence[Path]) -> str:
-    """sha256 of the files' bytes, one after another, hexadecimal."""
+    """Return the sha256 of the files' bytes, one after another, hexadecimal."""
     digest = hashlib.sha256()
     for path in paths:
         with path.open("rb") as file:
-            while piece := file.read(PIECE):
-                digest.update(piece)
+            while chunk := file.read(CHUNK):
+                digest.update(chunk)
     return digest.hexdigest()

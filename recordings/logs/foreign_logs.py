@@ -1,4 +1,4 @@
-"""Kinds of logs that installed packages bring: entry points in the group `stopgo.log`, each a `LogFormat`."""
+"""Log formats of installed packages: entry points in the group `stopgo.log`, each a `LogFormat`."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from stopgo.mission.console.plugins import Variant, installed, variant
 from stopgo.recordings.logs.field_log import FieldLog
 
 CLOCKS = ("wall", "since boot", "simulated")
-"""What `FieldLog.clock` may be."""
+"""Allowed values of `FieldLog.clock`."""
 
 
 def foreign_formats(kind: type[Any]) -> Iterator[Variant[Any]]:
-    """Each kind of log that an installed package brings; all are of this kind."""
+    """Yield each log format that an installed package adds; all are instances of `kind`."""
     for name in installed("log"):
         found: Variant[Any] = variant("log", name, {}, said=f"log reader {name}")
         found.of_kind(found.what, kind)
@@ -23,14 +23,14 @@ def foreign_formats(kind: type[Any]) -> Iterator[Variant[Any]]:
 
 
 def sound_log(reader: Variant[Any], given: object) -> FieldLog:
-    """What another's reader gives, if it is a log whose poses are finite and in the order of their times."""
+    """Return a third-party reader's log, if its poses are finite and in order of time."""
     log: FieldLog = reader.of_kind(given, FieldLog)
     if log.clock not in CLOCKS:
         raise reader.wrong(f"its clock is '{log.clock}'; known: {', '.join(CLOCKS)}")
     for poses in log.poses:
         count = len(poses.ns)
         reader.check_array(poses.ns, f"the times of {poses.source}", (count,))
-        reader.check_array(poses.xy, f"the places of {poses.source}", (count, 2))
+        reader.check_array(poses.xy, f"the positions of {poses.source}", (count, 2))
         heading = np.asarray(poses.heading)
         reader.check_array(
             np.where(np.isnan(heading), 0.0, heading), f"the headings of {poses.source}", (count,)

@@ -1,4 +1,4 @@
-"""What is in a log, in words and as JSON: for `stopgo replay LOG --list`."""
+"""Content of a log, as text and as JSON: for `stopgo replay LOG --list`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from stopgo.mission.console.table import duration, table
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 
 SHOWN = 12
-"""Of the lines that a log tells at single moments, as many are shown."""
+"""Limit of remarks that are shown."""
 
 
 def as_text(log: FieldLog) -> str:
-    """A log for a person."""
+    """Return the content for a person."""
     lines = [
         f"{log.path}: {log.format}, {log.messages} messages, {_span(log)}",
         f"  sha256 {log.digest[:16]}…",
@@ -67,18 +67,19 @@ def _remark(track: Poses) -> str:
 
 
 def _remarks(log: FieldLog) -> list[str]:
-    """Modes and triggers one by one, the rest counted."""
-    told = [remark for remark in log.remarks if remark.kind in ("mode", "trigger", "reached")]
+    """Return modes and triggers one by one, and the number of other remarks."""
+    shown = [remark for remark in log.remarks if remark.kind in ("mode", "trigger", "reached")]
     lines = [
-        f"  {(remark.ns - log.begin_ns) / 1e9:8.1f} s  {remark.kind} {remark.text}" for remark in told[:SHOWN]
+        f"  {(remark.ns - log.begin_ns) / 1e9:8.1f} s  {remark.kind} {remark.text}"
+        for remark in shown[:SHOWN]
     ]
-    lines += [f"  … and {len(told) - SHOWN} more"] if len(told) > SHOWN else []
-    counts = Counter(remark.kind for remark in log.remarks if remark not in told)
+    lines += [f"  … and {len(shown) - SHOWN} more"] if len(shown) > SHOWN else []
+    counts = Counter(remark.kind for remark in log.remarks if remark not in shown)
     return lines + [f"  {count} of kind {kind}" for kind, count in sorted(counts.items())]
 
 
 def as_json(log: FieldLog) -> dict[str, Any]:
-    """The same for programs."""
+    """Return the content for programs."""
     return {
         "log": log.path,
         "format": log.format,

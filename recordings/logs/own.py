@@ -1,4 +1,4 @@
-"""stopgo's own logs, which are in the mission's frame already: a robot's journal."""
+"""Reader of stopgo's own logs, which are in the mission's frame: a robot's journal."""
 
 from __future__ import annotations
 
@@ -21,42 +21,42 @@ from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, 
 from stopgo.recordings.logs.files import digest_of
 
 SITE = "site"
-"""What the mission's own frame is called in a log."""
+"""Name of the mission's own frame in a log."""
 AT_EVENTS = "events"
-"""The source of poses that are told with events alone: where the robot stood, and not how it came there."""
-NOWHERE = Poses(AT_EVENTS, SITE, frozen((), np.int64), frozen(np.empty((0, 2))), frozen(()), rank=1)
-BESIDE = ("-wal", "-shm")
+"""Source of poses that events contain: stationary poses, without the path between them."""
+NO_POSES = Poses(AT_EVENTS, SITE, frozen((), np.int64), frozen(np.empty((0, 2))), frozen(()), rank=1)
+SQLITE_SUFFIXES = ("-wal", "-shm")
 
 
 def read_journal(path: Path, reading: Reading) -> FieldLog:
-    """Read a robot's journal, what it had not yet put in its place included; the file stays as it is.
+    """Read a robot's journal with its write-ahead log; the file stays unchanged.
 
     Raises
     ------
     InputError
-        When it is no journal of stopgo, or nothing happened.
+        When it is not a journal of stopgo, or has no events.
     """
     with _copied(path) as connection:
         try:
             events = tuple(_decoded(connection.execute("SELECT body FROM events ORDER BY number")))
             missions = tuple(_missions(_documents(connection)))
         except sqlite3.DatabaseError as error:
-            raise InputError(f"{path}: is no journal of stopgo, or damaged ({error})") from None
+            raise InputError(f"{path}: not a journal of stopgo, or damaged ({error})") from None
     if not events:
-        raise InputError(f"{path}: a journal in which nothing has happened yet")
+        raise InputError(f"{path}: the journal has no events yet")
     return own_log(path, "stopgo journal", events, missions, poses_of_events(events))
 
 
 @contextmanager
 def _copied(path: Path) -> Iterator[sqlite3.Connection]:
-    """An open copy: SQLite writes to what it opens when the last writer was killed."""
+    """Open a copy: SQLite writes to a file that it opens if the last writer was killed."""
     with TemporaryDirectory(prefix="stopgo-") as folder:
         copy = Path(folder) / "journal.sqlite"
         shutil.copyfile(path, copy)
-        for suffix in BESIDE:
-            beside = path.with_name(path.name + suffix)
-            if beside.exists():
-                shutil.copyfile(beside, f"{copy}{suffix}")
+        for suffix in SQLITE_SUFFIXES:
+            companion = path.with_name(path.name + suffix)
+            if companion.exists():
+                shutil.copyfile(companion, f"{copy}{suffix}")
         connection = sqlite3.connect(copy)
         try:
             yield connection
@@ -71,11 +71,11 @@ def _decoded(rows: Iterable[tuple[bytes]]) -> Iterator[AnyEvent]:
 
 
 def _documents(connection: sqlite3.Connection) -> Iterator[bytes]:
-    """Each mission's JSON: in pieces by a number, or whole in journals of formats 1 and 2."""
-    pieces = "SELECT COALESCE(CAST(data AS BLOB), x'') FROM chunks WHERE document = ? ORDER BY number"
+    """Yield each mission's JSON: in numbered chunks, or whole in journals of formats 1 and 2."""
+    chunks = "SELECT COALESCE(CAST(data AS BLOB), x'') FROM chunks WHERE document = ? ORDER BY number"
     for (document,) in connection.execute("SELECT document FROM missions ORDER BY revision").fetchall():
         whole = isinstance(document, bytes)
-        yield document if whole else b"".join(data for (data,) in connection.execute(pieces, (document,)))
+        yield document if whole else b"".join(data for (data,) in connection.execute(chunks, (document,)))
 
 
 def _missions(documents: Iterable[bytes]) -> Iterator[Mission]:
@@ -85,19 +85,21 @@ def _missions(documents: Iterable[bytes]) -> Iterator[Mission]:
 
 
 def poses_of_events(events: Iterable[AnyEvent]) -> Poses:
-    """Where the robot was when it told so with an event; nowhere, if every stop was skipped."""
-    told = [(event.robot_ns, pose) for event in events if (pose := getattr(event, "pose", None)) is not None]
-    if not told:
-        return NOWHERE
-    xy = [(pose.x, pose.y) for _, pose in told]
-    found = poses_of(AT_EVENTS, SITE, [ns for ns, _ in told], xy, [pose.heading for _, pose in told], rank=1)
-    return found or NOWHERE
+    """Return the poses in events; an empty track if every stop was skipped."""
+    posed = [(event.robot_ns, pose) for event in events if (pose := getattr(event, "pose", None)) is not None]
+    if not posed:
+        return NO_POSES
+    xy = [(pose.x, pose.y) for _, pose in posed]
+    found = poses_of(
+        AT_EVENTS, SITE, [ns for ns, _ in posed], xy, [pose.heading for _, pose in posed], rank=1
+    )
+    return found or NO_POSES
 
 
 def own_log(
     path: Path, form: str, events: tuple[AnyEvent, ...], missions: tuple[Mission, ...], *tracks: Poses | None
 ) -> FieldLog:
-    """What there is of a log of stopgo's, as of any other."""
+    """Return one of stopgo's logs as a `FieldLog`."""
     counts: dict[str, int] = {}
     for event in events:
         counts[type(event).__name__] = counts.get(type(event).__name__, 0) + 1

@@ -1,4 +1,4 @@
-"""A run's recording (field.rrd) as a log: the newest run in it."""
+"""Reader of a run's recording (field.rrd) as a log: the newest run in it."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ def read_run_recording(path: Path, reading: Reading) -> FieldLog:
     Raises
     ------
     InputError
-        When it cannot be read, or tells of no run.
+        When it cannot be read, or contains no run.
     """
     recording = read_recording(path)
     if not recording.logs:
-        raise InputError(f"{path}: tells of no run; is it a plan's recording?")
+        raise InputError(f"{path}: contains no run; give the recording of a run")
     run = recording.logs[-1]
     track = run.poses
     poses = (
         poses_of("robot", SITE, track.ns, track.xy, track.heading, robot=run.robot) if len(track) else None
     )
-    told = poses_of_events(run.events)
-    return own_log(path, "stopgo recording", run.events, recording.missions, poses, told)
+    stationary = poses_of_events(run.events)
+    return own_log(path, "stopgo recording", run.events, recording.missions, poses, stationary)

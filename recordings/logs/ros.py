@@ -1,4 +1,4 @@
-"""ROS logs: ROS 1 .bag, and of ROS 2 a folder, a raw .mcap or .db3, whole or damaged."""
+"""Reader of ROS logs: ROS 1 .bag, and of ROS 2 a folder, a raw .mcap or .db3, complete or damaged."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ from stopgo.recordings.logs.transforms import TransformTree
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 FIX, BATTERY = "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/BatteryState"
 SIMULATED_BELOW_NS = 10**18
-"""Times before September 2001 are no wall clock's but a simulation's, or count from a start."""
+"""Times before September 2001 are simulated, or count from a start."""
 NOT_THE_ROBOT = ("goal", "target", "setpoint", "initialpose", "plan", "desired", "reference")
-"""Topics with such a word in their name tell where the robot is to be."""
+"""Words in the names of topics that contain goals, not the robot's pose."""
 TICK_EVERY = 20_000
 
 
 def read_ros(path: Path, reading: Reading) -> FieldLog:
-    """Read a bag to its end, or as much of it as can be had.
+    """Read a bag to its end, or the readable part of it.
 
     Raises
     ------
     InputError
-        When it is no bag, or nothing of it can be read.
+        When it is not a bag, or nothing in it can be read.
     """
     try:
         with whole_bag(path) as bag:
-            return _gathered(path, bag, reading)
+            return _read_bag(path, bag, reading)
     except Damaged as damage:
         with salvaged_bag(path, str(damage)) as bag:
-            found = _gathered(path, bag, reading)
+            found = _read_bag(path, bag, reading)
     if not found.messages:
-        raise InputError(f"{path}: nothing in it can be read ({found.lost}); was it copied whole?")
+        raise InputError(f"{path}: nothing in it can be read ({found.lost}); incomplete copy?")
     return found
 
 
-def _gathered(path: Path, bag: Bag, reading: Reading) -> FieldLog:
+def _read_bag(path: Path, bag: Bag, reading: Reading) -> FieldLog:
     sorter = _TopicSorter(bag, reading)
     wanted = [topic for topic in bag.topics if topic.count is None or sorter.wants(topic)]
     total = sum(topic.count or 0 for topic in wanted)
@@ -65,7 +65,7 @@ def _gathered(path: Path, bag: Bag, reading: Reading) -> FieldLog:
         begin_ns=begin,
         end_ns=end,
         channels=_channels(counts),
-        poses=(*sorter.poses(), *sorter.places()),
+        poses=(*sorter.poses(), *sorter.earth_poses()),
         battery=tuple(sorter.battery),
         mounts=sorter.mounts(),
         sweeps=lambda: _sweeps(path, reading),
@@ -82,7 +82,7 @@ def _format(path: Path, bag: Bag) -> str:
 
 
 def _channels(counts: dict[Topic, int]) -> tuple[Channel, ...]:
-    """One for each topic, however many connections it has."""
+    """Return one channel per topic, whatever the number of its connections."""
     merged: Counter[tuple[str, str]] = Counter()
     for topic, count in counts.items():
         merged[topic.name, topic.msgtype] += count
@@ -91,7 +91,7 @@ def _channels(counts: dict[Topic, int]) -> tuple[Channel, ...]:
 
 @dataclass
 class _TopicSorter:
-    """Takes messages one after another, each to what it tells of."""
+    """Reads messages one after another, each by its type."""
 
     bag: Bag
     reading: Reading
@@ -102,7 +102,7 @@ class _TopicSorter:
     counts: Counter[Topic] = field(default_factory=Counter)
     faults: Counter[str] = field(default_factory=Counter)
     logged: list[int] = field(default_factory=list)
-    """The first and the last time."""
+    """First and last time."""
 
     def wants(self, topic: Topic) -> bool:
         return topic.msgtype in (*TYPES, *TRANSFORMS, FIX, BATTERY)
@@ -110,17 +110,17 @@ class _TopicSorter:
     def take(self, topic: Topic, ns: int, raw: bytes) -> None:
         self.counts[topic] += 1
         self.logged = [min(self.logged[0], ns), max(self.logged[1], ns)] if self.logged else [ns, ns]
-        taking = self._taking(topic)
-        if taking is None:
+        handler = self._handler_of(topic)
+        if handler is None:
             return
         try:
-            taking(topic, ns, raw)
+            handler(topic, ns, raw)
         except UnknownType as error:
             self.faults[f"{topic.name}: {error}"] += 1
         except (struct.error, IndexError, AttributeError):
-            self.faults[f"{topic.name}: bytes that are no {topic.msgtype}"] += 1
+            self.faults[f"{topic.name}: bytes that are not a {topic.msgtype}"] += 1
 
-    def _taking(self, topic: Topic) -> Callable[[Topic, int, bytes], None] | None:
+    def _handler_of(self, topic: Topic) -> Callable[[Topic, int, bytes], None] | None:
         if topic.msgtype in TYPES:
             return self._pose
         if topic.msgtype in TRANSFORMS:
@@ -135,8 +135,8 @@ class _TopicSorter:
 
     def _transforms(self, topic: Topic, ns: int, raw: bytes) -> None:
         for item in self.bag.decode(topic, raw).transforms:
-            move, turn = item.transform.translation, item.transform.rotation
-            heading = heading_of((turn.x, turn.y, turn.z, turn.w))
+            move, rotation = item.transform.translation, item.transform.rotation
+            heading = heading_of((rotation.x, rotation.y, rotation.z, rotation.w))
             stamp = self._time(item.header.stamp.sec * 10**9 + item.header.stamp.nanosec, ns)
             static = topic.name.endswith("tf_static")
             self.tree.add(
@@ -144,29 +144,29 @@ class _TopicSorter:
             )
 
     def _fix(self, topic: Topic, ns: int, raw: bytes) -> None:
-        told = self.bag.decode(topic, raw)
-        stamp = self._time(told.header.stamp.sec * 10**9 + told.header.stamp.nanosec, ns)
-        if told.status.status >= 0:
-            self.fixes.setdefault(topic.name, []).append((stamp, told.latitude, told.longitude))
+        fix = self.bag.decode(topic, raw)
+        stamp = self._time(fix.header.stamp.sec * 10**9 + fix.header.stamp.nanosec, ns)
+        if fix.status.status >= 0:
+            self.fixes.setdefault(topic.name, []).append((stamp, fix.latitude, fix.longitude))
 
     def _charge(self, topic: Topic, ns: int, raw: bytes) -> None:
-        share = float(self.bag.decode(topic, raw).percentage)
-        if 0 <= share <= 1:
-            self.battery.append((ns, share))
+        fraction = float(self.bag.decode(topic, raw).percentage)
+        if 0 <= fraction <= 1:
+            self.battery.append((ns, fraction))
 
     def _time(self, stamp_ns: int, logged_ns: int) -> int:
-        """The time that counts; a stamp of 0 was never set."""
+        """Return the time that counts; a stamp of 0 was never set."""
         return logged_ns if self.reading.stamps == "log" or stamp_ns == 0 else stamp_ns
 
     def span(self) -> tuple[int, int]:
-        """When the log begins and ends, by the times that count for its poses if it has any."""
-        tracks = [*self.poses(), *self.places()]
+        """Return the begin and end of the log, from its poses if it has any."""
+        tracks = [*self.poses(), *self.earth_poses()]
         if tracks:
             return min(int(t.ns[0]) for t in tracks), max(int(t.ns[-1]) for t in tracks)
         return (self.logged[0], self.logged[1]) if self.logged else (0, 0)
 
     def poses(self) -> tuple[Poses, ...]:
-        """From every topic and frame that tells any, and from transforms."""
+        """Return poses from every topic and frame that contains any, and from transforms."""
         if self._poses is None:
             found = [track for column in self.columns.values() for track in self._of(column)]
             chained = self._of_transforms()
@@ -187,15 +187,15 @@ class _TopicSorter:
                 yield track
 
     def _of_transforms(self) -> Poses | None:
-        way = self.tree.robot_chain(self.reading.frame)
-        if not way:
+        chain = self.tree.robot_chain(self.reading.frame)
+        if not chain:
             return None
-        ns, xy, heading = self.tree.poses(way)
-        names = " > ".join([way[0][0], *(child for _, child in way)])
-        rank = 0 if self.reading.frame is not None or way[0][0] == "map" else 5
-        return poses_of(f"tf {names}", way[0][0], ns, xy, heading, rank=rank)
+        ns, xy, heading = self.tree.poses(chain)
+        names = " > ".join([chain[0][0], *(child for _, child in chain)])
+        rank = 0 if self.reading.frame is not None or chain[0][0] == "map" else 5
+        return poses_of(f"tf {names}", chain[0][0], ns, xy, heading, rank=rank)
 
-    def places(self) -> tuple[Poses, ...]:
+    def earth_poses(self) -> tuple[Poses, ...]:
         tracks = []
         for topic, rows in self.fixes.items():
             table = np.array(rows)
@@ -207,8 +207,8 @@ class _TopicSorter:
         return tuple(track for track in tracks if track is not None)
 
     def mounts(self) -> tuple[tuple[str, float, float, float], ...]:
-        way = self.tree.robot_chain(self.reading.frame)
-        return self.tree.mounts(way[-1][1]) if way else self.tree.mounts("base_link")
+        chain = self.tree.robot_chain(self.reading.frame)
+        return self.tree.mounts(chain[-1][1]) if chain else self.tree.mounts("base_link")
 
     def oddities(self) -> tuple[str, ...]:
         lines = [f"{fault} ({count} messages, left out)" for fault, count in self.faults.items()]
@@ -216,14 +216,14 @@ class _TopicSorter:
         return (*lines, apart) if apart else tuple(lines)
 
     def _clocks_apart(self) -> str:
-        """Whether the messages' stamps are of another clock than the log's times."""
+        """Return a note if the messages' stamps are from another clock than the log's times."""
         for column in self.columns.values():
             stamps, logged = np.array(column.stamp_ns, np.int64), np.array(column.logged_ns, np.int64)
-            away = np.abs(stamps - logged)[stamps != 0] / 1e9
-            if len(away) and float(np.median(away)) > APART_S:
+            difference = np.abs(stamps - logged)[stamps != 0] / 1e9
+            if len(difference) and float(np.median(difference)) > APART_S:
                 counts = "stamps count" if self.reading.stamps == "header" else "log times count"
                 return (
-                    f"{column.topic}: stamps lie {np.median(away):.0f} s from the log's own times"
+                    f"{column.topic}: stamps differ by {np.median(difference):.0f} s from the log's own times"
                     f" (simulated time, or clocks that were not set); the {counts}"
                 )
         return ""
@@ -233,12 +233,12 @@ APART_S = 60.0
 
 
 def _namespace(topic: str) -> str:
-    """The robot's part of a topic: `r1` of `/r1/odom`."""
+    """Return the robot's part of a topic: `r1` of `/r1/odom`."""
     return "/".join(topic.strip("/").split("/")[:-1])
 
 
 def _rank(topic: str, msgtype: str, frame: str) -> int:
-    """Which of several sources is believed first: what a map was matched with, then odometry."""
+    """Return the priority of a source: map matching first, then odometry."""
     if any(word in topic.lower() for word in NOT_THE_ROBOT):
         return 9
     if msgtype.endswith("PoseWithCovarianceStamped"):
@@ -249,10 +249,10 @@ def _rank(topic: str, msgtype: str, frame: str) -> int:
 
 
 def _sweeps(path: Path, reading: Reading) -> Iterator[Sweep]:
-    """The scans of the log, in order; of a damaged log those that can be had."""
+    """Yield the scans of the log, in order; of a damaged log, the readable ones."""
     try:
         with whole_bag(path) as bag:
-            for _ in bag.messages(bag.topics):  # damage shows only when it is read
+            for _ in bag.messages(bag.topics):  # damage is found only by reading
                 pass
     except Damaged as damage:
         with salvaged_bag(path, str(damage)) as bag:
@@ -267,7 +267,7 @@ def _sweeps_of(bag: Bag, reading: Reading) -> Iterator[Sweep]:
         try:
             message = bag.decode(topic, raw)
         except UnknownType:
-            continue  # was counted when the log was read
+            continue  # counted when the log was read
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         when = ns if reading.stamps == "log" or stamp == 0 else stamp
         frame = message.header.frame_id.lstrip("/")

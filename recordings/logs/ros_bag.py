@@ -1,4 +1,4 @@
-"""Opens ROS bags of either kind: by rosbags where they are whole, record by record where they are not."""
+"""Access to ROS bags: complete ones by rosbags, damaged ones record by record."""
 
 from __future__ import annotations
 
@@ -19,48 +19,48 @@ from stopgo.recordings.logs.salvage import Salvaged, salvage
 
 @dataclass(frozen=True)
 class Topic:
-    """One connection of a bag."""
+    """Connection of a bag."""
 
     number: int
     name: str
     msgtype: str
     count: int | None
-    """None where only reading to the end tells."""
+    """Number of messages; None if it is known only at the end."""
 
 
 BagMessage = tuple[Topic, int, bytes]
-"""Its topic, when it was logged (ns), and its bytes."""
+"""Topic, time of logging (ns), and bytes of a message."""
 
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag."""
+    """Open bag."""
 
     ros2: bool
     topics: tuple[Topic, ...]
     messages: Callable[[Sequence[Topic]], Iterator[BagMessage]]
-    """Of these topics, in the order in which they were logged."""
+    """Messages of these topics, in the order of logging."""
     decode: Callable[[Topic, bytes], Any]
-    """A message as an object with its fields; UnknownType where nobody knows how."""
+    """Decoder of a message into an object; raises UnknownType for unknown types."""
     lost: Callable[[], str] = lambda: ""
-    """Once all messages were read: what of the bag could not be."""
+    """Unreadable part of the bag; complete only after all messages were read."""
 
 
 class UnknownType(Exception):
-    """A message of a type that is not described anywhere."""
+    """Message type that is not described anywhere."""
 
 
 class Damaged(Exception):
-    """A bag that rosbags cannot read to its end."""
+    """Bag that rosbags cannot read to its end."""
 
 
 def files_of(path: Path) -> list[Path]:
-    """The files that a bag is made of."""
+    """Return the files of a bag."""
     if not path.is_dir():
         return [path]
     found = [p for p in sorted(path.iterdir(), key=lambda p: _natural(p.name)) if _is_part(p)]
     if not found:
-        raise InputError(f"{path}: holds no .mcap, .db3 or .bag; give a log, or the folder of a rosbag2")
+        raise InputError(f"{path}: contains no .mcap, .db3 or .bag; give a log, or the folder of a rosbag2")
     return found
 
 
@@ -69,7 +69,7 @@ def _is_part(path: Path) -> bool:
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
-    """So that bag_2 comes before bag_10."""
+    """Sort key by which bag_2 comes before bag_10."""
     import re
 
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
@@ -77,7 +77,7 @@ def _natural(name: str) -> list[tuple[int, str]]:
 
 @contextmanager
 def whole_bag(path: Path) -> Iterator[Bag]:
-    """A bag as rosbags reads it.
+    """Open a bag with rosbags.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def whole_bag(path: Path) -> Iterator[Bag]:
     from rosbags.typesys import Stores, get_typestore
 
     with ExitStack() as stack:
-        with _damage_told():
+        with _raising_damage():
             described = path.is_dir() and (path / METADATA).exists()
             paths = [path] if described else stack.enter_context(_unpacked(files_of(path)))
             reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
@@ -101,28 +101,28 @@ METADATA = "metadata.yaml"
 
 @contextmanager
 def _unpacked(files: Sequence[Path]) -> Iterator[list[Path]]:
-    """The files, those that are packed as a whole (`.zstd`) unpacked in a folder that goes away again."""
+    """Yield the files; compressed ones (`.zstd`) are decompressed into a temporary folder."""
     with TemporaryDirectory(prefix="stopgo-") as folder:
         yield [_plain(file, Path(folder)) if file.suffix == ".zstd" else file for file in files]
 
 
 def _plain(file: Path, folder: Path) -> Path:
-    """As much of a packed file as can be unpacked."""
+    """Decompress a file as far as possible."""
     from backports import zstd
 
     target = folder / file.stem
     unpack = zstd.ZstdDecompressor()
     with file.open("rb") as packed, target.open("wb") as plain:
-        while piece := packed.read(1 << 20):
+        while chunk := packed.read(1 << 20):
             try:
-                plain.write(unpack.decompress(piece))
+                plain.write(unpack.decompress(chunk))
             except (zstd.ZstdError, EOFError):
                 break
     return target
 
 
 @contextmanager
-def _damage_told() -> Iterator[None]:
+def _raising_damage() -> Iterator[None]:
     try:
         yield
     except _damage() as error:
@@ -130,7 +130,7 @@ def _damage_told() -> Iterator[None]:
 
 
 def _damage() -> tuple[type[Exception], ...]:
-    """What reading a damaged file raises; of rosbags' own SQLite, too, where it has come with one."""
+    """Return the exceptions that reading a damaged file raises, also those of rosbags' own SQLite."""
     from rosbags.highlevel import AnyReaderError
     from rosbags.rosbag1 import ReaderError as Error1
     from rosbags.rosbag2 import ReaderError as Error2
@@ -145,7 +145,7 @@ LOW_LEVEL = (
     AssertionError, OSError, sqlite3.DatabaseError, struct.error, EOFError, RuntimeError, ValueError,
     IndexError, KeyError, lzma.LZMAError, MemoryError, OverflowError,
 )  # fmt: skip
-"""What readers of damaged files have been seen to raise besides errors of their own."""
+"""Exceptions that readers of damaged files raise besides their own."""
 
 
 def _reason(error: BaseException) -> str:
@@ -157,7 +157,7 @@ def _bag(reader: Any) -> Bag:
 
     def messages(wanted: Sequence[Topic]) -> Iterator[BagMessage]:
         chosen = [c for c in reader.connections if topics[_key(c)] in wanted]
-        with _damage_told():  # whoever takes the messages raises nothing in here
+        with _raising_damage():  # exceptions of the consumer are not raised in here
             for connection, ns, raw in reader.messages(connections=chosen) if chosen else ():
                 yield topics[_key(connection)], ns, raw
 
@@ -172,7 +172,7 @@ def _key(connection: Any) -> tuple[int, str, int]:
 
 
 def decoded(store: Any, msgtype: str, raw: bytes, *, ros2: bool) -> Any:
-    """A message's bytes as an object.
+    """Return a message's bytes as an object.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def decoded(store: Any, msgtype: str, raw: bytes, *, ros2: bool) -> Any:
 
 @contextmanager
 def salvaged_bag(path: Path, why: str) -> Iterator[Bag]:
-    """As much of a damaged bag as can be had."""
+    """Open the readable part of a damaged bag."""
     with _unpacked(files_of(path)) as files, salvage(files, why) as found:
         yield _salvaged(found)
 
@@ -211,7 +211,7 @@ def _salvaged(found: Salvaged) -> Bag:
 
 
 def _store_of(found: Salvaged) -> Any:
-    """ROS's own types, and those that the bag describes."""
+    """Return ROS's own types, and those that the bag describes."""
     from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE if found.ros2 else Stores.ROS1_NOETIC)
@@ -221,5 +221,5 @@ def _store_of(found: Salvaged) -> Any:
                 types = get_types_from_msg(connection.definition, connection.msgtype)
                 store.register({name: item for name, item in types.items() if name not in store.fielddefs})
             except TypesysError:
-                continue  # then messages of this type are told as unknown
+                continue  # messages of this type are then reported as unknown
     return store

@@ -1,7 +1,7 @@
-"""ROS messages of known types -> poses, straight from their bytes: a log holds hundreds of thousands.
+"""Poses of ROS messages of known types, read from their bytes: a log contains hundreds of thousands.
 
-Each message is read twice as fast as by a whole decoder because only its stamp and pose are looked at. The
-first message of every topic is decoded whole too; where the two differ, all of them are.
+Reading only stamp and pose is twice as fast as a whole decoder. The first message of every topic is also
+decoded as a whole; if the results differ, all messages of that topic are.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from stopgo.mission.geometry import FloatArray
 
 
 class Stamped(NamedTuple):
-    """A pose as a message tells it."""
+    """Pose in a message, with its stamp."""
 
     stamp_ns: int
     frame: str
@@ -34,7 +34,7 @@ TYPES = (WITH_CHILD, "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWit
 
 
 def heading_of(quaternion: tuple[float, float, float, float]) -> float:
-    """The turn about z, radians; NaN of a quaternion that is none."""
+    """Return the rotation about z, radians; NaN for an invalid quaternion."""
     x, y, z, w = quaternion
     if not 0.5 < x * x + y * y + z * z + w * w < 2.0:
         return math.nan
@@ -42,7 +42,7 @@ def heading_of(quaternion: tuple[float, float, float, float]) -> float:
 
 
 def _from_cdr(raw: bytes, child: bool) -> Stamped:
-    """ROS 2: everything stands at multiples of its size, counted from byte 4."""
+    """Read ROS 2 bytes: each value is at a multiple of its size, counted from byte 4."""
     order = "<" if raw[1] & 1 else ">"
     seconds, nanoseconds, length = struct.unpack_from(f"{order}iII", raw, 4)
     frame = raw[16 : 15 + length].decode("utf-8", "replace")
@@ -59,7 +59,7 @@ def _next(at: int, size: int) -> int:
 
 
 def _from_ros1(raw: bytes, child: bool) -> Stamped:
-    """ROS 1: everything follows closely."""
+    """Read ROS 1 bytes: values follow each other without padding."""
     _, seconds, nanoseconds, length = struct.unpack_from("<IIII", raw)
     frame = raw[16 : 16 + length].decode("utf-8", "replace")
     at = 16 + length
@@ -70,18 +70,20 @@ def _from_ros1(raw: bytes, child: bool) -> Stamped:
 
 
 def _from_message(message: Any) -> Stamped:
-    """Of a message that was decoded whole."""
+    """Read a message that was decoded as a whole."""
     header, pose = message.header, message.pose
     while hasattr(pose, "pose"):
         pose = pose.pose
-    place, turn = pose.position, pose.orientation
+    position, rotation = pose.position, pose.orientation
     stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
-    return Stamped(stamp, header.frame_id, place.x, place.y, (turn.x, turn.y, turn.z, turn.w))
+    return Stamped(
+        stamp, header.frame_id, position.x, position.y, (rotation.x, rotation.y, rotation.z, rotation.w)
+    )
 
 
 @dataclass
 class PoseColumns:
-    """The poses of one topic, as they are read."""
+    """Poses of one topic, while they are read."""
 
     topic: str
     msgtype: str
@@ -91,20 +93,20 @@ class PoseColumns:
     logged_ns: array[int] = field(default_factory=lambda: array("q"))
     values: array[float] = field(default_factory=lambda: array("d"))
     frames: dict[str, int] = field(default_factory=dict)
-    """How many poses are told in each frame."""
+    """Index of each frame."""
     in_frame: array[int] = field(default_factory=lambda: array("l"))
     _read: Callable[[bytes], Stamped] | None = None
 
     def take(self, logged_ns: int, raw: bytes) -> None:
-        """Take a message in; struct.error where its bytes are too few."""
+        """Read a message; raises struct.error if it has too few bytes."""
         if self._read is None:
             self._read = self._reader(raw)
-        told = self._read(raw)
-        x, y, z, w = told.quaternion
-        self.stamp_ns.append(told.stamp_ns)
+        pose = self._read(raw)
+        x, y, z, w = pose.quaternion
+        self.stamp_ns.append(pose.stamp_ns)
         self.logged_ns.append(logged_ns)
-        self.values.extend((told.x, told.y, x, y, z, w))
-        number = self.frames.setdefault(told.frame.lstrip("/"), len(self.frames))
+        self.values.extend((pose.x, pose.y, x, y, z, w))
+        number = self.frames.setdefault(pose.frame.lstrip("/"), len(self.frames))
         self.in_frame.append(number)
 
     def _reader(self, raw: bytes) -> Callable[[bytes], Stamped]:
@@ -119,16 +121,16 @@ class PoseColumns:
         return lambda data: _from_message(self.decode(data))
 
     def of_frame(self, frame: str) -> tuple[np.ndarray, np.ndarray, FloatArray, FloatArray]:
-        """Stamps, log times, places (n, 2) and headings (n,) that are told in a frame."""
-        mine = np.array(self.in_frame, np.int64) == self.frames[frame]
-        values = np.array(self.values).reshape(-1, 6)[mine]
-        stamps, logged = (np.array(times, np.int64)[mine] for times in (self.stamp_ns, self.logged_ns))
+        """Return stamps, log times, positions (n, 2) and headings (n,) in a frame."""
+        in_frame = np.array(self.in_frame, np.int64) == self.frames[frame]
+        values = np.array(self.values).reshape(-1, 6)[in_frame]
+        stamps, logged = (np.array(times, np.int64)[in_frame] for times in (self.stamp_ns, self.logged_ns))
         return stamps, logged, values[:, :2], headings_of(values[:, 2:])
 
 
 def headings_of(quaternions: FloatArray) -> FloatArray:
-    """Turns about z of quaternions (n, 4) x, y, z, w; NaN of those that are none."""
+    """Return rotations about z of quaternions (n, 4) x, y, z, w; NaN for invalid ones."""
     x, y, z, w = quaternions.T
-    turn = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    rotation = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     size = (quaternions**2).sum(axis=1)
-    return np.where((size > 0.5) & (size < 2.0), turn, np.nan)
+    return np.where((size > 0.5) & (size < 2.0), rotation, np.nan)

@@ -1,4 +1,4 @@
-"""Laser scans and point clouds of ROS -> points in the scanner's frame."""
+"""Laser scans and point clouds of ROS, as points in the scanner's frame."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from stopgo.mission.geometry import FloatArray
 def _of_laser_scan(message: Any) -> FloatArray:
     ranges = np.asarray(message.ranges, float)
     angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
-    good = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges <= message.range_max)
-    ranges, angles = ranges[good], angles[good]
+    valid = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges <= message.range_max)
+    ranges, angles = ranges[valid], angles[valid]
     flat = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=-1)
     return np.column_stack([flat, np.zeros(len(flat))])
 
@@ -24,25 +24,25 @@ KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
 def _of_point_cloud(message: Any) -> FloatArray:
-    """Nothing of a cloud whose own words about its bytes do not fit them."""
+    """Return the points; none if the cloud's description does not match its bytes."""
     order = ">" if message.is_bigendian else "<"
-    places = {item.name: item for item in message.fields if item.name in ("x", "y", "z")}
-    if {"x", "y"} - places.keys() or any(item.datatype not in KINDS for item in places.values()):
+    axes = {item.name: item for item in message.fields if item.name in ("x", "y", "z")}
+    if {"x", "y"} - axes.keys() or any(item.datatype not in KINDS for item in axes.values()):
         return np.empty((0, 3))
-    forms = {name: np.dtype(order + KINDS[item.datatype]) for name, item in places.items()}
+    forms = {name: np.dtype(order + KINDS[item.datatype]) for name, item in axes.items()}
     step, wide = int(message.point_step), int(message.width) * int(message.point_step)
-    if any(item.offset + forms[name].itemsize > step for name, item in places.items()):
+    if any(item.offset + forms[name].itemsize > step for name, item in axes.items()):
         return np.empty((0, 3))
     kind = np.dtype({
         "names": list(forms), "formats": list(forms.values()),
-        "offsets": [places[name].offset for name in forms], "itemsize": step,
+        "offsets": [axes[name].offset for name in forms], "itemsize": step,
     })  # fmt: skip
     data = np.asarray(message.data, np.uint8)
     pitch = max(int(message.row_step), wide)
     if message.height > 1 and pitch > wide and len(data) >= message.height * pitch:  # rows are padded
         data = data[: message.height * pitch].reshape(message.height, pitch)[:, :wide].ravel()
     rows = np.frombuffer(data[: len(data) // step * step].tobytes(), kind)
-    z = rows["z"] if "z" in places else np.zeros(len(rows))
+    z = rows["z"] if "z" in axes else np.zeros(len(rows))
     xyz = np.stack([rows["x"], rows["y"], z], axis=-1).astype(float)
     return xyz[np.isfinite(xyz).all(axis=1)]
 
@@ -51,4 +51,4 @@ SWEEPS: dict[str, Callable[[Any], FloatArray]] = {
     "sensor_msgs/msg/LaserScan": _of_laser_scan,
     "sensor_msgs/msg/PointCloud2": _of_point_cloud,
 }
-"""How each type's points (n, 3) are told."""
+"""Function per type that returns its points (n, 3)."""

@@ -1,7 +1,7 @@
-"""Reads damaged bags record by record, without their index, up to where nothing makes sense any more.
+"""Recovery of damaged bags: they are read record by record, without their index, up to invalid bytes.
 
-Of a ROS 1 bag (format 2.0) and of MCAP every chunk that can be unpacked is taken, of a cut one what is
-there; of SQLite every row that can be reached. What was passed over is counted in bytes or rows.
+Of ROS 1 bags (format 2.0) and MCAP, every chunk that can be decompressed is used, of a truncated one its
+readable part. Of SQLite, every reachable row is used. Skipped bytes or rows are counted.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from urllib.parse import quote
 from stopgo.mission.errors import InputError
 
 Raw = tuple[int, int, bytes]
-"""Number of the connection, when it was logged (ns), and the bytes."""
+"""Number of the connection, time of logging (ns), and the bytes."""
 
 BAG_MAGIC = b"#ROSBAG V2.0\n"
 MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -32,18 +32,18 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
 class BagConnection(NamedTuple):
-    """A topic as the bag describes it."""
+    """Topic as the bag describes it."""
 
     number: int
     topic: str
     msgtype: str
-    """With `/msg/` in the middle, as ROS 2 writes it."""
+    """Message type with `/msg/` in the middle, as ROS 2 writes it."""
     definition: str
 
 
 @dataclass
 class Salvaged:
-    """What there is in damaged files."""
+    """Readable content of damaged files."""
 
     ros2: bool
     connections: tuple[BagConnection, ...]
@@ -53,12 +53,12 @@ class Salvaged:
 
 @dataclass
 class _Loss:
-    """What was passed over, as it is read."""
+    """Skipped data, collected during reading."""
 
     why: str
     lines: list[str] = field(default_factory=list)
 
-    def tell(self, line: str) -> None:
+    def add(self, line: str) -> None:
         if line not in self.lines:
             self.lines.append(line)
 
@@ -67,7 +67,7 @@ class _Loss:
 
 
 class _FoundChunk(NamedTuple):
-    """How one kind of file is read: its records, each a connection or a message."""
+    """Reader of one kind of file: its records, each a connection or a message."""
 
     ros2: bool
     records: Callable[[Path, _Loss], Iterator[BagConnection | Raw]]
@@ -75,17 +75,17 @@ class _FoundChunk(NamedTuple):
 
 @contextmanager
 def salvage(paths: Sequence[Path], why: str) -> Iterator[Salvaged]:
-    """Read what can be read of the files of a bag; `why` is what a reader of whole files said.
+    """Read the readable part of a bag's files; `why` is the error of the regular reader.
 
     Raises
     ------
     InputError
-        When a file is none of these kinds.
+        When a file is of none of these kinds.
     """
     loss = _Loss(why)
     parts = [(path, _part(path)) for path in paths]
     if len({part.ros2 for _, part in parts}) > 1:
-        raise InputError(f"{paths[0].parent}: holds bags of ROS 1 and of ROS 2; give one of them")
+        raise InputError(f"{paths[0].parent}: contains bags of ROS 1 and of ROS 2; give one of them")
 
     def read() -> Iterator[BagConnection | Raw]:
         for number, (path, part) in enumerate(parts):
@@ -100,7 +100,7 @@ def salvage(paths: Sequence[Path], why: str) -> Iterator[Salvaged]:
 
 
 FILES_APART = 1 << 32
-"""Connections are numbered anew in every file."""
+"""Distance of connection numbers between files: each file numbers its own from 0."""
 
 
 def _shifted(record: BagConnection | Raw, by: int) -> BagConnection | Raw:
@@ -120,16 +120,16 @@ def _part(path: Path) -> _FoundChunk:
     for magic, part in kinds.items():
         if begin.startswith(magic):
             return part
-    raise InputError(f"{path}: does not begin as a .bag, .mcap or .db3 does; nothing of it can be read")
+    raise InputError(f"{path}: invalid .bag, .mcap or .db3 header; nothing in it can be read")
 
 
 Bytes = bytes | mmap
-"""Of which slices can be cut, each as bytes."""
+"""Sliceable bytes."""
 
 
 @contextmanager
 def _mapped(path: Path) -> Iterator[mmap]:
-    """A file's bytes without reading them all."""
+    """Map a file's bytes without reading them all."""
     with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as mapped:
         yield mapped
 
@@ -140,18 +140,18 @@ def _bag_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
 
 
 def _bag_stream(data: Bytes, at: int, name: str, loss: _Loss) -> Iterator[BagConnection | Raw]:
-    """Records of a file, or of an unpacked chunk: a header of fields, then data, each with its length."""
+    """Yield records of a file, or of a decompressed chunk: header fields, then data, each with its length."""
     while at < len(data):
         record = _bag_record(data, at)
         if record is None:
-            loss.tell(f"{name}: the last {len(data) - at} bytes make no sense")
+            loss.add(f"{name}: the last {len(data) - at} bytes are invalid")
             return
         fields, body, at = record
         operation = fields.get(b"op", b"\0")[:1]
         if operation == b"\x05":
             plain = _unpacked(fields.get(b"compression", b"").decode("ascii", "replace"), body)
             if plain is None:
-                loss.tell(f"{name}: a chunk of {len(body)} bytes cannot be unpacked")
+                loss.add(f"{name}: a chunk of {len(body)} bytes cannot be decompressed")
             else:
                 yield from _bag_stream(plain, 0, f"{name}, a chunk", loss)
         elif operation == b"\x07":
@@ -164,9 +164,9 @@ def _bag_stream(data: Bytes, at: int, name: str, loss: _Loss) -> Iterator[BagCon
 
 
 def _bag_record(data: Bytes, at: int) -> tuple[dict[bytes, bytes], bytes, int] | None:
-    """Its header's fields, its data and where the next begins; None if it makes no sense.
+    """Return a record's header fields, its data and the begin of the next one; None if it is invalid.
 
-    A chunk that is cut off at the end of the file is given as far as it goes.
+    A chunk that is truncated at the end of the file is returned as far as it goes.
     """
     if at + 4 > len(data):
         return None
@@ -186,16 +186,16 @@ LONGEST_HEADER = 1 << 20
 
 
 def _fields(header: bytes) -> dict[bytes, bytes]:
-    """A header's fields by name, as far as they make sense."""
+    """Return a header's valid fields by name."""
     fields: dict[bytes, bytes] = {}
-    place = 0
-    while place + 4 <= len(header):
-        (size,) = struct.unpack_from("<I", header, place)
-        name, equals, value = header[place + 4 : place + 4 + size].partition(b"=")
+    offset = 0
+    while offset + 4 <= len(header):
+        (size,) = struct.unpack_from("<I", header, offset)
+        name, equals, value = header[offset + 4 : offset + 4 + size].partition(b"=")
         if not equals:
             break
         fields[name] = value
-        place += 4 + size
+        offset += 4 + size
     return fields
 
 
@@ -223,7 +223,7 @@ def _mcap_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
 def _mcap_stream(
     data: Bytes, at: int, name: str, loss: _Loss, schemas: dict[int, tuple[str, str]]
 ) -> Iterator[BagConnection | Raw]:
-    """Records of a file, or of an unpacked chunk: an operation, a length, a body."""
+    """Yield records of a file, or of a decompressed chunk: operation, length, body."""
     while at + 9 <= len(data):
         operation, length = struct.unpack_from("<BQ", data, at)
         begin, end = at + 9, at + 9 + length
@@ -236,11 +236,11 @@ def _mcap_stream(
         try:
             yield from _mcap_record(operation, body, name, loss, schemas)
         except (struct.error, UnicodeDecodeError):
-            loss.tell(f"{name}: a record of {length} bytes makes no sense")
+            loss.add(f"{name}: a record of {length} bytes is invalid")
     if at < len(data):
-        loss.tell(f"{name}: the last {len(data) - at} bytes make no sense")
+        loss.add(f"{name}: the last {len(data) - at} bytes are invalid")
     elif at > len(data):
-        loss.tell(f"{name}: ends {at - len(data)} bytes too early")
+        loss.add(f"{name}: {at - len(data)} bytes are missing at its end")
 
 
 def _mcap_record(
@@ -262,7 +262,7 @@ def _mcap_record(
         compression, at = _text(body, 28)
         plain = _unpacked(compression, body[at + 8 :])
         if plain is None:
-            loss.tell(f"{name}: a chunk of {len(body)} bytes cannot be unpacked")
+            loss.add(f"{name}: a chunk of {len(body)} bytes cannot be decompressed")
         else:
             yield from _mcap_stream(plain, 0, f"{name}, a chunk", loss, schemas)
 
@@ -273,7 +273,7 @@ def _text(body: bytes, at: int) -> tuple[str, int]:
 
 
 def _unpacked(compression: str, body: bytes) -> bytes | None:
-    """A chunk's bytes, as far as they go; None where not even their beginning can be unpacked."""
+    """Return a chunk's bytes as far as possible; None if not even their beginning can be decompressed."""
     if compression in ("", "none"):
         return body
     try:
@@ -299,19 +299,19 @@ def _bz2(body: bytes) -> bytes:
 
 
 def _piecewise(unpack: Callable[[bytes], bytes], body: bytes) -> bytes:
-    """What comes out before something is wrong."""
+    """Return the output before the first error."""
     from backports import zstd
 
     plain = bytearray()
-    for at in range(0, len(body), PIECE):
+    for at in range(0, len(body), STEP_BYTES):
         try:
-            plain += unpack(body[at : at + PIECE])
+            plain += unpack(body[at : at + STEP_BYTES])
         except (OSError, RuntimeError, EOFError, ValueError, zstd.ZstdError):
             break
     return bytes(plain)
 
 
-PIECE = 4096
+STEP_BYTES = 4096
 _UNPACKING: dict[str, Callable[[bytes], bytes]] = {"lz4": _lz4, "zstd": _zstd, "bz2": _bz2}
 
 
@@ -328,7 +328,7 @@ def _db3_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
 
 
 def _of_full_length(path: Path, folder: Path) -> Path:
-    """The file, or of one that is cut off a copy as long as its head says: SQLite opens nothing shorter."""
+    """Yield the file, or if truncated a copy of its full length: SQLite opens no shorter file."""
     with path.open("rb") as file:
         begin = file.read(32)
     size, pages = (int.from_bytes(begin[a:b], "big") for a, b in ((16, 18), (28, 32)))
@@ -345,12 +345,12 @@ def _rows(connection: sqlite3.Connection, statement: str, path: Path, loss: _Los
     try:
         return connection.execute(statement).fetchall()
     except sqlite3.DatabaseError as error:
-        loss.tell(f"{path.name}: {error}")
+        loss.add(f"{path.name}: {error}")
         return []
 
 
 def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> Iterator[Raw]:
-    """Rows in order; behind one that cannot be read the search goes on in wider and wider steps."""
+    """Yield rows in order; after an unreadable one, the search continues in growing steps."""
     after, step, last = 0, 1, 0
     while step < FARTHEST_ROW:
         try:
@@ -358,7 +358,7 @@ def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> It
                 "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? ORDER BY id", (after,)
             ):
                 if step > 1:
-                    loss.tell(f"{path.name}: rows {last + 1} to {row[0] - 1} cannot be read")
+                    loss.add(f"{path.name}: rows {last + 1} to {row[0] - 1} cannot be read")
                 after, step, last = row[0], 1, row[0]
                 if None not in row:
                     yield int(row[1]), int(row[2]), bytes(row[3])
@@ -367,7 +367,7 @@ def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> It
         else:
             break
     if step > 1:
-        loss.tell(f"{path.name}: rows from {last + 1} on cannot be read")
+        loss.add(f"{path.name}: rows from {last + 1} on cannot be read")
 
 
 FARTHEST_ROW = 1 << 40

@@ -1,4 +1,4 @@
-"""Trajectories as text: TUM (`t x y z qx qy qz qw`) and tables with a header, separated by , ; or tabs."""
+"""Reader of trajectories as text: TUM (`t x y z qx qy qz qw`), and tables separated by , ; or tabs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from stopgo.recordings.logs.ros_poses import headings_of
 Numbers = tuple[float, ...]
 TUM_COLUMNS = 8
 WALL_S = 1e9
-"""Times from September 2001 on are taken for seconds since 1970."""
+"""Times from September 2001 on count as seconds since 1970."""
 
 
 def read_table(path: Path, reading: Reading) -> FieldLog:
@@ -34,12 +34,12 @@ def read_table(path: Path, reading: Reading) -> FieldLog:
 
 
 def read_tum(path: Path, reading: Reading) -> FieldLog:
-    """Read a trajectory in TUM's format; lines that are none are left out and counted.
+    """Read a trajectory in TUM's format; other lines are left out and counted.
 
     Raises
     ------
     InputError
-        When no line is one.
+        When no line has this format.
     """
     rows: list[Numbers] = []
     lost = 0
@@ -50,7 +50,7 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
             lost += bool(words) and row is None
             rows += [] if row is None else [row]
     if not rows:
-        raise InputError(f"{path}: no line is `t x y z qx qy qz qw`; is it a trajectory in TUM's format?")
+        raise InputError(f"{path}: no line is `t x y z qx qy qz qw`; give a trajectory in TUM's format")
     table = np.array(rows)
     ns = np.rint(table[:, 0] * 1e9).astype(np.int64)
     track = poses_of("TUM", "trajectory", ns, table[:, 1:3], headings_of(table[:, 4:]))
@@ -95,7 +95,7 @@ TIMES: dict[str, float] = {
     "t_s": 1e9, "timestamp_s": 1e9, "time_ms": 1e6, "timestamp_ms": 1e6, "time_us": 1e3, "timestamp_us": 1e3,
     "time_ns": 1.0, "timestamp_ns": 1.0, "ns": 1.0, "robot_ns": 1.0,
 }  # fmt: skip
-"""Names of a time's column, and nanoseconds per unit."""
+"""Column names of a time, and nanoseconds per unit."""
 PLACES = (
     ("x", "y"),
     ("x_m", "y_m"),
@@ -115,33 +115,33 @@ QUATERNIONS = (("qx", "qy", "qz", "qw"), ("q_x", "q_y", "q_z", "q_w"))
 
 
 class _Columns:
-    """Which column is what, by the header's names."""
+    """Columns of a table, identified by the header's names."""
 
     def __init__(self, names: list[str], path: Path) -> None:
         at = {re.sub(r"[\s\[\]()]+", "_", name.lower()).strip("_"): k for k, name in enumerate(names)}
         self.time = next((name for name in TIMES if name in at), "")
-        self.place: tuple[str, ...] = next((pair for pair in PLACES if set(pair) <= at.keys()), ())
+        self.position: tuple[str, ...] = next((pair for pair in PLACES if set(pair) <= at.keys()), ())
         self.turn = next((name for name in TURNS if name in at), "")
         self.quaternion: tuple[str, ...] = next(
             (names for names in QUATERNIONS if set(names) <= at.keys()), ()
         )
         self.at = at
-        if not self.time or not self.place:
+        if not self.time or not self.position:
             known = ", ".join(names)[:80]
             raise InputError(
-                f"{path}: its header ({known}) names no time with x and y or lat and lon; "
+                f"{path}: its header ({known}) has no time with x and y or lat and lon; "
                 "name the columns as in: time,x,y,heading_deg"
             )
 
     @property
     def needed(self) -> tuple[str, ...]:
-        return (self.time, *self.place)
+        return (self.time, *self.position)
 
     def row(self, cells: list[str]) -> tuple[int, Numbers] | None:
-        """Time in ns; then x and y, and the heading in radians (NaN where none is told)."""
+        """Return the time in ns, then x and y, and the heading in radians (NaN without one)."""
         try:
             ns = self._ns(cells[self.at[self.time]])
-            x, y = (float(cells[self.at[name]]) for name in self.place)
+            x, y = (float(cells[self.at[name]]) for name in self.position)
             return ns, (x, y, self._heading(cells))
         except (ValueError, IndexError, OverflowError):
             return None
@@ -163,7 +163,7 @@ class _Columns:
 
     def track(self, rows: list[Numbers], ns: list[int]) -> Poses | None:
         table = np.array(rows)
-        if self.place[0].startswith("lat"):
+        if self.position[0].startswith("lat"):
             return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]))
         return poses_of("CSV", "table", ns, table[:, :2], table[:, 2])
 
@@ -185,7 +185,7 @@ def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: n
 
 
 def _looks_like_tum(path: Path) -> bool:
-    """Whether the first line that is no comment has eight numbers."""
+    """True if the first line that is not a comment has eight numbers."""
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in _first_lines(file):
             words = line.split("#")[0].replace(",", " ").split()

@@ -1,7 +1,7 @@
-"""MAVLink telemetry logs (.tlog): packets as a station heard them, each after the time in microseconds.
+"""Reader of MAVLink telemetry logs (.tlog): packets that a station received, each after its time.
 
-Packets are walked by their lengths; where one does not follow another the walk looks for the next that has
-the right checksum. Only messages that tell something here are decoded.
+Packets are found by their lengths. If a packet does not follow another one, the search continues to the next
+packet with a valid checksum. Only messages that a replay needs are decoded.
 """
 
 from __future__ import annotations
@@ -43,22 +43,22 @@ STAMP = 8
 MAGIC_1, MAGIC_2 = 0xFE, 0xFD
 SIGNED = 1
 OLDEST_US, NEWEST_US = 10**14, 4 * 10**15
-"""Stamps from 1973 to 2096 are believed: they tell a packet from bytes that look like one."""
+"""Range of valid time stamps, 1973 to 2096: it distinguishes a packet from similar bytes."""
 TICK_EVERY = 50_000
 STATIONS = 250
-"""Systems from this number on are ground stations."""
-TOLD = (
+"""Least system number of ground stations."""
+DECODED = (
     "HEARTBEAT", "SYS_STATUS", "SYSTEM_TIME", "ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
     "MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_CURRENT", "MISSION_COUNT", "MISSION_ITEM_REACHED",
     "MISSION_ACK", "GPS_GLOBAL_ORIGIN", "COMMAND_LONG", "ODOMETRY", "VISION_POSITION_ESTIMATE",
     "BATTERY_STATUS", "STATUSTEXT", "CAMERA_IMAGE_CAPTURED", "CAMERA_TRIGGER",
 )  # fmt: skip
 """Messages that are decoded."""
-NUMBERS = frozenset(dialect.__dict__[f"MAVLINK_MSG_ID_{name}"] for name in TOLD)
+NUMBERS = frozenset(dialect.__dict__[f"MAVLINK_MSG_ID_{name}"] for name in DECODED)
 
 
 class Packet(NamedTuple):
-    """One packet of the log, not decoded."""
+    """Packet of the log, not decoded."""
 
     ns: int
     number: int
@@ -67,8 +67,8 @@ class Packet(NamedTuple):
     raw: bytes
 
 
-class Heard(NamedTuple):
-    """A decoded message, and when a station heard it."""
+class ReceivedMessage(NamedTuple):
+    """Decoded message, and the time at which a station received it."""
 
     ns: int
     system: int
@@ -83,12 +83,12 @@ def read_telemetry_log(path: Path, reading: Reading) -> FieldLog:
     InputError
         When no packet in it can be read.
     """
-    walk = _FrameScan(path, reading)
+    scan = _FrameScan(path, reading)
     sorter = _VehicleSorter()
-    for packet in walk.packets():
+    for packet in scan.packets():
         sorter.take(packet)
     if not sorter.counts:
-        raise InputError(f"{path}: no packet in it can be read; is it a MAVLink .tlog?")
+        raise InputError(f"{path}: no readable packet; check that it is a MAVLink .tlog")
     return FieldLog(
         path=str(path),
         format=FORMAT,
@@ -102,22 +102,22 @@ def read_telemetry_log(path: Path, reading: Reading) -> FieldLog:
         uploads=tuple(sorter.uploads),
         remarks=tuple(sorter.remarks),
         battery=tuple(sorter.battery),
-        lost=walk.lost,
-        oddities=(*sorter.oddities(), *walk.oddities),
+        lost=scan.lost,
+        oddities=(*sorter.oddities(), *scan.oddities),
     )
 
 
-def messages_of(path: Path) -> Iterator[Heard]:
-    """The messages of TOLD, once more, for whoever follows the vehicle's run by them."""
+def messages_of(path: Path) -> Iterator[ReceivedMessage]:
+    """Yield the messages of DECODED again, to follow the vehicle's run."""
     decoder = _Decoder()
     for packet in _FrameScan(path, Reading()).packets():
         message = decoder.message(packet)
         if message is not None:
-            yield Heard(packet.ns, packet.system, message)
+            yield ReceivedMessage(packet.ns, packet.system, message)
 
 
 class _Decoder:
-    """Makes messages of packets; what has a wrong checksum is none."""
+    """Decoder of packets; one with a wrong checksum gives no message."""
 
     def __init__(self) -> None:
         self._mavlink = dialect.MAVLink(None)
@@ -133,7 +133,7 @@ class _Decoder:
 
 
 class _FrameScan:
-    """Goes through a file from packet to packet."""
+    """Search through a file from packet to packet."""
 
     def __init__(self, path: Path, reading: Reading) -> None:
         self._path, self._tick = path, reading.tick
@@ -142,39 +142,39 @@ class _FrameScan:
 
     @property
     def lost(self) -> str:
-        return f"{self.lost_bytes} of {self.size} bytes make no sense" if self.lost_bytes else ""
+        return f"{self.lost_bytes} of {self.size} bytes are invalid" if self.lost_bytes else ""
 
     @property
     def oddities(self) -> tuple[str, ...]:
         if not self.tail_bytes:
             return ()
-        return (f"the last packet is cut off ({self.tail_bytes} bytes), as when a station is switched off",)
+        return (f"the last packet is truncated ({self.tail_bytes} bytes), as when a station is switched off",)
 
     def packets(self) -> Iterator[Packet]:
         with self._path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
             self.size, self.lost_bytes = len(data), 0
             at = steps = 0
-            sure = False
+            synchronised = False
             while at + STAMP < len(data):
                 packet, end = _packet(data, at)
                 followed = packet is not None and (end == len(data) or _packet(data, end)[0] is not None)
                 if packet is None or not (
-                    (followed and sure) or self._decoder.decoded(packet.raw) is not None
+                    (followed and synchronised) or self._decoder.decoded(packet.raw) is not None
                 ):
-                    if packet is None and end > len(data) and sure:  # the log ends in the middle of a packet
+                    if packet is None and end > len(data) and synchronised:  # the log ends within a packet
                         self.tail_bytes = len(data) - at
                         break
-                    at, sure = at + 1, False
+                    at, synchronised = at + 1, False
                     self.lost_bytes += 1
                     continue
                 yield packet
-                at, sure, steps = end, True, steps + 1
+                at, synchronised, steps = end, True, steps + 1
                 if steps % TICK_EVERY == 0:
                     self._tick(at / self.size)
 
 
 def _packet(data: mmap, at: int) -> tuple[Packet | None, int]:
-    """The packet whose stamp begins here, if one may, and where it ends."""
+    """Return the packet whose stamp may begin here, and its end."""
     if at + STAMP + 12 > len(data) + 4:
         return None, len(data) + 1
     (stamp,) = struct.unpack_from(">Q", data, at)
@@ -198,7 +198,7 @@ def _packet(data: mmap, at: int) -> tuple[Packet | None, int]:
 
 @dataclass
 class _Vehicle:
-    """What one system told, as it is read."""
+    """Data of one system, while it is read."""
 
     kind: str = "generic"
     attitude: list[tuple[int, float]] = field(default_factory=list)
@@ -211,147 +211,154 @@ class _Vehicle:
     boot_ms: int = 0
 
 
-TRIED = 5
+CHECKED = 5
 UNKNOWN_BEARING = 65_535
 MISSION_TYPE = 0
 
 
 @dataclass
 class _VehicleSorter:
-    """Takes packets one after another, each to what it tells of."""
+    """Reads packets one after another, each by its type."""
 
     counts: Counter[tuple[int, int]] = field(default_factory=Counter)
-    """By system and number."""
+    """Number of messages by system and message number."""
     vehicles: dict[int, _Vehicle] = field(default_factory=dict)
     uploads: list[LoggedMission] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
     battery: list[tuple[int, float]] = field(default_factory=list)
     span: tuple[int, int] = (0, 0)
     bad: Counter[tuple[int, int]] = field(default_factory=Counter)
-    """Messages with a wrong checksum; of those that are not looked at the first few are tried."""
+    """Messages with a wrong checksum; of messages that are not decoded, the first few are checked."""
     _decoder: _Decoder = field(default_factory=_Decoder)
-    _sent: dict[int, Item] = field(default_factory=dict)
-    _due: tuple[int, int] | None = None
-    """When an upload was announced, and how many items it is to have."""
+    _items: dict[int, Item] = field(default_factory=dict)
+    _announced: tuple[int, int] | None = None
+    """Time at which an upload was announced, and its number of items."""
 
     def take(self, packet: Packet) -> None:
         self.counts[packet.system, packet.number] += 1
         self.span = (min(self.span[0] or packet.ns, packet.ns), max(self.span[1], packet.ns))
         if packet.number not in NUMBERS:
-            self._try(packet)
+            self._check(packet)
             return
         message = self._decoder.message(packet)
         if message is None:
             self.bad[packet.system, packet.number] += 1
             return
-        taking = getattr(self, f"_{message.get_type().lower()}", None)
-        if taking is not None:
-            taking(packet, message, self.vehicles.setdefault(packet.system, _Vehicle()))
+        handler = getattr(self, f"_{message.get_type().lower()}", None)
+        if handler is not None:
+            handler(packet, message, self.vehicles.setdefault(packet.system, _Vehicle()))
 
-    def _try(self, packet: Packet) -> None:
+    def _check(self, packet: Packet) -> None:
         key = (packet.system, packet.number)
-        if self.bad[key] == self.counts[key] - 1 < TRIED and self._decoder.decoded(packet.raw) is None:
+        if self.bad[key] == self.counts[key] - 1 < CHECKED and self._decoder.decoded(packet.raw) is None:
             self.bad[key] += 1
 
-    def _heartbeat(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        if packet.system >= STATIONS or told.autopilot == dialect.MAV_AUTOPILOT_INVALID:
+    def _heartbeat(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        if packet.system >= STATIONS or message.autopilot == dialect.MAV_AUTOPILOT_INVALID:
             return
-        kind = autopilot_of(told.autopilot)
+        kind = autopilot_of(message.autopilot)
         vehicle.kind = kind.name
-        mode = kind.mode_name(told) if told.type in ROVERS else f"mode {told.custom_mode}"
+        mode = kind.mode_name(message) if message.type in ROVERS else f"mode {message.custom_mode}"
         if mode != vehicle.mode:
             vehicle.mode = mode
             self.remarks.append(Remark(packet.ns, "mode", mode))
 
-    def _attitude(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        vehicle.attitude.append((packet.ns, told.yaw))
-        if told.time_boot_ms + 1000 < vehicle.boot_ms:
+    def _attitude(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        vehicle.attitude.append((packet.ns, message.yaw))
+        if message.time_boot_ms + 1000 < vehicle.boot_ms:
             vehicle.boots += 1
-        vehicle.boot_ms = told.time_boot_ms
+        vehicle.boot_ms = message.time_boot_ms
 
-    def _local_position_ned(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        vehicle.local.append((packet.ns, told.y, told.x))
+    def _local_position_ned(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        vehicle.local.append((packet.ns, message.y, message.x))
 
-    def _global_position_int(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        bearing = np.nan if told.hdg == UNKNOWN_BEARING else told.hdg / 100
-        vehicle.earth.append((packet.ns, told.lat / 1e7, told.lon / 1e7, bearing))
+    def _global_position_int(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        bearing = np.nan if message.hdg == UNKNOWN_BEARING else message.hdg / 100
+        vehicle.earth.append((packet.ns, message.lat / 1e7, message.lon / 1e7, bearing))
 
-    def _odometry(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        w, x, y, z = told.q
+    def _odometry(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        w, x, y, z = message.q
         yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        vehicle.odometry.append((packet.ns, told.y, told.x, np.pi / 2 - yaw))
+        vehicle.odometry.append((packet.ns, message.y, message.x, np.pi / 2 - yaw))
 
-    def _gps_global_origin(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+    def _gps_global_origin(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         vehicle.origin = SiteOrigin(
-            lat=told.latitude / 1e7, lon=told.longitude / 1e7, alt=told.altitude / 1000, heading_deg=0.0
+            lat=message.latitude / 1e7,
+            lon=message.longitude / 1e7,
+            alt=message.altitude / 1000,
+            heading_deg=0.0,
         )
 
-    def _sys_status(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        if 0 <= told.battery_remaining <= 100:
-            self.battery.append((packet.ns, told.battery_remaining / 100))
+    def _sys_status(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        if 0 <= message.battery_remaining <= 100:
+            self.battery.append((packet.ns, message.battery_remaining / 100))
 
     _battery_status = _sys_status
 
-    def _statustext(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        self.remarks.append(Remark(packet.ns, "text", str(told.text).rstrip("\0")))
+    def _statustext(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        self.remarks.append(Remark(packet.ns, "text", str(message.text).rstrip("\0")))
 
-    def _command_long(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        self.remarks.append(Remark(packet.ns, "command", _command(told.command)))
+    def _command_long(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        self.remarks.append(Remark(packet.ns, "command", _command(message.command)))
 
-    def _mission_item_reached(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+    def _mission_item_reached(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         last = next((remark for remark in reversed(self.remarks) if remark.kind == "reached"), None)
-        if last is None or last.number != told.seq:  # it is repeated, so that a lost one is recovered
-            self.remarks.append(Remark(packet.ns, "reached", f"item {told.seq}", told.seq))
+        if last is None or last.number != message.seq:  # vehicles repeat it, in case one is lost
+            self.remarks.append(Remark(packet.ns, "reached", f"item {message.seq}", message.seq))
 
-    def _camera_image_captured(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        result = "" if told.capture_result == 1 else ", failed"
+    def _camera_image_captured(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        result = "" if message.capture_result == 1 else ", failed"
         self.remarks.append(
-            Remark(packet.ns, "trigger", f"image {told.image_index}{result}", told.image_index)
+            Remark(packet.ns, "trigger", f"image {message.image_index}{result}", message.image_index)
         )
 
-    def _camera_trigger(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        self.remarks.append(Remark(packet.ns, "trigger", f"trigger {told.seq}", told.seq))
+    def _camera_trigger(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        self.remarks.append(Remark(packet.ns, "trigger", f"trigger {message.seq}", message.seq))
 
-    def _mission_count(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        if getattr(told, "mission_type", MISSION_TYPE) == MISSION_TYPE:
-            self._sent, self._due = {}, (packet.ns, told.count)
+    def _mission_count(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        if getattr(message, "mission_type", MISSION_TYPE) == MISSION_TYPE:
+            self._items, self._announced = {}, (packet.ns, message.count)
 
-    def _mission_item_int(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        if getattr(told, "mission_type", MISSION_TYPE) == MISSION_TYPE:
-            params = (told.param1, told.param2, told.param3, told.param4)
-            self._item(packet, told.seq, Item(told.command, told.frame, params, told.x, told.y, told.z))
+    def _mission_item_int(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        if getattr(message, "mission_type", MISSION_TYPE) == MISSION_TYPE:
+            params = (message.param1, message.param2, message.param3, message.param4)
+            self._item(
+                packet,
+                message.seq,
+                Item(message.command, message.frame, params, message.x, message.y, message.z),
+            )
 
-    def _mission_item(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        if getattr(told, "mission_type", MISSION_TYPE) == MISSION_TYPE:
-            params = (told.param1, told.param2, told.param3, told.param4)
-            x, y = (round(value * 1e7) for value in (told.x, told.y))
-            self._item(packet, told.seq, Item(told.command, told.frame, params, x, y, told.z))
+    def _mission_item(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        if getattr(message, "mission_type", MISSION_TYPE) == MISSION_TYPE:
+            params = (message.param1, message.param2, message.param3, message.param4)
+            x, y = (round(value * 1e7) for value in (message.x, message.y))
+            self._item(packet, message.seq, Item(message.command, message.frame, params, x, y, message.z))
 
     def _item(self, packet: Packet, sequence: int, item: Item) -> None:
-        self._sent[sequence] = item
-        if self._due is not None and len(self._sent) >= self._due[1]:
-            self._keep(self._due[0], complete=True)
+        self._items[sequence] = item
+        if self._announced is not None and len(self._items) >= self._announced[1]:
+            self._store_upload(self._announced[0], complete=True)
 
-    def _mission_ack(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
-        if self._due is not None and self._sent:
-            self._keep(self._due[0], complete=False)
+    def _mission_ack(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
+        if self._announced is not None and self._items:
+            self._store_upload(self._announced[0], complete=False)
 
-    def _keep(self, ns: int, *, complete: bool) -> None:
-        """The list that was sent is whole, or was broken off."""
+    def _store_upload(self, ns: int, *, complete: bool) -> None:
+        """Store the list of items, complete or interrupted."""
         kinds = [vehicle.kind for vehicle in self.vehicles.values() if vehicle.kind != "generic"]
         kind = autopilot_named(kinds[0] if kinds else "generic")
         items = [
-            item for sequence, item in sorted(self._sent.items()) if not (kind.home_first and sequence == 0)
+            item for sequence, item in sorted(self._items.items()) if not (kind.home_first and sequence == 0)
         ]
         if not any(upload.items == tuple(items) and upload.ns == ns for upload in self.uploads):
-            home = self._sent.get(0) if kind.home_first else None
+            home = self._items.get(0) if kind.home_first else None
             self.uploads.append(
                 LoggedMission(ns, tuple(items), kind.name, complete=complete, home=_site(home))
             )
-        self._sent, self._due = {}, None
+        self._items, self._announced = {}, None
 
     def channels(self) -> tuple[Channel, ...]:
-        """By name; with the system where several told the same."""
+        """Return channels by name; with the system if several have the same."""
         several = len({system for system, _ in self.counts}) > 1
         return tuple(
             Channel(f"{system}/{_name(number)}" if several else _name(number), "", count)
@@ -368,13 +375,13 @@ class _VehicleSorter:
 
     def oddities(self) -> tuple[str, ...]:
         lines = [
-            f"{self.counts[key] if count == TRIED else count} messages {_name(key[1])} of system {key[0]} "
-            "have a wrong checksum or another dialect's, left out"
+            f"{self.counts[key] if count == CHECKED else count} messages {_name(key[1])} of system {key[0]} "
+            "have a wrong checksum or another dialect; left out"
             for key, count in sorted(self.bad.items())
             if count
         ]
         lines += [
-            f"system {system} was started anew {vehicle.boots} times"
+            f"system {system} restarted {vehicle.boots} times"
             for system, vehicle in self.vehicles.items()
             if vehicle.boots
         ]
@@ -426,7 +433,7 @@ def _columns(rows: list[Any]) -> tuple[IntArray, FloatArray]:
 
 
 def _yaw_at(vehicle: _Vehicle, ns: IntArray) -> FloatArray:
-    """Clockwise from north at given times."""
+    """Return the yaw clockwise from north at given times."""
     if not vehicle.attitude:
         return np.full(len(ns), np.nan)
     times, yaw = _columns(vehicle.attitude)

@@ -1,4 +1,4 @@
-"""PX4's own logs (.ulg), by pyulog."""
+"""Reader of PX4's own logs (.ulg), with pyulog."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ WANTED = [
     "vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth",
 ]  # fmt: skip
 LARGE = 200 << 20
-"""Bytes from which only messages that tell something here are taken into memory."""
+"""File size in bytes from which on only wanted messages are read into memory."""
 NAVIGATION = {
     0: (1, 0), 1: (2, 0), 2: (3, 0), 3: (4, 4), 4: (4, 3), 5: (4, 5), 10: (5, 0), 14: (6, 0), 15: (7, 0),
     17: (4, 2), 18: (4, 6),
 }  # fmt: skip
-"""PX4's nav_state -> main and sub mode, as a heartbeat tells them."""
+"""PX4's nav_state, with main and sub mode as in a heartbeat."""
 
 
 def read_ulog(path: Path, reading: Reading) -> FieldLog:
@@ -56,7 +56,7 @@ def read_ulog(path: Path, reading: Reading) -> FieldLog:
         poses=tuple(track for track in _poses(log, offset) if track is not None),
         remarks=tuple(sorted(_remarks(log, offset), key=lambda remark: remark.ns)),
         battery=tuple(_battery(log, offset)),
-        lost="parts of the file are damaged and were passed over" if log.file_corruption else "",
+        lost="damaged parts of the file were skipped" if log.file_corruption else "",
         oddities=(*_dropouts(log), *_invalid(log)),
     )
 
@@ -79,9 +79,9 @@ def _opened(path: Path) -> Any:
         UnicodeDecodeError,
     ) as error:
         reason = " ".join(str(error).split())[:80]
-        raise InputError(f"{path}: cannot be read as a PX4 ULog ({reason}); was it copied whole?") from None
+        raise InputError(f"{path}: cannot be read as a PX4 ULog ({reason}); incomplete copy?") from None
     if not log.data_list:
-        raise InputError(f"{path}: no message in it can be read; was it copied whole?")
+        raise InputError(f"{path}: no readable message; incomplete copy?")
     return log
 
 
@@ -102,7 +102,7 @@ def _invalid(log: Any) -> tuple[str, ...]:
     local = _columns(log, "vehicle_local_position")
     if local is None or "xy_valid" not in local or local["xy_valid"].any():
         return ()
-    return (f"vehicle_local_position: none of its {len(local['x'])} positions is valid, by its own word",)
+    return (f"vehicle_local_position: none of its {len(local['x'])} positions is marked valid",)
 
 
 def _columns(log: Any, name: str) -> dict[str, Any] | None:
@@ -111,7 +111,7 @@ def _columns(log: Any, name: str) -> dict[str, Any] | None:
 
 
 def _since_1970_us(log: Any) -> int:
-    """What to add to times since boot, where a GPS receiver told the date; else 0."""
+    """Return the offset from boot time to 1970, if a GPS receiver gave the date; else 0."""
     gps = _columns(log, "vehicle_gps_position")
     if gps is None or "time_utc_usec" not in gps:
         return 0
@@ -136,17 +136,17 @@ def _poses(log: Any, offset_us: int) -> Iterator[Poses | None]:
 
 
 def _local(log: Any, name: str, local: dict[str, Any], offset_us: int, *, truth: bool) -> Poses | None:
-    """North and east metres from the estimator's origin, where its position is valid."""
-    good = local["xy_valid"].astype(bool) if "xy_valid" in local else np.ones(len(local["x"]), bool)
+    """Return north and east metres from the estimator's origin, where its position is valid."""
+    valid = local["xy_valid"].astype(bool) if "xy_valid" in local else np.ones(len(local["x"]), bool)
     xy = np.stack([local["y"], local["x"]], axis=-1).astype(float)
-    xy[~good] = np.nan
+    xy[~valid] = np.nan
     heading = np.pi / 2 - _yaw(log, local)
     ns = _ns(local, offset_us)
     return poses_of(name, "local", ns, xy, heading, rank=1, origin=_origin(local), rule="px4", truth=truth)
 
 
 def _yaw(log: Any, columns: dict[str, Any]) -> FloatArray:
-    """Clockwise from north, radians."""
+    """Return the yaw clockwise from north, radians."""
     for name in ("heading", "yaw"):
         if name in columns:
             return np.asarray(columns[name], float)
@@ -190,6 +190,6 @@ def _remarks(log: Any, offset_us: int) -> Iterator[Remark]:
 def _battery(log: Any, offset_us: int) -> Iterator[tuple[int, float]]:
     battery = _columns(log, "battery_status")
     if battery is not None and "remaining" in battery:
-        for ns, share in zip(_ns(battery, offset_us).tolist(), battery["remaining"].tolist(), strict=True):
-            if 0 <= share <= 1:
-                yield ns, float(share)
+        for ns, fraction in zip(_ns(battery, offset_us).tolist(), battery["remaining"].tolist(), strict=True):
+            if 0 <= fraction <= 1:
+                yield ns, float(fraction)

@@ -1,4 +1,4 @@
-"""The plan as an SVG inside the page: floor, what was seen and lost, ways, and what became of each stop."""
+"""Plan as SVG inside the page: floor, covered and lost targets, paths, and the outcome of each stop."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import shown, tag
 
 FILLED = {"walls": PALE, "columns": "#b9bcc4", "stairs": "#e3e4e8", "other": "#e3e0d8"}
-"""Kinds of elements that are filled; of the others the outline is drawn."""
+"""Kinds of elements that are filled; of the others, the outline is drawn."""
 MOST_LABELS = 300
-"""With more stops than these, only those that need somebody are named."""
+"""Number of stops above which only stops that need attention are named."""
 SLACK_M = 0.5
-"""How far outside its room's bounds a name may stand."""
-STOOD = (Held, Paused, LinkLost)
-"""Events whose place is marked."""
+"""Largest distance in metres of a name outside its room's bounds."""
+STANDSTILL_EVENTS = (Held, Paused, LinkLost)
+"""Events whose position is marked."""
 
 
-Beneath = Callable[["PictureFrame"], Iterable[str]]
+LowerLayer = Callable[["PictureFrame"], Iterable[str]]
 
 
 def plan_picture(
-    subject: ReportSubject, comparison: Comparison | None, *, beneath: Beneath = lambda frame: ()
+    subject: ReportSubject, comparison: Comparison | None, *, beneath: LowerLayer = lambda frame: ()
 ) -> str:
-    """The plan, and one of its runs if there is any; `beneath` draws above the floor, below the stops."""
+    """Return the plan, and one of its runs if given; `beneath` draws above the floor, below the stops."""
     mission = subject.mission if comparison is None else comparison.mission
     frame = PictureFrame.of(subject, mission)
     layers = [
         *_floor(subject, frame),
         *_coverage(subject, comparison, frame),
-        *_ways(mission, comparison, frame),
+        *_paths(mission, comparison, frame),
         *beneath(frame),
         *_marks(mission, comparison, frame),
     ]
@@ -51,7 +51,7 @@ def plan_picture(
 
 @dataclass(frozen=True)
 class PictureFrame:
-    """Where metres of the drawing lie in the picture, whose y goes down."""
+    """Transform from drawing metres to the picture, whose y axis points down."""
 
     left: float
     top: float
@@ -63,9 +63,9 @@ class PictureFrame:
     @classmethod
     def of(cls, subject: ReportSubject, mission: Mission) -> PictureFrame:
         lines = [] if subject.floor is None else list(subject.floor.outline)
-        ways = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
+        paths = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
         start = np.array([(mission.start.x, mission.start.y)])
-        left, low, right, high = bounds([*lines, *ways, start])
+        left, low, right, high = bounds([*lines, *paths, start])
         size = max(right - left, high - low, 1.0)
         margin = 0.02 * size
         return cls(
@@ -75,18 +75,18 @@ class PictureFrame:
 
     @property
     def least(self) -> float:
-        """The least size of a text that is read, metres; a name that would be smaller is left out."""
+        """Smallest readable text size, metres; a name that would be smaller is left out."""
         return 0.0055 * max(self.width, self.height)
 
     @property
     def view(self) -> str:
         return f"0 0 {self.width:.3f} {self.height:.3f}"
 
-    def place(self, x: float, y: float) -> tuple[float, float]:
+    def to_picture(self, x: float, y: float) -> tuple[float, float]:
         return x - self.left, self.top - y
 
     def path(self, lines: Iterable[FloatArray], *, close: bool = False) -> str:
-        """The `d` of a path; lines that end where they begin are closed."""
+        """Return the `d` of a path; lines that end at their first point are closed."""
         return "".join(self._line(line, close) for line in lines if len(line) > 1)
 
     def _line(self, line: FloatArray, close: bool) -> str:
@@ -97,7 +97,7 @@ class PictureFrame:
 
 
 def _spacing(mission: Mission) -> float:
-    """How far apart stops usually are: the median distance from each to the nearest other."""
+    """Return the usual distance of stops: the median distance from each to the nearest other."""
     xy = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
     if len(xy) < 2:
         return 10.0
@@ -107,7 +107,7 @@ def _spacing(mission: Mission) -> float:
 
 
 def stroke(d: str, colour: str, width: float, **style: Any) -> str:
-    """A path as a line whose width, in points, does not grow with the picture; nothing for no path."""
+    """Return a path as a line with a fixed width in points; an empty string for no path."""
     if not d:
         return ""
     look = {"fill": "none", "stroke": colour, "stroke_width": width, "vector_effect": "non-scaling-stroke"}
@@ -123,7 +123,7 @@ def _floor(subject: ReportSubject, frame: PictureFrame) -> Iterator[str]:
         fill = {"fill": FILLED[kind], "fill_rule": "evenodd"} if kind in FILLED else {}
         yield stroke(frame.path(lines, close=True), "#9a9da5", 0.6, **fill)
     for name, x, y in floor.names:
-        px, py = frame.place(x, y)
+        px, py = frame.to_picture(x, y)
         fitting = _room_width(floor.rooms, x, y) / max(text_width(name, 1.0), 1.0)
         size = min(0.011 * max(frame.width, frame.height), fitting)
         if size < frame.least:
@@ -133,7 +133,7 @@ def _floor(subject: ReportSubject, frame: PictureFrame) -> Iterator[str]:
 
 
 def _room_width(rooms: Sequence[FloatArray], x: float, y: float) -> float:
-    """The width of the smallest room about a place; without bounds where there is none."""
+    """Return the width of the smallest room around a point; infinity if there is none."""
     boxes = [(*ring.min(axis=0).tolist(), *ring.max(axis=0).tolist()) for ring in rooms if len(ring)]
     about = [
         box for box in boxes if box[0] <= x <= box[2] and box[1] - SLACK_M <= y <= box[3] + SLACK_M
@@ -142,7 +142,7 @@ def _room_width(rooms: Sequence[FloatArray], x: float, y: float) -> float:
 
 
 def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:
-    """What nobody planned to see dashed, what was seen, and thick what was planned and not seen."""
+    """Draw unplanned targets dashed, covered ones, and thick those planned but not covered."""
     acquired = None if comparison is None else comparison.acquired
     sight = subject.sight if acquired is None else acquired.sight
     if sight is None:
@@ -157,14 +157,14 @@ def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: Pict
 
 
 def along(targets: Targets, units: BoolArray, frame: PictureFrame) -> str:
-    """The path of the stretches of targets where a mask of units (n,) holds."""
+    """Return the path of the units in a mask (n,)."""
     runs = runs_of(targets, units)
     a, b = targets.a[runs.segment], targets.b[runs.segment]
     ends = (a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None])
     return frame.path(np.stack(ends, axis=1))
 
 
-def _ways(mission: Mission, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:
+def _paths(mission: Mission, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:
     legs = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
     yield stroke(frame.path(legs), "#444", 1.1, stroke_dasharray="6 4")
     if comparison is not None and len(comparison.log.poses):
@@ -173,10 +173,10 @@ def _ways(mission: Mission, comparison: Comparison | None, frame: PictureFrame) 
 
 
 def _thinned(xy: FloatArray, least: float) -> FloatArray:
-    """Points of a line (n, 2), a new one each time that it has gone on by `least` metres."""
+    """Return points of a line (n, 2) that are at least `least` metres of driving apart."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
-    kept = np.unique(np.concatenate([[0], np.flatnonzero(np.diff(along // least) > 0) + 1, [len(xy) - 1]]))
-    return xy[kept]
+    indices = np.unique(np.concatenate([[0], np.flatnonzero(np.diff(along // least) > 0) + 1, [len(xy) - 1]]))
+    return xy[indices]
 
 
 def _marks(mission: Mission, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:
@@ -187,7 +187,7 @@ def _marks(mission: Mission, comparison: Comparison | None, frame: PictureFrame)
         if stop.id not in missing:
             yield _stop(stop, stop.id.lstrip("sS") if named else "", frame)
     if comparison is not None:
-        yield from _stood(comparison, frame)
+        yield from _standstills(comparison, frame)
     for stop in mission.stops:
         item = missing.get(stop.id)
         if item is not None:
@@ -203,23 +203,23 @@ OUTLINE: dict[str, Any] = {"stroke": INK, "stroke_width": 1.5, "vector_effect": 
 
 
 def _stop(stop: Stop, label: str, frame: PictureFrame) -> str:
-    x, y = frame.place(stop.x, stop.y)
+    x, y = frame.to_picture(stop.x, stop.y)
     at = {"cx": f"{x:.3f}", "cy": f"{y:.3f}", "r": f"{frame.mark:.3f}", "fill": "#fff"}
     circle = tag("circle", tag("title", shown(stop.id)), **at, **OUTLINE)
     return circle + (_letter(x, y, label, frame) if label else "")
 
 
 def _cross(stop: Stop, label: str, frame: PictureFrame, *, over: bool) -> str:
-    """A stop that was not scanned: a square with a cross; hollow while the run may still come there."""
-    x, y = frame.place(stop.x, stop.y)
+    """Draw a stop that was not scanned: a square with a cross, hollow while the run may still reach it."""
+    x, y = frame.to_picture(stop.x, stop.y)
     r = frame.mark * 1.1
     k = 0.6 * r
     at = {"x": f"{x - r:.3f}", "y": f"{y - r:.3f}", "width": f"{2 * r:.3f}", "height": f"{2 * r:.3f}"}
     square = tag("rect", tag("title", shown(label)), fill=VERMILION if over else "#fff", **at, **OUTLINE)
     strokes = (f"M{x - k:.3f} {y + side * k:.3f}L{x + k:.3f} {y - side * k:.3f}" for side in (1, -1))
-    beside = {"x": f"{x + 1.5 * r:.3f}", "y": f"{y + 0.4 * r:.3f}", "font_size": f"{1.3 * r:.3f}"}
+    label_position = {"x": f"{x + 1.5 * r:.3f}", "y": f"{y + 0.4 * r:.3f}", "font_size": f"{1.3 * r:.3f}"}
     halo = {"stroke": "#fff", "stroke_width": f"{0.25 * r:.3f}", "paint_order": "stroke"}
-    text = tag("text", shown(label), font_weight="bold", fill="#8a3000", **beside, **halo)
+    text = tag("text", shown(label), font_weight="bold", fill="#8a3000", **label_position, **halo)
     return square + stroke("".join(strokes), "#fff" if over else INK, 2) + text
 
 
@@ -229,13 +229,13 @@ def _letter(x: float, y: float, content: str, frame: PictureFrame) -> str:
                font_weight="bold", text_anchor="middle")  # fmt: skip
 
 
-def _stood(comparison: Comparison, frame: PictureFrame) -> Iterator[str]:
-    """A diamond where the run was paused or held, or its link was lost."""
+def _standstills(comparison: Comparison, frame: PictureFrame) -> Iterator[str]:
+    """Draw a diamond where the run was paused or held, or lost its link."""
     poses = comparison.log.poses
     for event in comparison.log.events:
-        index = poses.last_until(event.robot_ns) if isinstance(event, STOOD) else None
+        index = poses.last_until(event.robot_ns) if isinstance(event, STANDSTILL_EVENTS) else None
         if index is not None:
-            x, y = frame.place(*poses.xy[index].tolist())
+            x, y = frame.to_picture(*poses.xy[index].tolist())
             r = frame.mark
             d = f"M{x:.3f} {y - r:.3f}L{x + r:.3f} {y:.3f}L{x:.3f} {y + r:.3f}L{x - r:.3f} {y:.3f}Z"
             why = f"{type(event).__name__}: {getattr(event, 'reason', '')}"
@@ -245,7 +245,7 @@ def _stood(comparison: Comparison, frame: PictureFrame) -> Iterator[str]:
 
 
 def legend(items: Sequence[tuple[str, str]]) -> str:
-    """What lines and marks mean: (SVG of 26 × 12, words)."""
+    """Return what lines and marks mean: (SVG of 26 × 12, words)."""
     return tag("div", *(_sample(mark) + shown(words) for mark, words in items), class_="legend")
 
 

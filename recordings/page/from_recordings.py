@@ -1,4 +1,4 @@
-"""Recordings that were reviewed -> what a report is of."""
+"""Collect the subject of a report from recordings that were reviewed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.run_log import LogSource
 from stopgo.mission.stages.stop_reasons import StopReason
-from stopgo.recordings.embedded.findings import CarriedFindings, findings_in
+from stopgo.recordings.embedded.findings import EmbeddedFindings, findings_in
 from stopgo.recordings.embedded.floor_lines import FloorLines, floor_lines
 from stopgo.recordings.embedded.plan import origin_in
 from stopgo.recordings.embedded.reading import Recording
@@ -19,22 +19,22 @@ from stopgo.recordings.page.subject import ReportSubject
 
 
 def subject_of(review: Review) -> ReportSubject:
-    """The mission of all recordings, its plan and its runs.
+    """Return the mission of all recordings, its plan and its runs.
 
     Raises
     ------
     InputError
-        When they are of several missions, or none of them carries its mission.
+        When they are of several missions, or none of them contains its mission.
     """
     items = review.recordings
     ids = sorted({item.recording.mission_id for item in items})
     if len(ids) > 1:
-        raise InputError(f"a report is of one mission; these recordings are of {len(ids)}: {', '.join(ids)}")
+        raise InputError(f"report: needs recordings of one mission, not {len(ids)}: {', '.join(ids)}")
     read = [item.recording for item in items]
     missions, sights = missions_of(read), sights_of(read)
     if not missions:
         raise InputError(
-            "no recording carries its mission: all are of another version; plan and record again"
+            "report: no recording contains its mission, all are of another version; plan and record again"
         )
     return ReportSubject(
         missions=missions,
@@ -43,9 +43,9 @@ def subject_of(review: Review) -> ReportSubject:
         floor=_first(read, _floor),
         results=_results(items),
         reasons=_first(read, _reasons) or (),
-        found=_first(read, _found) or CarriedFindings(),
+        found=_first(read, _found) or EmbeddedFindings(),
         sources=tuple(_source(item) for item in read),
-        told={
+        more={
             run.run_id: (("What to do next", lines),)
             for item in items
             for run in item.comparisons
@@ -56,7 +56,7 @@ def subject_of(review: Review) -> ReportSubject:
 
 
 def _first(read: Sequence[Recording], of: Any) -> Any:
-    """What the first recording has that has any."""
+    """Return the first value that a recording has."""
     return next((found for item in read if (found := of(item)) is not None), None)
 
 
@@ -68,7 +68,7 @@ def _reasons(recording: Recording) -> tuple[StopReason, ...] | None:
     return reasons_in(recording.values, str(recording.path)) or None
 
 
-def _found(recording: Recording) -> CarriedFindings | None:
+def _found(recording: Recording) -> EmbeddedFindings | None:
     found = findings_in(recording.values)
     return found if found.findings or found.unreached else None
 

@@ -1,4 +1,4 @@
-"""Small plots of a run: beside the route, late at the stops, and coverage as it grew."""
+"""Small plots of a run: cross-track error, delay at the stops, and growth of coverage."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from stopgo.recordings.page.words import shown, tag
 WIDTH, HEIGHT = 360, 150
 LEFT, BOTTOM, TOP, RIGHT = 44, 20, 8, 8
 MOST_POINTS = 1500
-"""Of a curve with more points, the least and the greatest of each stretch are drawn."""
+"""Limit of points; of a longer curve, the least and the greatest value of each interval are drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlotLine:
-    """A line through (x, y), or marks at them."""
+    """Line through (x, y), or marks at these points."""
 
     x: FloatArray
     y: FloatArray
@@ -32,59 +32,59 @@ class PlotLine:
 
 
 def plots(comparison: Comparison) -> str:
-    """Every plot of which the run tells anything, side by side."""
+    """Return every plot for which the run has data, side by side."""
     return tag("div", *_plots(comparison), class_="plots")
 
 
 def _plots(comparison: Comparison) -> Iterator[str]:
-    log, beside = comparison.log, comparison.cross_track
-    known = np.isfinite(beside.metres)
-    if known.any():
-        seconds = log.seconds(beside.ns)[known]
+    log, cross_track = comparison.log, comparison.cross_track
+    finite = np.isfinite(cross_track.metres)
+    if finite.any():
+        seconds = log.seconds(cross_track.ns)[finite]
         tolerance = 1000 * max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
         limits = [
             PlotLine(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3") for side in (tolerance, -tolerance)
         ]
-        curve = PlotLine(*_few(seconds, 1000 * beside.metres[known]), PURPLE)
-        yield _plot("beside the route, mm, left positive; dashed: tolerance", [*limits, curve])
-    late = [(item.arrived_s, item.late_s) for item in comparison.stops if item.late_s is not None]
-    if late:
-        times, values = np.array(late, dtype=np.float64).T
-        yield _plot("late at each stop, s", [PlotLine(times, values, BLUE)])
+        curve = PlotLine(*_decimated(seconds, 1000 * cross_track.metres[finite]), PURPLE)
+        yield _plot("cross-track error, mm, left positive; dashed: tolerance", [*limits, curve])
+    delays = [(item.arrived_s, item.late_s) for item in comparison.stops if item.late_s is not None]
+    if delays:
+        times, values = np.array(delays, dtype=np.float64).T
+        yield _plot("delay at each stop, s", [PlotLine(times, values, BLUE)])
     yield from _growth(comparison)
 
 
 def _growth(comparison: Comparison) -> Iterator[str]:
-    """Coverage after each scan, and what was asked."""
+    """Plot coverage after each scan, and the required coverage."""
     acquired = comparison.acquired
     if acquired is None:
         return
     ledger, views = acquired.sight.ledger, np.zeros(len(acquired.seen), dtype=np.int64)
     visible = ledger.amount(ledger.visible)
-    times, shares = [0.0], [0.0]
+    times, percentages = [0.0], [0.0]
     for event in comparison.log.events:
         if isinstance(event, Scanned) and visible:
             views = views + acquired.sight.views_from([event.stop])
             seen = ledger.enough(views) & acquired.seen
             times.append(event.mission_time_s)
-            shares.append(100 * ledger.amount(seen & ledger.visible) / visible)
+            percentages.append(100 * ledger.amount(seen & ledger.visible) / visible)
     if len(times) > 1:
         ends = np.array([0.0, times[-1]])
-        asked = PlotLine(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
-        grown = PlotLine(np.array(times), np.array(shares), BLUE, steps=True)
-        yield _plot("coverage acquired, %; dashed: asked", [asked, grown])
+        required = PlotLine(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
+        acquired_line = PlotLine(np.array(times), np.array(percentages), BLUE, steps=True)
+        yield _plot("coverage acquired, %; dashed: required", [required, acquired_line])
 
 
-def _few(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A curve of at most MOST_POINTS that keeps every least and greatest value."""
+def _decimated(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a curve of at most MOST_POINTS that keeps every least and greatest value."""
     if len(x) <= MOST_POINTS:
         return x, y
     size = -(-2 * len(x) // MOST_POINTS)
-    kept = []
+    indices = []
     for begin in range(0, len(x), size):
         part = y[begin : begin + size]
-        kept += sorted({begin + int(part.argmin()), begin + int(part.argmax())})
-    return x[kept], y[kept]
+        indices += sorted({begin + int(part.argmin()), begin + int(part.argmax())})
+    return x[indices], y[indices]
 
 
 def _plot(title: str, curves: Sequence[PlotLine]) -> str:
@@ -99,7 +99,7 @@ def _plot(title: str, curves: Sequence[PlotLine]) -> str:
 
 @dataclass(frozen=True)
 class _Scale:
-    """The range of a plot."""
+    """Range of a plot."""
 
     left: float
     right: float

@@ -1,4 +1,4 @@
-"""A proof as one HTML page of the family of reports: the answer, the numbers, the picture, the tables."""
+"""HTML page about a simulation of a plan's scans: answer, numbers, picture and tables."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
 
 UNMET_SHOWN = 12
-"""Sentences of what is not met that stand in the band; the tables have all."""
+"""Limit of unmet conditions in the band; the tables list all."""
 
 
 def proof_html(proof: PlanProof, floor: FloorPlan) -> bytes:
-    """The page; the same proof gives the same bytes."""
+    """Return the page; the same simulation gives the same bytes."""
     parts = [_title(proof), _band(proof), _tiles(proof), _picture(proof, floor), *_tables(proof)]
     return whole_page(f"{proof.mission.name}: proof", "\n".join(parts))
 
@@ -45,11 +45,11 @@ def proof_html(proof: PlanProof, floor: FloorPlan) -> bytes:
 def _title(proof: PlanProof) -> str:
     mission = proof.mission
     about = f"mission {mission.id[:12]}, revision {mission.revision}, floor {mission.origin.floor}"
-    return tag("h1", shown(f"{mission.name}: proof by simulation"), " ", tag("small", shown(about)))
+    return tag("h1", shown(f"{mission.name}: verification by simulation"), " ", tag("small", shown(about)))
 
 
 def _band(proof: PlanProof) -> str:
-    """The answer; where something is not met, what."""
+    """Return the answer, and the conditions that are not met."""
     lines = "".join(tag("li", shown(line)) for line in proof.unmet[:UNMET_SHOWN])
     more = len(proof.unmet) - UNMET_SHOWN
     lines += tag("li", shown(f"and {more} more")) if more > 0 else ""
@@ -60,8 +60,8 @@ def _band(proof: PlanProof) -> str:
 def _tiles(proof: PlanProof) -> str:
     network, quality, whole = proof.network, proof.quality, proof.whole
     acquired = f"{whole.kept:.0f} {proof.unit}" if whole.simulated is None else percent(whole.simulated)
-    drift = f"worst stop {1000 * network.adrift_m:.1f} mm off" if network.registered else "none registers"
-    scans = "one network" if network.closed else f"{len(network.pieces)} pieces"
+    drift = f"worst stop {1000 * network.adrift_m:.1f} mm error" if network.registered else "none registers"
+    scans = "one network" if network.closed else f"{len(network.pieces)} components"
     tiles = [
         tile("coverage acquired", acquired, coverage_words(whole, proof.unit)),
         tile("surface with points", f"{quality.seen_m2:.0f} m²", f"of {quality.total_m2:.0f} m² of targets"),
@@ -87,35 +87,35 @@ def _picture(proof: PlanProof, floor: FloorPlan) -> str:
 
 
 def _layers(proof: PlanProof, frame: PictureFrame) -> Iterator[str]:
-    """Targets by what became of them, and the pairs."""
+    """Draw targets by outcome, and the pairs."""
     promised = proof.seen if proof.promised is None else proof.promised
     missed = promised & ~proof.seen
     yield stroke(along(proof.targets, ~proof.seen & ~missed, frame), GREY, 1.2, stroke_dasharray="4 3")
     yield stroke(along(proof.targets, missed, frame), VERMILION, 5)
     yield stroke(along(proof.targets, proof.seen, frame), BLUE, 2.4)
-    place = {stop.id: (stop.x, stop.y) for stop in proof.mission.stops}
+    position = {stop.id: (stop.x, stop.y) for stop in proof.mission.stops}
 
     def lines(wanted: bool) -> str:
         pairs = (pair for pair in proof.network.pairs if pair.registered == wanted)
-        return frame.path([np.array([place[pair.a], place[pair.b]]) for pair in pairs])
+        return frame.path([np.array([position[pair.a], position[pair.b]]) for pair in pairs])
 
     yield stroke(lines(False), VERMILION, 1.5, stroke_dasharray="2 4")
     yield stroke(lines(True), GREEN, 3)
 
 
 def _lines_of(floor: FloorPlan) -> FloorLines:
-    """The floor as the pictures of reports have it."""
+    """Return the floor as report pictures use it."""
     kinds: dict[str, list[FloatArray]] = {}
     for item in floor.elements:
         kinds.setdefault(item.kind, []).extend([*outlines(item.solids), *item.lines])
     named = [room for room in floor.rooms if room.polygons]
-    places = (name_point(max(room.polygons, key=lambda polygon: polygon.area)) for room in named)
+    positions = (name_point(max(room.polygons, key=lambda polygon: polygon.area)) for room in named)
     return FloorLines(
         outline=tuple(outlines(floor.outline)),
         rooms=tuple(line for room in floor.rooms for line in outlines(room.polygons)),
         kinds={kind: tuple(lines) for kind, lines in kinds.items()},
         openings=tuple(item.line for item in floor.openings),
-        names=tuple((room.label, float(x), float(y)) for room, (x, y) in zip(named, places, strict=True)),
+        names=tuple((room.label, float(x), float(y)) for room, (x, y) in zip(named, positions, strict=True)),
     )
 
 
@@ -128,7 +128,7 @@ def _tables(proof: PlanProof) -> Iterator[str]:
     ]
     yield tag("div", *columns, class_="columns")
     yield section("The network", _listed(network_words(proof)), _pairs(proof.network.pairs))
-    yield section("Taken for granted", _listed(assumed_words(proof.simulation)))
+    yield section("Assumptions", _listed(assumed_words(proof.simulation)))
     digests = (("mission", proof.mission.digest), ("floor", proof.mission.origin.floor_digest))
     lines = (tag("li", shown(f"{name} "), tag("code", shown(digest))) for name, digest in digests)
     yield section("Digests (sha256)", tag("ul", *lines))
@@ -168,7 +168,7 @@ def _stops(proof: PlanProof) -> str:
         )
         for item in proof.stops
     ]
-    return grid(("stop", "claims units", "in sight", "got", "million points"), rows)
+    return grid(("stop", "claims units", "visible", "acquired", "million points"), rows)
 
 
 def _quality(quality: CloudQuality) -> str:
@@ -183,7 +183,7 @@ def _quality(quality: CloudQuality) -> str:
         ),
         *(row([f"from {least} stops or more", percent(share)]) for least, share in quality.by_stops.items()),
     ]
-    return section("Surface with points", grid(("", "share"), rows))
+    return section("Surface with points", grid(("", "fraction"), rows))
 
 
 def _pairs(pairs: Sequence[ScanPair]) -> str:
@@ -203,4 +203,4 @@ def _pairs(pairs: Sequence[ScanPair]) -> str:
         )
         for pair in pairs
     ]
-    return grid(("pair", "shared", "off, mm", "off, °", "free", "registers"), rows)
+    return grid(("pair", "overlap", "error, mm", "error, °", "unconstrained", "registers"), rows)

@@ -1,4 +1,4 @@
-"""What recordings tell of plans and runs: read together, each run beside its plan; for `stopgo review`."""
+"""Review of recordings: plans and runs read together, each run compared with its plan."""
 
 from __future__ import annotations
 
@@ -24,40 +24,41 @@ SUFFIX = ".rrd"
 
 @dataclass(frozen=True, eq=False)
 class RecordingReview:
-    """One recording, and its runs compared with whatever plan of their mission was read."""
+    """One recording, and its runs compared with any plan of their mission that was read."""
 
     recording: Recording
     comparisons: tuple[Comparison, ...]
     problems: tuple[str, ...]
-    """What contradicts itself or is missing, a line each."""
+    """Contradictions and missing data, one line each."""
 
     @property
     def plan(self) -> dict[str, Any] | None:
-        """Results of the plan's stages, if a plan is in it."""
+        """Results of the plan's stages; None without a plan."""
         return self.recording.contents.properties.get(entities.PROPERTY_PLAN)
 
     def as_json(self) -> dict[str, Any]:
-        """Everything, for `--json`."""
-        held = self.recording.contents
+        """Return everything, for `--json`."""
+        contents = self.recording.contents
         return {
             "file": str(self.recording.path),
-            "recording_id": held.recording_id,
+            "recording_id": contents.recording_id,
             "mission_id": self.recording.mission_id,
-            "complete": held.complete,
+            "complete": contents.complete,
             "problems": list(self.problems),
-            "timelines": list(held.timelines),
-            "entities": len(held.rows),
-            "rows": held.total_rows,
+            "timelines": list(contents.timelines),
+            "entities": len(contents.rows),
+            "rows": contents.total_rows,
             "plan": self.plan,
             "runs": [comparison_json(comparison) for comparison in self.comparisons],
         }
 
     def as_text(self) -> str:
-        """The same for a person."""
-        held = self.recording.contents
+        """Return the review for a person."""
+        contents = self.recording.contents
         lines = [
-            f"{self.recording.path}: recording {held.recording_id} (mission of the same id)",
-            f"  timelines {', '.join(held.timelines)}; {len(held.rows)} entities, {held.total_rows} rows",
+            f"{self.recording.path}: recording {contents.recording_id} (mission of the same id)",
+            f"  timelines {', '.join(contents.timelines)};"
+            f" {len(contents.rows)} entities, {contents.total_rows} rows",
             *(f"  problem: {problem}" for problem in self.problems),
         ]
         if self.plan is not None:
@@ -69,11 +70,11 @@ class RecordingReview:
 
 @dataclass(frozen=True, eq=False)
 class Review:
-    """Several recordings; those that cannot be read hide none of the others."""
+    """Several recordings; an unreadable file does not hide the others."""
 
     recordings: tuple[RecordingReview, ...]
     faults: tuple[str, ...]
-    """Why a file cannot be read, a line each."""
+    """Errors of unreadable files, one line each."""
 
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
@@ -81,7 +82,7 @@ class Review:
 
     @property
     def exit_code(self) -> int:
-        """2 where a file cannot be read, else that of the worst run."""
+        """2 if a file cannot be read, else the code of the worst run."""
         if self.faults:
             return InputError.exit_code
         codes = {judge(comparison).exit_code for comparison in self.comparisons}
@@ -89,17 +90,17 @@ class Review:
 
     @property
     def check_code(self) -> int:
-        """1 where a recording contradicts itself or is incomplete, else the exit code."""
+        """1 if a recording is incomplete or contradicts itself, else the exit code."""
         return 1 if any(item.problems for item in self.recordings) else self.exit_code
 
 
 def what_next(run: Comparison, path: Path) -> tuple[str, ...]:
-    """What plans a further mission, where a run that `path` tells of is over and saw less than was asked."""
+    """Return the command for a follow-up mission, if a finished run in `path` acquired too little."""
     acquired, floor = run.acquired, run.mission.origin.floor
     if acquired is None or acquired.answer != "no" or not run.log.ended or not floor:
         return ()
     command = f"stopgo replay {quote(str(path))} --mission mission.json --floor FLOOR --top-up next.json"
-    return (f"For what is missing, a further mission (FLOOR is the file of {floor}): {command}",)
+    return (f"For the missing coverage, plan a follow-up mission (FLOOR is the file of {floor}): {command}",)
 
 
 def review(paths: Iterable[Path]) -> Review:
@@ -115,36 +116,36 @@ def review(paths: Iterable[Path]) -> Review:
 
 
 def reviewed(read: Sequence[Recording], faults: Sequence[str] = ()) -> Review:
-    """Set the runs of recordings beside the plans that are among them."""
+    """Compare the runs of recordings with the plans among them."""
     return Review(tuple(_review(item, read) for item in read), tuple(faults))
 
 
 def files_in(paths: Iterable[Path]) -> Iterator[Path]:
-    """The files as they were named, and every recording that lies in a folder, by name."""
+    """Yield the given files, and every recording in a given folder, by name."""
     for path in paths:
         if not path.is_dir():
             yield path
             continue
         found = sorted(item for item in path.iterdir() if item.suffix == SUFFIX and item.is_file())
         if not found:
-            raise InputError(f"{path}: there is no {SUFFIX} file in this folder; name another")
+            raise InputError(f"{path}: no {SUFFIX} file in this folder; name another folder")
         yield from found
 
 
 def _review(recording: Recording, read: Sequence[Recording]) -> RecordingReview:
-    mine = [item for item in read if item.mission_id == recording.mission_id]
-    missions, sights = missions_of(mine), sights_of(mine)
+    of_mission = [item for item in read if item.mission_id == recording.mission_id]
+    missions, sights = missions_of(of_mission), sights_of(of_mission)
     comparisons = [compare(log, missions, sights) for log in recording.logs] if missions else []
     return RecordingReview(recording, tuple(comparisons), problems_of(recording))
 
 
 def missions_of(recordings: Iterable[Recording]) -> tuple[Mission, ...]:
-    """Every revision once, in ascending order."""
+    """Return every revision once, in ascending order."""
     found = {mission.digest: mission for item in recordings for mission in item.missions}
     return tuple(sorted(found.values(), key=lambda mission: mission.revision))
 
 
 def sights_of(recordings: Iterable[Recording]) -> tuple[Sight, ...]:
-    """What the stops of every revision see, once."""
+    """Return what the stops of every revision see, once."""
     found = {sight.digest: sight for item in recordings for sight in item.sights}
     return tuple(sorted(found.values(), key=lambda sight: sight.revision))

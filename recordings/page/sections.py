@@ -1,4 +1,4 @@
-"""The parts of the page, in the order of reading: the verdict, the numbers, the picture, the tables."""
+"""Parts of the page in reading order: verdict, numbers, picture, tables."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
 
 MOST_ELEMENTS = 40
-"""Elements that are listed: the ones least seen."""
+"""Limit of listed elements; those with the least coverage come first."""
 
 
 def body(subject: ReportSubject) -> str:
-    """Everything between <body> and </body>."""
+    """Return everything between <body> and </body>."""
     runs = subject.comparisons
     parts = [_title(subject), *_problems(subject)]
     if not runs:
         parts += [_plan_band(subject), _plan_tiles(subject), _pictured(subject, None), _plan_tables(subject)]
         parts += [stop_table(subject.reasons)]
     if len(runs) > 1:
-        parts += [_side_by_side(subject)]
+        parts += [_runs_compared(subject)]
     parts += [
         tag("div", *_run(subject, comparison, alone=len(runs) == 1), class_="run") for comparison in runs
     ]
@@ -48,7 +48,7 @@ def _title(subject: ReportSubject) -> str:
 def _problems(subject: ReportSubject) -> Iterator[str]:
     if subject.problems:
         lines = "".join(tag("li", shown(problem)) for problem in subject.problems)
-        yield tag("div", tag("b", "Do not trust these files blindly."), tag("ul", lines), class_="band",
+        yield tag("div", tag("b", "These files have problems; check them."), tag("ul", lines), class_="band",
                   style=f"background:{ANSWERS['no']}")  # fmt: skip
 
 
@@ -60,17 +60,18 @@ def _plan_band(subject: ReportSubject) -> str:
     if planned is None:
         return tag("div", tag("b", "Planned."), class_="band", style=f"background:{ANSWERS['unknown']}")
     whole = planned.whole
-    asked = "" if whole.required is None else f"; {percent(whole.required)} was asked"
+    required = "" if whole.required is None else f"; {percent(whole.required)} is required"
     met = not planned.short
-    text = f" {percent(whole.coverage)} of what is visible will be scanned{asked}."
-    return tag("div", tag("b", "Planned." if met else "Planned, and too little."), shown(text), class_="band",
+    text = f" {percent(whole.coverage)} of what is visible will be scanned{required}."
+    headline = tag("b", "Planned." if met else "Planned, but below the requirement.")
+    return tag("div", headline, shown(text), class_="band",
                style=f"background:{ANSWERS['yes' if met else 'no']}")  # fmt: skip
 
 
 def _plan_tiles(subject: ReportSubject) -> str:
     mission, times = subject.mission, schedule(subject.mission)
     share = None if subject.sight is None else subject.sight.planned.whole
-    visible = "" if share is None else f"{percent(share.visible_share)} of all can be seen"
+    visible = "" if share is None else f"{percent(share.visible_share)} of all is visible"
     tiles = [
         tile("stops", str(len(mission.stops)), _bound(subject)),
         tile("coverage", percent(None if share is None else share.coverage), visible),
@@ -82,12 +83,12 @@ def _plan_tiles(subject: ReportSubject) -> str:
 
 def _bound(subject: ReportSubject) -> str:
     bound, over = (subject.results.get(name) for name in ("stops_bound", "stops_bound_over"))
-    among = f"of {over} " if over else ""  # else of the plan's candidates
+    among = f"of {over} " if over else ""  # without it, the bound is over the plan's candidates
     return "" if bound is None else f"{among}at least {bound} are needed"
 
 
 def _least_time(subject: ReportSubject, scan_s: float) -> str:
-    """How much of it is scanning; of a plan for the least time also what no plan is below."""
+    """Return a note: scanning time, and for a plan of least time its lower bound."""
     bound, before = subject.results.get("least_time_bound_s"), subject.results.get("two_step_s")
     if bound is None or before is None:
         return f"of which scanning {duration(scan_s)}"
@@ -112,8 +113,8 @@ def _plan_tables(subject: ReportSubject) -> str:
 
 
 def _planned_cells(stop: Stop, arrival_s: float) -> list[str]:
-    places = (number(stop.x, digits=3), number(stop.y, digits=3))
-    return [shown(stop.id), *places, duration(arrival_s), str(stop.sees.units), str(stop.sees.new_units)]
+    position = (number(stop.x, digits=3), number(stop.y, digits=3))
+    return [shown(stop.id), *position, duration(arrival_s), str(stop.sees.units), str(stop.sees.new_units)]
 
 
 def _plan_shares(shares: Sequence[Share], what: str) -> str:
@@ -136,13 +137,13 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
     yield section("Stops", tag("div", _stop_grid(comparison), class_="scroll"))
     if comparison.acquired is not None:
         yield tag("div", *_coverage_tables(comparison.acquired), class_="columns")
-    for title, lines in subject.told.get(comparison.run_id, ()):
+    for title, lines in subject.more.get(comparison.run_id, ()):
         yield section(title, tag("ul", *(tag("li", shown(line)) for line in lines)))
-    yield section("On the way", plots(comparison))
+    yield section("During the run", plots(comparison))
 
 
 def _tiles(comparison: Comparison) -> Iterator[str]:
-    away, beside = comparison.greatest_deviation_m, comparison.cross_track.greatest_m
+    deviation_m, cross_track_m = comparison.greatest_deviation_m, comparison.cross_track.greatest_m
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
     tolerance = max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
     paused, held = (sum(span.state == state for span in comparison.spans) for state in ("PAUSED", "HELD"))
@@ -151,16 +152,17 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
     )
     if comparison.acquired is not None:
         shares, planned = comparison.acquired.shares, comparison.acquired.planned
-        asked = percent(shares.whole.required)
-        planned_text = f"asked {asked}, planned {percent(planned.whole.coverage)}"
+        required = percent(shares.whole.required)
+        planned_text = f"required {required}, planned {percent(planned.whole.coverage)}"
         yield tile("coverage acquired", percent(shares.whole.coverage), planned_text)
     yield tile("run time", driven, f"planned {duration(comparison.planned_s)}")
-    yield tile("greatest offset at a stop", _millimetres(away), f"tolerance {1000 * tolerance:.0f} mm")
+    limit = f"tolerance {1000 * tolerance:.0f} mm"
+    yield tile("greatest position error at a stop", _millimetres(deviation_m), limit)
     poses = comparison.log.poses
-    driven_m = f"{poses.length_m:.1f} m driven" if len(poses) else "the way is not in the log"
-    yield tile("off the route, worst", _millimetres(beside), driven_m)
-    stood = comparison.seconds_in("PAUSED", "HELD")
-    yield tile("stood still", duration(stood), f"paused {paused}, held {held}")
+    driven_m = f"{poses.length_m:.1f} m driven" if len(poses) else "the path is not in the log"
+    yield tile("greatest cross-track error", _millimetres(cross_track_m), driven_m)
+    stationary_s = comparison.seconds_in("PAUSED", "HELD")
+    yield tile("stationary", duration(stationary_s), f"paused {paused}, held {held}")
 
 
 def _millimetres(metres: float | None) -> str:
@@ -185,11 +187,11 @@ def _pictured(subject: ReportSubject, comparison: Comparison | None) -> str:
     marks = [(line_sample(BLUE, 2.4), seen), (line_sample(GREY, 1.2, "4 3"), "never planned")]
     if comparison is not None:
         marks.insert(1, (line_sample(VERMILION, 5), "planned, not scanned (thick)"))
-    marks.append((line_sample("#444", 1.1, "6 4"), "planned way"))
+    marks.append((line_sample("#444", 1.1, "6 4"), "planned path"))
     if comparison is not None:
         diamond = tag("path", d="M13 1L18 6L13 11L8 6Z", fill=YELLOW, stroke="#111")
         cross = tag("path", d="M8 1H18V11H8ZM10 3L16 9M10 9L16 3", fill=VERMILION, stroke="#111")
-        marks += [(line_sample(PURPLE, 2), "driven way"), (cross, "not scanned"), (diamond, "stood still")]
+        marks += [(line_sample(PURPLE, 2), "driven path"), (cross, "not scanned"), (diamond, "stationary")]
     return legend(marks) + plan_picture(subject, comparison)
 
 
@@ -199,7 +201,7 @@ STOP_HEADER = (
         "outcome",
         "planned",
         "arrived",
-        "late s",
+        "delay s",
         "along mm",
         "across mm",
         "heading °",
@@ -220,9 +222,9 @@ def _stop_grid(comparison: Comparison) -> str:
 
 
 def _stop_cells(item: StopComparison) -> list[str]:
-    told = ": ".join(word for word in (item.outside_text or item.outcome, item.reason) if word)
+    outcome = ": ".join(word for word in (item.outside_text or item.outcome, item.reason) if word)
     return [
-        *(shown(item.stop), shown(told), _clock(item.planned_s), _clock(item.arrived_s)),
+        *(shown(item.stop), shown(outcome), _clock(item.planned_s), _clock(item.arrived_s)),
         *(number(item.late_s, sign=True), number(item.along_m, 1000, sign=True)),
         *(number(item.across_m, 1000, sign=True), number(item.heading_rad, 180 / math.pi, sign=True)),
         *(number(item.settle_s), str(item.tries)),
@@ -248,9 +250,9 @@ def _coverage_tables(acquired: Acquired) -> Iterator[str]:
 
 
 def _share_grid(pairs: Sequence[tuple[Share, Share]], what: str, *, alone: bool = False) -> str:
-    """Rows of planned and acquired shares; `alone` where there is only a plan."""
+    """Return rows of planned and acquired coverage; `alone` if there is only a plan."""
     rows = [row(_share_cells(planned, share, alone=alone)) for planned, share in pairs]
-    header = (what, "planned", "") if alone else (what, "planned", "got", "")
+    header = (what, "planned", "") if alone else (what, "planned", "acquired", "")
     return grid(header, rows) if rows else ""
 
 
@@ -261,19 +263,19 @@ def _share_cells(planned: Share, share: Share, *, alone: bool) -> list[str]:
 
 
 def _bar(share: Share) -> str:
-    """How much is seen, and a mark at what was asked."""
+    """Return a bar of the coverage, with a mark at the required coverage."""
     if share.coverage is None:
         return ""
     colour = BLUE if share.met else VERMILION
-    asked = "" if share.required is None else tag("i", style=f"left:{100 * share.required:.1f}%")
+    required = "" if share.required is None else tag("i", style=f"left:{100 * share.required:.1f}%")
     inner = tag("div", style=f"width:{100 * share.coverage:.1f}%;background:{colour}")
-    return tag("div", inner, asked, class_="bar")
+    return tag("div", inner, required, class_="bar")
 
 
 # ---- several runs ----
 
 
-def _side_by_side(subject: ReportSubject) -> str:
+def _runs_compared(subject: ReportSubject) -> str:
     runs = subject.comparisons
     header = ["", *(shown(run.run_id or "without a name") for run in runs)]
     verdicts = (shown(subject.judgement(run).headline) for run in runs)
@@ -298,7 +300,7 @@ def _outcome(item: StopComparison | None) -> str:
 
 
 def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
-    """Rooms by their order in the plan; runs of which nothing is known have no shares."""
+    """Return rooms in the plan's order; runs with unknown coverage have empty cells."""
     known = [run.acquired for run in runs]
     first = next((item for item in known if item is not None), None)
     if first is None:
@@ -316,24 +318,24 @@ _ROWS = (
     ("stops scanned", lambda run: f"{run.scanned} / {len(run.asked)}"),
     ("coverage", lambda run: "" if run.acquired is None else percent(run.acquired.shares.whole.coverage)),
     ("run time", lambda run: _clock(run.driven_s)),
-    ("greatest offset at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
-    ("off the route, worst", lambda run: _millimetres(run.cross_track.greatest_m)),
-    ("stood still", lambda run: duration(run.seconds_in("PAUSED", "HELD"))),
+    ("greatest position error at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
+    ("greatest cross-track error", lambda run: _millimetres(run.cross_track.greatest_m)),
+    ("stationary", lambda run: duration(run.seconds_in("PAUSED", "HELD"))),
 )
 """Rows of the table of runs."""
 
 
-# ---- what it stands on ----
+# ---- findings, alignment and files ----
 
 
 def _findings(subject: ReportSubject) -> str:
     found = subject.found
-    left = [
+    unreached = [
         tag("li", shown(f"{room} ({area:.1f} m²) is not entered: {why}"))
         for room, area, why in found.unreached
     ]
-    told = [tag("li", tag("b", shown(code)), " ", shown(message)) for _, code, message in found.findings]
-    return section("Findings", tag("ul", *left, *told)) if left or told else ""
+    findings = [tag("li", tag("b", shown(code)), " ", shown(message)) for _, code, message in found.findings]
+    return section("Findings", tag("ul", *unreached, *findings)) if unreached or findings else ""
 
 
 def _alignments(subject: ReportSubject) -> str:
@@ -351,12 +353,13 @@ def _aligned(run: Comparison) -> str:
     fit = run.log.alignment
     if fit is None:
         return "recorded in the mission's frame"
-    turn, shift = math.degrees(fit.heading), f"({fit.x:.3f}, {fit.y:.3f}) m"
-    how = f"{fit.how}: turned by {turn:.3f}°, shifted by {shift}, times by {fit.time_offset_ns / 1e9:+.3f} s"
+    rotation, shift = math.degrees(fit.heading), f"({fit.x:.3f}, {fit.y:.3f}) m"
+    seconds = f"{fit.time_offset_ns / 1e9:+.3f} s"
+    how = f"{fit.how}: rotated by {rotation:.3f}°, shifted by {shift}, times by {seconds}"
     if fit.residual_rms_m is None:
         return how
-    rms, most = 1000 * fit.residual_rms_m, 1000 * (fit.residual_max_m or 0.0)
-    return f"{how}; of {fit.pairs} pairs {rms:.1f} mm rms are left, {most:.1f} mm at most"
+    rms, greatest = 1000 * fit.residual_rms_m, 1000 * (fit.residual_max_m or 0.0)
+    return f"{how}; residuals of {fit.pairs} pairs: {rms:.1f} mm rms, {greatest:.1f} mm at most"
 
 
 def _read(run: Comparison) -> str:

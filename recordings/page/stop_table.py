@@ -1,4 +1,4 @@
-"""Why each stop of a plan is there, as a table of the page."""
+"""Table of the page with the reasons for each stop of a plan."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stopgo.recordings.page.words import grid, number, row, section, shown
 
 
 def stop_table(reasons: Sequence[StopReason]) -> str:
-    """A row for each stop, in the order of driving; nothing for plans that do not tell."""
+    """Return a row for each stop, in the order of driving; an empty string for plans without reasons."""
     if not reasons:
         return ""
     unit = reasons[0].unit
@@ -18,17 +18,17 @@ def stop_table(reasons: Sequence[StopReason]) -> str:
         "stop",
         "choice",
         f"sees {unit}",
-        f"alone {unit}",
+        f"only it sees {unit}",
         "lost",
         f"where {unit}",
         f"runners-up {unit}",
     )
-    return section("Why each stop", grid(header, map(_row, reasons)))
+    return section("Reasons for each stop", grid(header, map(_row, reasons)))
 
 
 def _row(reason: StopReason) -> str:
     where = [
-        f"{room.name} {number(lost)}{'' if room.met else ', then below what is asked'}"
+        f"{room.name} {number(lost)}{'' if room.met else ', then below the requirement'}"
         for room, lost in zip(reason.rooms, reason.lost, strict=True)
         if lost >= LEAST_PRINTED
     ]

@@ -1,4 +1,4 @@
-"""How the page looks, on the screen and on paper: Okabe and Ito's colours, and shapes beside them."""
+"""Style of the page on screen and on paper: Okabe and Ito's colours, always together with a shape."""
 
 from __future__ import annotations
 

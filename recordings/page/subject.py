@@ -1,4 +1,4 @@
-"""What a report is of: a mission with its plan, and any number of its runs."""
+"""Subject of a report: a mission with its plan, and any number of its runs."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from stopgo.mission.document import Mission
 from stopgo.mission.run.run_log import LogSource
 from stopgo.mission.stages.sight import Sight
 from stopgo.mission.stages.stop_reasons import StopReason
-from stopgo.recordings.embedded.findings import CarriedFindings
+from stopgo.recordings.embedded.findings import EmbeddedFindings
 from stopgo.recordings.embedded.floor_lines import FloorLines
 
 
 @dataclass(frozen=True, eq=False)
 class ReportSubject:
-    """One mission; what is not known of it is empty or None."""
+    """One mission; what is not known is empty or None."""
 
     missions: tuple[Mission, ...]
-    """Its revisions, in ascending order; at least one."""
+    """Revisions in ascending order; at least one."""
     comparisons: tuple[Comparison, ...] = ()
-    """Its runs, the one begun first before others."""
+    """Runs of the mission, the earliest first."""
     sight: Sight | None = None
-    """What its newest plan's stops see."""
+    """Visibility of the newest plan's stops."""
     floor: FloorLines | None = None
     results: dict[str, Any] = field(default_factory=dict)
-    """What the stages of the plan came to, by name."""
+    """Results of the plan's stages, by name."""
     reasons: tuple[StopReason, ...] = ()
-    """Why the stops of the newest plan are there."""
-    found: CarriedFindings = field(default_factory=CarriedFindings)
+    """Reasons for the stops of the newest plan."""
+    found: EmbeddedFindings = field(default_factory=EmbeddedFindings)
     sources: tuple[LogSource, ...] = ()
-    """The files that it was made from."""
+    """Files that the report was made from."""
     problems: tuple[str, ...] = ()
-    """What of these files is missing or contradicts itself."""
+    """Contradictions and missing data in these files."""
 
     judgements: Mapping[str | None, Judgement] = field(default_factory=dict)
-    """What is answered of a run otherwise than by its scans, by run id: of logs that tell of none."""
-    told: Mapping[str | None, tuple[tuple[str, tuple[str, ...]], ...]] = field(default_factory=dict)
-    """What else is told of a run, by run id: titles, each with its lines."""
+    """Verdicts by run id that are not based on scans: for logs that contain no scans."""
+    more: Mapping[str | None, tuple[tuple[str, tuple[str, ...]], ...]] = field(default_factory=dict)
+    """Additional texts by run id: titles, each with its lines."""
 
     def judgement(self, run: Comparison) -> Judgement:
-        """What is answered of a run, and why."""
+        """Return the verdict on a run, with its reasons."""
         return self.judgements.get(run.run_id) or judge(run)
 
     @property
     def mission(self) -> Mission:
-        """The newest revision."""
+        """Newest revision."""
         return self.missions[-1]
 
     @property

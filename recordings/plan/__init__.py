@@ -1,4 +1,4 @@
-"""A plan as a recording: takes each noun as the planner makes it, and draws them when the plan ends."""
+"""Plan as a recording: collects each stage result from the planner, and draws them all when the plan ends."""
 
 from __future__ import annotations
 
@@ -27,12 +27,18 @@ from stopgo.recordings.drawing.canvas import (
     mission_origin,
     open_canvas,
 )
-from stopgo.recordings.drawing.markdown import Nouns, parameter_values, parameters, plan_report, plan_results
-from stopgo.recordings.embedded.checking import carry_end
-from stopgo.recordings.embedded.findings import carry_findings
-from stopgo.recordings.embedded.missions import carry_mission
-from stopgo.recordings.embedded.reasons import carry_reasons
-from stopgo.recordings.embedded.sight import carry_sight
+from stopgo.recordings.drawing.markdown import (
+    StageResults,
+    parameter_values,
+    parameters,
+    plan_report,
+    plan_results,
+)
+from stopgo.recordings.embedded.checking import embed_end
+from stopgo.recordings.embedded.findings import embed_findings
+from stopgo.recordings.embedded.missions import embed_mission
+from stopgo.recordings.embedded.reasons import embed_reasons
+from stopgo.recordings.embedded.sight import embed_sight
 from stopgo.recordings.plan.candidates import draw_candidates
 from stopgo.recordings.plan.drive import planned_drive
 from stopgo.recordings.plan.floor import draw_floor, raise_floor
@@ -45,7 +51,7 @@ from stopgo.recordings.plan.mission import (
 )
 from stopgo.recordings.plan.selection import draw_selection, paint_coverage
 from stopgo.recordings.plan.space import draw_space
-from stopgo.recordings.plan.stop_browser import tell_stops
+from stopgo.recordings.plan.stop_browser import describe_stops
 from stopgo.recordings.plan.visibility import draw_visibility
 from stopgo.recordings.rrd.read import check
 
@@ -57,102 +63,106 @@ DRAWINGS: dict[type, tuple[Drawing, ...]] = {
     Candidates: (draw_candidates,),
     Visibility: (draw_visibility,),
     Selection: (draw_selection, paint_coverage),
-    Mission: (draw_mission, carry_mission),
-    Sight: (carry_sight,),
-    Figures: (carry_findings,),
+    Mission: (draw_mission, embed_mission),
+    Sight: (embed_sight,),
+    Figures: (embed_findings,),
 }
-"""How each noun is drawn; nouns of other types are left out."""
+"""Drawing functions of each stage result; results of other types are left out."""
 
 
 class PlanRecording:
-    """Collects the nouns of one plan, and draws them when it is written.
+    """Collects the stage results of one plan, and draws them when it is written.
 
-    Drawing waits for the end because the local origin is the mission's, which is known last and which
-    field recordings of the mission know too.
+    Drawing waits for the end, because the local origin is the mission's. The mission is the last result, and
+    its field recordings have the same origin.
     """
 
     def __init__(self, recording_id: str) -> None:
         self.recording_id = recording_id
-        self._nouns: Nouns = {}
+        self._results: StageResults = {}
 
-    def observe(self, noun: object) -> None:
-        """Take one noun; of two of a kind the later one counts."""
-        self._nouns[type(noun)] = noun
+    def observe(self, result: object) -> None:
+        """Collect one stage result; a later one replaces an earlier one of the same type."""
+        self._results[type(result)] = result
 
     def write(self, path: Path) -> None:
-        """Draw the nouns into `path`, and read it back to its end."""
-        path.write_bytes(_drawn(self.recording_id, self._nouns))
+        """Draw the stage results into `path`, and read the file to its end."""
+        path.write_bytes(_recording(self.recording_id, self._results))
         check(path)
 
     def streamed(self) -> bytes:
-        """The nouns as a recording, behind its layout: a viewer that reads it from a pipe draws what it has
-        so far, and would make a layout of its own for a recording that comes first.
+        """Return the stage results as a recording that follows its layout.
+
+        A viewer that reads from a pipe draws the data it has so far. It would make its own layout for a
+        recording that comes before its layout.
         """
-        layout = layout_alone(_sheet(self.recording_id, self._nouns))
-        return layout + _drawn(self.recording_id, self._nouns)
+        layout = layout_alone(_sheet(self.recording_id, self._results))
+        return layout + _recording(self.recording_id, self._results)
 
 
-def _drawn(recording_id: str, nouns: Nouns) -> bytes:
-    with open_canvas(_sheet(recording_id, nouns)) as canvas:
+def _recording(recording_id: str, results: StageResults) -> bytes:
+    with open_canvas(_sheet(recording_id, results)) as canvas:
         for kind, drawings in DRAWINGS.items():
-            for draw in drawings if kind in nouns else ():
-                draw(canvas, nouns[kind])
-        _draw_planned_drive(canvas, nouns)
-        _tell(canvas, nouns)
-        carry_end(canvas)
-        return canvas.taken()
+            for draw in drawings if kind in results else ():
+                draw(canvas, results[kind])
+        _draw_planned_drive(canvas, results)
+        _describe_plan(canvas, results)
+        embed_end(canvas)
+        return canvas.drain()
 
 
-def _sheet(recording_id: str, nouns: Nouns) -> Sheet:
-    return Sheet(recording_id=recording_id, name=_name(nouns), origin=_origin(nouns), extent=_extent(nouns))
+def _sheet(recording_id: str, results: StageResults) -> Sheet:
+    return Sheet(
+        recording_id=recording_id, name=_name(results), origin=_origin(results), extent=_extent(results)
+    )
 
 
-def _origin(nouns: Nouns) -> LocalOrigin:
-    if Mission in nouns:
-        return mission_origin(nouns[Mission])
-    if FloorPlan in nouns and nouns[FloorPlan].outline:
-        x, y = nouns[FloorPlan].outline[0].exterior[0]
+def _origin(results: StageResults) -> LocalOrigin:
+    if Mission in results:
+        return mission_origin(results[Mission])
+    if FloorPlan in results and results[FloorPlan].outline:
+        x, y = results[FloorPlan].outline[0].exterior[0]
         return local_origin(float(x), float(y))
     return (0.0, 0.0)
 
 
-def _extent(nouns: Nouns) -> Bounds:
-    floor, mission = nouns.get(FloorPlan), nouns.get(Mission)
+def _extent(results: StageResults) -> Bounds:
+    floor, mission = results.get(FloorPlan), results.get(Mission)
     if floor is not None:
         return bounds(polygon.exterior for polygon in floor.outline)
     return mission_extent(mission) if mission is not None else (0.0, 0.0, 0.0, 0.0)
 
 
-def _name(nouns: Nouns) -> str:
+def _name(results: StageResults) -> str:
     for kind in (Mission, FloorPlan):
-        if kind in nouns:
-            return str(nouns[kind].name)
+        if kind in results:
+            return str(results[kind].name)
     return "plan"
 
 
-def _draw_planned_drive(canvas: Canvas, nouns: Nouns) -> None:
-    """The drive of the mission, and the coverage it reaches on the way."""
-    if Mission not in nouns or not nouns[Mission].stops:
+def _draw_planned_drive(canvas: Canvas, results: StageResults) -> None:
+    """Draw the mission's drive, and the coverage along it."""
+    if Mission not in results or not results[Mission].stops:
         return
-    mission = nouns[Mission]
+    mission = results[Mission]
     drive = planned_drive(mission)
     draw_drive(canvas, drive, radius=mission.robot.radius)
-    if Route in nouns:
-        route: Route = nouns[Route]
+    if Route in results:
+        route: Route = results[Route]
         reasons = stop_reasons(route, [stop.id for stop in mission.stops])
         plot_planned_coverage(canvas, driven_coverage(route), drive)
-        tell_stops(canvas, route, mission, reasons, drive)
-        carry_reasons(canvas, reasons)
+        describe_stops(canvas, route, mission, reasons, drive)
+        embed_reasons(canvas, reasons)
     plan_states(canvas, mission, drive)
 
 
-def _tell(canvas: Canvas, nouns: Nouns) -> None:
-    """The report, and the properties by which the file says what it is of."""
-    report = rr.TextDocument(plan_report(nouns, canvas.origin), media_type="text/markdown")
+def _describe_plan(canvas: Canvas, results: StageResults) -> None:
+    """Write the report, and the properties that identify the file."""
+    report = rr.TextDocument(plan_report(results, canvas.origin), media_type="text/markdown")
     canvas.show(entities.REPORT, report)
     canvas.at(entities.LATEST_REPORT, report, step=0, candidate=0, mission_s=0.0)
-    results = {"local_origin": list(canvas.origin), "stopgo": __version__, **plan_results(nouns)}
-    canvas.describe(entities.PROPERTY_PLAN, results)
-    settings = parameters(nouns)
+    values = {"local_origin": list(canvas.origin), "stopgo": __version__, **plan_results(results)}
+    canvas.describe(entities.PROPERTY_PLAN, values)
+    settings = parameters(results)
     if settings is not None:
         canvas.describe(entities.PROPERTY_PARAMETERS, parameter_values(settings))

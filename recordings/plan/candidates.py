@@ -1,4 +1,4 @@
-"""Candidates: every possible position, and why it was dropped."""
+"""Candidates: every possible position, and why some were dropped."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from stopgo.mission.stages import DROP_REASONS, KEPT, Candidates
 from stopgo.recordings.drawing import entities, palette
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
 from stopgo.recordings.drawing.pens import ORDER
-from stopgo.recordings.plan.story import CANDIDATES, tell_step
+from stopgo.recordings.plan.story import CANDIDATES, describe_step
 
 
 def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:
-    """Every possible position, coloured by what became of it; hovering tells the reason and the room."""
+    """Draw every possible position, coloured by its outcome; hovering shows the reason and the room."""
     if not len(candidates.xy):
         canvas.say("no candidate positions", level="WARN", step=CANDIDATES)
         return
-    kept = candidates.reason == KEPT
+    remaining = candidates.reason == KEPT
     points = rr.Points2D(
         canvas.local(candidates.xy),
         class_ids=[palette.reason(int(number)).number for number in candidates.reason],
-        radii=np.where(kept, on_screen(2.2), on_screen(1.5)),
+        radii=np.where(remaining, on_screen(2.2), on_screen(1.5)),
         show_labels=False,
         draw_order=ORDER["candidate"],
     )
@@ -29,9 +29,9 @@ def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:
     why = [DROP_REASONS[int(number)] for number in candidates.reason]
     canvas.since(entities.CANDIDATES, points, rr.AnyValues(room=names, reason=why), step=CANDIDATES)
     counts = np.bincount(candidates.reason, minlength=len(DROP_REASONS))
-    told = ", ".join(f"{int(count)} {DROP_REASONS[i]}" for i, count in enumerate(counts) if count)
+    counted = ", ".join(f"{int(count)} {DROP_REASONS[i]}" for i, count in enumerate(counts) if count)
     title = (
-        f"candidates ({candidates.strategy}): {candidates.generated} places generated, "
+        f"candidates ({candidates.strategy}): {candidates.generated} positions generated, "
         f"{candidates.reachable} reachable"
     )
-    tell_step(canvas, CANDIDATES, title, f"Of {len(candidates.xy)} positions: {told}.")
+    describe_step(canvas, CANDIDATES, title, f"Of {len(candidates.xy)} positions: {counted}.")

@@ -1,4 +1,4 @@
-"""Where the robot is planned to be when: a mission as poses over mission time."""
+"""Planned drive: poses of a mission over mission time."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from stopgo.mission.files.mission_text import route_length
 from stopgo.mission.geometry import FloatArray
 
 STEP_M = 0.25
-"""Greatest distance between two poses of the planned drive …"""
+"""Greatest distance between two poses of the planned drive, if MOST_POSES are enough for it."""
 MOST_POSES = 8000
-"""… unless it is longer than this many such steps: they are as much longer then."""
+"""Limit of poses; a longer drive has longer steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,25 +26,25 @@ class Drive:
     seconds: FloatArray
     poses: FloatArray
     leaving_s: FloatArray
-    """When each stop's scan is done (k,)."""
+    """End of each stop's scan (k,)."""
 
 
 def planned_drive(mission: Mission) -> Drive:
-    """The drive that `schedule` times: turn in place, straight on, settle, scan."""
-    walk = _DriveTimer(mission)
+    """Return the drive that `schedule` times: rotate on the spot, drive straight, settle, scan."""
+    timer = _DriveTimer(mission)
     leaving = []
     for stop in mission.stops:
-        walk.along(stop.approach)
-        walk.turn_to(stop.heading)
-        walk.stay(stop.settle_s + stop.scan.duration_s)
-        leaving.append(walk.seconds)
-    walk.along(mission.return_ or ())
-    table = np.array(walk.rows)
+        timer.along(stop.approach)
+        timer.turn_to(stop.heading)
+        timer.stay(stop.settle_s + stop.scan.duration_s)
+        leaving.append(timer.seconds)
+    timer.along(mission.return_ or ())
+    table = np.array(timer.rows)
     return Drive(table[:, 0], table[:, 1:], np.array(leaving))
 
 
 class _DriveTimer:
-    """A robot going through a plan, writing down a pose whenever it has moved."""
+    """Robot that drives through a plan and records a pose after each movement."""
 
     def __init__(self, mission: Mission) -> None:
         self.robot = mission.robot
@@ -52,7 +52,7 @@ class _DriveTimer:
         self.x, self.y, self.heading = mission.start.x, mission.start.y, mission.start.heading
         self.step_m = max(STEP_M, route_length(mission) / MOST_POSES)
         self.rows: list[tuple[float, float, float, float]] = []
-        self._note()
+        self._record_pose()
 
     def along(self, leg: tuple[Point, ...]) -> None:
         for a, b in pairwise(leg):
@@ -63,22 +63,22 @@ class _DriveTimer:
     def turn_to(self, heading: float) -> None:
         self.seconds += turn_time(heading - self.heading, turn_rate=self.robot.turn_rate)
         self.heading = heading
-        self._note()
+        self._record_pose()
 
     def stay(self, seconds: float) -> None:
         self.seconds += seconds
-        self._note()
+        self._record_pose()
 
     def _straight(self, a: Point, b: Point) -> None:
-        """Evenly from a to b; only the time at b is exact, as the robot speeds up and slows down."""
+        """Drive evenly from a to b. Only the time at b is exact, as the robot speeds up and slows down."""
         begin, length = self.seconds, math.dist(a, b)
-        takes = straight_time(length, speed=self.robot.speed, acceleration=self.robot.acceleration)
+        duration = straight_time(length, speed=self.robot.speed, acceleration=self.robot.acceleration)
         steps = max(1, math.ceil(length / self.step_m))
         for step in range(1, steps + 1):
             t = step / steps
-            self.seconds = begin + t * takes
+            self.seconds = begin + t * duration
             self.x, self.y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
-            self._note()
+            self._record_pose()
 
-    def _note(self) -> None:
+    def _record_pose(self) -> None:
         self.rows.append((self.seconds, self.x, self.y, self.heading))

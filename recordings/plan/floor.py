@@ -1,4 +1,4 @@
-"""The floor: outline, holes, rooms, elements and openings in 2D, and walls cut at a nominal height in 3D."""
+"""Floor: outline, holes, rooms, elements and openings in 2D, and walls up to a nominal height in 3D."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
 from stopgo.recordings.drawing.pens import ORDER, THICK, THIN, Pen, draw
 from stopgo.recordings.plan import story
-from stopgo.recordings.plan.story import tell_step
+from stopgo.recordings.plan.story import describe_step
 
 MOST_NAMES = 30
-"""With more rooms than these their names hide one another, and are shown where the mouse points."""
+"""Number of rooms above which names would cover one another; they are then shown at the mouse pointer."""
 CUT = 1.2
-"""Height in metres at which walls are cut, low enough to look into the rooms: drawings tell no heights."""
+"""Height in metres at which walls are cut, low enough to look into the rooms: drawings contain no heights."""
 SPANS = {"beams": (CUT, CUT + 0.15), "stairs": (0.0, 0.4), "windows": (0.8, CUT), "railings": (0.0, 0.9)}
-"""From where to where other kinds than walls and columns are drawn, so that they are told apart."""
+"""Heights between which kinds other than walls and columns are drawn, to distinguish them."""
 
 
 def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
-    """Outline, holes, rooms with names, elements by kind, openings."""
+    """Draw outline, holes, rooms with names, elements by kind, and openings."""
     edges = strokes.outlines(floor.outline)
     draw(canvas, entities.OUTLINE, edges, Pen(palette.OUTLINE, "floor", THICK))
     holes = [hole for polygon in floor.outline for hole in polygon.holes]
@@ -34,13 +34,13 @@ def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
         _draw_elements(canvas, floor, kind)
     openings = [opening.line for opening in floor.openings]
     draw(canvas, entities.OPENINGS, openings, Pen(palette.PASSABLE, "line", THICK))
-    say_findings(canvas, floor.findings)
-    told = f"floor {floor.name}: {floor.area:.1f} m², {len(floor.rooms)} rooms, {len(openings)} openings"
-    tell_step(canvas, story.FLOOR, told)
+    log_findings(canvas, floor.findings)
+    title = f"floor {floor.name}: {floor.area:.1f} m², {len(floor.rooms)} rooms, {len(openings)} openings"
+    describe_step(canvas, story.FLOOR, title)
 
 
 def raise_floor(canvas: Canvas, floor: FloorPlan) -> None:
-    """Slab, and every kind of element up to the cut."""
+    """Draw the slab, and every kind of element up to the cut."""
     slab = strokes.level(canvas.local(strokes.triangles(floor.outline)), -0.02)
     _mesh(canvas, entities.SLAB, slab, palette.SLAB)
     for kind, colour in palette.KIND_COLOURS.items():
@@ -48,11 +48,11 @@ def raise_floor(canvas: Canvas, floor: FloorPlan) -> None:
         low, high = SPANS.get(kind, (0.0, CUT))
         sides = strokes.walls(canvas.strips(strokes.outlines(solids) + lines), low=low, high=high)
         top = strokes.level(canvas.local(strokes.triangles(solids)), high)
-        _mesh(canvas, entities.part(entities.WORLD_FLOOR, kind), np.concatenate([sides, top]), colour)
+        _mesh(canvas, entities.child(entities.WORLD_FLOOR, kind), np.concatenate([sides, top]), colour)
 
 
-def say_findings(canvas: Canvas, findings: Iterable[Finding], *, step: int = story.FLOOR) -> None:
-    """Each finding as a warning in the plan's log."""
+def log_findings(canvas: Canvas, findings: Iterable[Finding], *, step: int = story.FLOOR) -> None:
+    """Log each finding as a warning."""
     for finding in findings:
         canvas.say(f"{finding.code}: {finding.message}", level="WARN", step=step)
 
@@ -77,19 +77,19 @@ def _draw_rooms(canvas: Canvas, rooms: tuple[Room, ...]) -> None:
 
 def _draw_elements(canvas: Canvas, floor: FloorPlan, kind: str) -> None:
     solids, lines = _shapes(floor, kind)
-    colour, element = palette.KIND_COLOURS[kind], entities.part(entities.FLOOR, kind)
+    colour, element = palette.KIND_COLOURS[kind], entities.child(entities.FLOOR, kind)
     filled = strokes.fill(solids, spacing=0.05)
     if len(filled.lines):
         shape = rr.LineStrips2D(
             canvas.local(filled.lines), radii=filled.radii, colors=colour, draw_order=ORDER["solid"]
         )
-        canvas.show(entities.part(element, "fill"), shape)
+        canvas.show(entities.child(element, "fill"), shape)
     edges = strokes.outlines(solids) + lines
     draw(canvas, element, edges, Pen(colour, "solid", THIN), names=_names(floor, kind))
 
 
 def _names(floor: FloorPlan, kind: str) -> list[str]:
-    """What each edge of a kind belongs to, by the model's GlobalIds; empty where no element has one."""
+    """Return the element of each edge of a kind, by the model's GlobalIds; empty if no element has one."""
     elements = _of_kind(floor, kind)
     if not any(item.global_id for item in elements):
         return []
@@ -99,20 +99,20 @@ def _names(floor: FloorPlan, kind: str) -> list[str]:
 
 
 def _of_kind(floor: FloorPlan, kind: str) -> list[Element]:
-    """Elements of one kind; kinds without a colour count as `other`."""
+    """Return elements of one kind; kinds without a colour count as `other`."""
     known = palette.KIND_COLOURS
     return [item for item in floor.elements if kind == (item.kind if item.kind in known else "other")]
 
 
 def _shapes(floor: FloorPlan, kind: str) -> tuple[list[Polygon], list[FloatArray]]:
-    """Solids and open lines of one kind."""
+    """Return solids and open lines of one kind."""
     elements = _of_kind(floor, kind)
     solids = [polygon for item in elements for polygon in item.solids]
     return solids, [line for item in elements for line in item.lines]
 
 
 def _mesh(canvas: Canvas, entity: str, faces: FloatArray, colour: palette.Colour) -> None:
-    """Triangles (k, 3, 3) in one colour, shaded by the direction each faces."""
+    """Draw triangles (k, 3, 3) in one colour, shaded by the direction of each face."""
     if not len(faces):
         return
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])

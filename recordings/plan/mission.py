@@ -26,11 +26,11 @@ from stopgo.recordings.drawing.robot import draw_robot, quaternions
 from stopgo.recordings.plan.drive import Drive
 
 ABOVE_FLOOR = 0.05
-"""How high above the floor 3D lines lie, in metres, so that the floor does not hide them."""
+"""Height in metres of 3D lines above the floor, so that the floor does not hide them."""
 ARROW = 0.6
 """Length of a stop's heading, in metres."""
 MOST_NAMES = 60
-"""With more stops than these their names hide the plan, and are shown where the mouse points."""
+"""Number of stops above which names would cover the plan; they are then shown at the mouse pointer."""
 HEAD = 1.5
 """Height of the marks on stops in 3D, in metres."""
 
@@ -38,7 +38,7 @@ Leg = tuple[Point, ...]
 
 
 def draw_mission(canvas: Canvas, mission: Mission) -> None:
-    """Stops and route; nothing of it changes with time."""
+    """Draw stops and route, which do not change with time."""
     _draw_route(canvas, mission)
     _draw_network(canvas, mission)
     if mission.stops:
@@ -46,22 +46,22 @@ def draw_mission(canvas: Canvas, mission: Mission) -> None:
 
 
 def mission_extent(mission: Mission) -> Bounds:
-    """Bounds of what the mission drives along, and of what its scanner reaches from there."""
+    """Return the bounds of the mission's legs and of the scanner's range around them."""
     start = np.array([(mission.start.x, mission.start.y)])
-    ways = [start, *(np.array(stop.approach).reshape(-1, 2) for stop in mission.stops)]
-    left, low, right, high = bounds([*ways, np.array(mission.return_ or ()).reshape(-1, 2)])
+    paths = [start, *(np.array(stop.approach).reshape(-1, 2) for stop in mission.stops)]
+    left, low, right, high = bounds([*paths, np.array(mission.return_ or ()).reshape(-1, 2)])
     reach = mission.scanner.range
     return (left - reach, low - reach, right + reach, high + reach)
 
 
 def plan_states(canvas: Canvas, mission: Mission, drive: Drive) -> None:
-    """What the robot is planned to be doing, and what is tolerated of it, beside what runs tell."""
+    """Draw the planned states of the robot, and the tolerances, next to those of the runs."""
     lane = entities.PLANNED_STATE
     canvas.show(lane, state_colours())
     limits = {entities.METRIC_DEVIATION: [1.0], entities.METRIC_CROSS_TRACK: [1.0, -1.0]}
     for metric, sides in limits.items():
         look = rr.SeriesLines(colors=[palette.FAILED.colour] * len(sides), names=["tolerance"] * len(sides))
-        canvas.show(entities.part(metric, "planned"), look)
+        canvas.show(entities.child(metric, "planned"), look)
     canvas.at(lane, rr.StateChange(state="NAVIGATING"), mission_s=0.0)
     for stop, leaving in zip(mission.stops, drive.leaving_s.tolist(), strict=True):
         scanning = leaving - stop.scan.duration_s
@@ -70,22 +70,22 @@ def plan_states(canvas: Canvas, mission: Mission, drive: Drive) -> None:
             canvas.at(lane, rr.StateChange(state=state), mission_s=seconds)
         for metric, sides in limits.items():
             values = [side * stop.tolerance_m * 1000 for side in sides]
-            canvas.at(entities.part(metric, "planned"), rr.Scalars(values), mission_s=scanning)
-    least = entities.part(entities.METRIC_BATTERY, "planned")
+            canvas.at(entities.child(metric, "planned"), rr.Scalars(values), mission_s=scanning)
+    least = entities.child(entities.METRIC_BATTERY, "planned")
     canvas.show(least, rr.SeriesLines(colors=palette.FAILED.colour, names="least, then home"))
     for seconds in (0.0, float(drive.seconds[-1])):
         canvas.at(least, rr.Scalars(100 * mission.policy.battery_min), mission_s=seconds)
 
 
 def state_colours() -> rr.StateConfiguration:
-    """The colour of every state, for a lane."""
+    """Return the colour of every state, for a lane."""
     return rr.StateConfiguration(
         values=list(palette.STATE_COLOURS), colors=list(palette.STATE_COLOURS.values())
     )
 
 
 def plot_planned_coverage(canvas: Canvas, coverage: FloatArray, drive: Drive) -> None:
-    """Coverage over mission time, if every scan is done as planned; `coverage` after each scan (k,)."""
+    """Plot coverage over mission time if every scan is done as planned; `coverage` after each scan (k,)."""
     seconds = np.concatenate([[0.0], drive.leaving_s])
     planned = entities.COVERAGE_PLANNED
     index = rr.TimeColumn(entities.MISSION_TIME, duration=seconds)
@@ -97,7 +97,7 @@ def plot_planned_coverage(canvas: Canvas, coverage: FloatArray, drive: Drive) ->
 
 
 def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
-    """The planned pose over mission time."""
+    """Draw the planned pose over mission time."""
     index = rr.TimeColumn(entities.MISSION_TIME, duration=drive.seconds)
     xy = canvas.local(drive.poses[:, :2])
     turn = quaternions(drive.poses[:, 2])
@@ -117,7 +117,7 @@ def _draw_route(canvas: Canvas, mission: Mission) -> None:
 
 
 def _draw_network(canvas: Canvas, mission: Mission) -> None:
-    """Pairs of stops whose scans register with one another; those that nothing stands in for in a colour."""
+    """Draw pairs of stops whose scans register; pairs without an alternative have their own colour."""
     network = network_of(mission)
     if network is None or not network.overlaps:
         return
@@ -135,7 +135,7 @@ def _draw_network(canvas: Canvas, mission: Mission) -> None:
 
 
 def legs_of(mission: Mission) -> tuple[list[Leg], list[Colour]]:
-    """Every leg that is driven, the way back last, with its colour."""
+    """Return every driven leg and its colour, the return path last."""
     legs = [stop.approach for stop in mission.stops if len(stop.approach) > 1]
     colours = [palette.ROUTE] * len(legs)
     if mission.return_:
@@ -147,7 +147,7 @@ def legs_of(mission: Mission) -> tuple[list[Leg], list[Colour]]:
 def route_lines(
     canvas: Canvas, legs: Sequence[Leg], colours: Sequence[Colour], *, above: float = 0.0
 ) -> tuple[rr.LineStrips2D, rr.LineStrips3D]:
-    """Legs in 2D and 3D, `above` other legs by that part of a step of ORDER, and as much wider."""
+    """Return legs in 2D and 3D; `above`, a fraction of a step of ORDER, raises and widens them."""
     lines = [np.array(leg) for leg in legs]
     order, size = ORDER["route"] + above, 1 + above
     flat = rr.LineStrips2D(
@@ -183,9 +183,9 @@ def stop_marks(
     labels: Sequence[str] = (),
     above: float = 0.0,
 ) -> StopMarks:
-    """Stops in their own colours and with their names, or in one colour and with labels for pointing.
+    """Return stops in their own colours with their names, or in one colour with labels at the mouse pointer.
 
-    `above` is how far they lie above other stops, as a part of a step of ORDER; they are as much larger.
+    `above` is the distance above other stops, as a fraction of a step of ORDER; the marks are larger by it.
     """
     xy = canvas.local(np.array([(stop.x, stop.y) for stop in stops]))
     heads = strokes.level(xy, HEAD)
@@ -205,7 +205,7 @@ def stop_marks(
 
 
 def _details(mission: Mission) -> rr.AnyValues:
-    """What pointing at a stop tells."""
+    """Details shown at the mouse pointer."""
     return rr.AnyValues(
         doorway=[stop.doorway for stop in mission.stops],
         units=[stop.sees.units for stop in mission.stops],

@@ -1,4 +1,4 @@
-"""Selection: the choice of the stops, one step of the planning story each, and the coverage it reaches."""
+"""Selection: each choice of a stop as a planning step, and the coverage it reaches."""
 
 from __future__ import annotations
 
@@ -16,38 +16,41 @@ from stopgo.recordings.plan.mission import MOST_NAMES
 from stopgo.recordings.plan.story import FIRST_CHOICE, step_of_choice
 
 SKIN = 0.01
-"""How far the painted targets stand clear of the cut walls, so that both are seen."""
+"""Distance of the painted targets from the cut walls, so that both are visible."""
 
 
 def draw_selection(canvas: Canvas, selection: Selection) -> None:
-    """The choice step by step, and what it comes to."""
+    """Draw the choice step by step, and the result."""
     count = len(selection.chosen)
-    lines, first_step = strokes.pieces(selection.visibility.targets, step_of_units(selection))
+    lines, first_step = strokes.lines_by_value(selection.visibility.targets, step_of_units(selection))
     steps = np.arange(count) + FIRST_CHOICE
     _clear_space(canvas)
     _draw_targets(canvas, lines, first_step)
     _draw_seen(canvas, lines, first_step, steps)
     _draw_chosen(canvas, selection, steps)
     _plot_coverage(canvas, selection)
-    canvas.show(entities.COVERAGE, _pieces(canvas, lines, class_ids=_final(first_step, count)))
+    canvas.show(entities.COVERAGE, _target_lines(canvas, lines, class_ids=_final(first_step, count)))
 
 
 def paint_coverage(canvas: Canvas, selection: Selection) -> None:
-    """Targets as upright bands: seen by the stops, unseen, or seen by no candidate."""
+    """Paint targets as upright bands: seen by the stops, unseen, or seen by no candidate."""
     never = len(selection.chosen) + 1
     steps = step_of_units(selection)
     state = np.where(steps < 0, 2, np.where(steps == never, 1, 0))
-    lines, value = strokes.pieces(selection.visibility.targets, state)
+    lines, value = strokes.lines_by_value(selection.visibility.targets, state)
     meanings = {0: ("seen", palette.SEEN), 1: ("unseen", palette.UNSEEN), 2: ("hidden", palette.HIDDEN)}
     for number, (name, meaning) in meanings.items():
         band = [strokes.level(canvas.local(line), CUT + SKIN) for line in lines[value == number]]
         if band:
             shape = rr.LineStrips3D(band, colors=meaning.colour, radii=0.03)
-            canvas.show(entities.part(entities.WORLD_COVERAGE, name), shape)
+            canvas.show(entities.child(entities.WORLD_COVERAGE, name), shape)
 
 
 def step_of_units(selection: Selection) -> IntArray:
-    """The choice, from 1, with which each unit is seen; choices + 1 if with none, -1 if none can see it."""
+    """Return the choice, from 1, at which each unit is first seen enough.
+
+    The value is the number of choices + 1 for a unit that no chosen stop covers, and -1 for an invisible one.
+    """
     visibility = selection.visibility
     never = len(selection.chosen) + 1
     first = np.where(visibility.visible, never, -1)
@@ -61,23 +64,23 @@ def step_of_units(selection: Selection) -> IntArray:
 
 
 def sight_of_row(visibility: Visibility, row: int) -> FloatArray:
-    """What a candidate sees, as lines (k, 2, 2)."""
-    runs = slice(int(visibility.pointer[row]), int(visibility.pointer[row + 1]))
-    parts = (visibility.segment[runs], visibility.first[runs], visibility.last[runs])
-    return strokes.runs(visibility.targets, *parts)
+    """Return what a candidate sees, as lines (k, 2, 2)."""
+    rows = slice(int(visibility.pointer[row]), int(visibility.pointer[row + 1]))
+    parts = (visibility.segment[rows], visibility.first[rows], visibility.last[rows])
+    return strokes.range_lines(visibility.targets, *parts)
 
 
 def _draw_targets(canvas: Canvas, lines: FloatArray, first_step: IntArray) -> None:
-    """All targets, as long as no stop sees them: from the first choice on, what was only marked before."""
+    """Draw all targets from the first choice on: before, they were only outlined."""
     colours = np.where(first_step < 0, palette.HIDDEN.number, palette.UNSEEN.number)
-    shape = _pieces(canvas, lines, class_ids=colours)
+    shape = _target_lines(canvas, lines, class_ids=colours)
     canvas.since(entities.SELECTION_TARGETS, shape, step=FIRST_CHOICE)
 
 
 def _draw_seen(canvas: Canvas, lines: FloatArray, first_step: IntArray, steps: IntArray) -> None:
-    """Each choice adds what it newly sees; views show the rows of all choices so far.
+    """Draw what each choice newly sees; views show the rows of all choices so far.
 
-    What is new stands once more by itself, where a row replaces the one before.
+    A second entity shows only the newest: there, a row replaces the one before.
     """
     order = np.argsort(first_step, kind="stable")
     counts = np.bincount(first_step[first_step > 0], minlength=len(steps) + 2)[1:-1]
@@ -91,27 +94,27 @@ def _draw_seen(canvas: Canvas, lines: FloatArray, first_step: IntArray, steps: I
 
 
 def _so_far(steps: IntArray) -> list[rr.TimeColumn]:
-    """Rows that add up along the story, and are all there on the mission's time."""
+    """Times of rows that accumulate along the planning steps, and are all visible on mission time."""
     return [
         rr.TimeColumn(entities.STEP, sequence=steps),
         rr.TimeColumn(entities.MISSION_TIME, duration=np.zeros(len(steps))),
     ]
 
 
-def _pieces(canvas: Canvas, lines: FloatArray, class_ids: IntArray | None = None) -> rr.LineStrips2D:
+def _target_lines(canvas: Canvas, lines: FloatArray, class_ids: IntArray | None = None) -> rr.LineStrips2D:
     return rr.LineStrips2D(
         canvas.local(lines), class_ids=class_ids, radii=THICK, show_labels=False, draw_order=ORDER["target"]
     )
 
 
 def _final(first_step: IntArray, count: int) -> IntArray:
-    """Class ids when all stops are chosen."""
+    """Return class ids when all stops are chosen."""
     conditions = [first_step < 0, first_step <= count]
     return np.select(conditions, [palette.HIDDEN.number, palette.SEEN.number], palette.UNSEEN.number)
 
 
 def _draw_chosen(canvas: Canvas, selection: Selection, steps: IntArray) -> None:
-    """The stops chosen so far, numbered in the order of choice as long as numbers do not bury the plan."""
+    """Draw the stops chosen so far, numbered in the order of choice unless numbers would cover the plan."""
     stops = entities.SELECTION_STOPS
     numbered = len(steps) <= MOST_NAMES
     labels = [str(number + 1) for number in range(len(steps))]
@@ -135,13 +138,13 @@ def _plot_coverage(canvas: Canvas, selection: Selection) -> None:
     canvas.show(required, rr.SeriesLines(colors=palette.OUTLINE, names="required", widths=1))
     canvas.say(
         f"selection ({selection.method}): {count} stops, coverage {percent(selection.coverage)},"
-        f" at least {selection.bound} are needed{' of all places' if selection.everywhere else ''}",
+        f" at least {selection.bound} are needed{' of all positions' if selection.everywhere else ''}",
         step=step_of_choice(max(count, 1)),
     )
 
 
 def _clear_space(canvas: Canvas) -> None:
-    """Hatches make way for the choices."""
+    """Remove the hatches before the choices."""
     for entity in (entities.DRIVE_AREA, entities.STOP_AREA, entities.TARGETS):
         if entity in canvas.counts:
             canvas.at(entity, rr.LineStrips2D.from_fields(strips=[]), step=FIRST_CHOICE)

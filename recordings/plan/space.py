@@ -11,8 +11,8 @@ from stopgo.mission.stages import NavigableSpace, OpeningState
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas
 from stopgo.recordings.drawing.pens import ORDER, THICK, THIN, Pen, draw
-from stopgo.recordings.plan.floor import say_findings
-from stopgo.recordings.plan.story import SPACE, tell_step
+from stopgo.recordings.plan.floor import log_findings
+from stopgo.recordings.plan.story import SPACE, describe_step
 
 
 def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
@@ -39,9 +39,9 @@ def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
         planning_only=True,
     )
     new = [item for item in space.findings if item not in space.floor.findings]
-    say_findings(canvas, new, step=SPACE)
-    told = f"navigable space: {len(space.rooms)} rooms, {targets.total} target units"
-    tell_step(canvas, SPACE, told, "Blue: where the robot may drive. Green: where it may stop and scan.")
+    log_findings(canvas, new, step=SPACE)
+    title = f"navigable space: {len(space.rooms)} rooms, {targets.total} target units"
+    describe_step(canvas, SPACE, title, "Blue: where the robot may drive. Green: where it may stop and scan.")
 
 
 def _hatch_spacing(floor: FloorPlan) -> float:

@@ -1,4 +1,4 @@
-"""Why each stop stands where it does: told at its step of the story, and stop by stop on another timeline."""
+"""Reasons for each stop: at its planning step, and by stop on a timeline of its own."""
 
 from __future__ import annotations
 
@@ -19,37 +19,37 @@ from stopgo.recordings.drawing.pens import BOLD, ORDER, THICK, THIN, Pen, style
 from stopgo.recordings.plan.drive import Drive
 from stopgo.recordings.plan.mission import legs_of, route_lines
 from stopgo.recordings.plan.selection import sight_of_row
-from stopgo.recordings.plan.story import FIRST_CHOICE, step_of_choice, tell_step
+from stopgo.recordings.plan.story import FIRST_CHOICE, describe_step, step_of_choice
 
 GUIDE = (
     "Choose the timeline `stage_step` at the bottom of the window and drag: floor, navigable space, "
-    "candidates, each stop as it is chosen with the outline of what it sees, and the route. The log says "
-    "what each step is.",
-    "On the timeline `stop`, the tab *Stops* tells of each stop why it is there.",
+    "candidates, each stop as it is chosen with the outline of what it sees, and the route. The log "
+    "describes each step.",
+    "On the timeline `stop`, the tab *Stops* gives the reason for each stop.",
 )
 
 
-def tell_stops(
+def describe_stops(
     canvas: Canvas, route: Route, mission: Mission, reasons: Sequence[StopReason], drive: Drive
 ) -> None:
-    """What each choice was and the route at the end of the story, and each stop by its number."""
+    """Describe each choice and the route by planning step, and each stop by its number."""
     visibility = route.selection.visibility
     seen = [sight_of_row(visibility, item.candidate) for item in reasons]
     eyes = route.xy
     outlines = [sight_outline(eye, lines) for eye, lines in zip(eyes, seen, strict=True)]
-    told = ["\n\n".join(map(plain, item.sentences())) for item in reasons]
+    texts = ["\n\n".join(map(plain, item.sentences())) for item in reasons]
     chosen = np.argsort([item.step for item in reasons]).tolist()
-    _tell_choices(canvas, [reasons[k] for k in chosen], [told[k] for k in chosen])
+    _describe_choices(canvas, [reasons[k] for k in chosen], [texts[k] for k in chosen])
     _draw_outlines(canvas, entities.SELECTION_SIGHT, _steps(len(reasons)), [outlines[k] for k in chosen])
-    _tell_route(canvas, route, mission)
-    index = _on_the_way(drive)
+    _describe_route(canvas, route, mission)
+    index = _stop_times(drive)
     _draw_outlines(canvas, entities.WHY_SIGHT, index, outlines)
     _rows(canvas, entities.WHY_SEEN, index, seen, Pen(palette.SEEN.colour, "seen", THICK))
-    alone = _alone(visibility, [item.candidate for item in reasons])
+    alone = _seen_alone(visibility, [item.candidate for item in reasons])
     _rows(canvas, entities.WHY_ALONE, index, alone, Pen(palette.LOST, "ray", BOLD))
     _draw_stop(canvas, index, eyes, [item.stop for item in reasons])
     _draw_runners(canvas, index, reasons)
-    pages = [f"# Why {plain(item.stop)}?\n\n{text}" for item, text in zip(reasons, told, strict=True)]
+    pages = [f"# Why {plain(item.stop)}?\n\n{text}" for item, text in zip(reasons, texts, strict=True)]
     canvas.columns(entities.STOP_STORY, index, _documents(pages))
 
 
@@ -57,8 +57,8 @@ def _steps(count: int) -> rr.TimeColumn:
     return rr.TimeColumn(entities.STEP, sequence=np.arange(count) + FIRST_CHOICE)
 
 
-def _on_the_way(drive: Drive) -> list[rr.TimeColumn]:
-    """Each stop by its number, and on the mission's time while it is driven to and scanned."""
+def _stop_times(drive: Drive) -> list[rr.TimeColumn]:
+    """Return each stop by its number, and on mission time while it is driven to and scanned."""
     begins = np.concatenate([[0.0], drive.leaving_s[:-1]])
     return [
         rr.TimeColumn(entities.STOP_NUMBER, sequence=np.arange(len(begins)) + 1),
@@ -66,12 +66,12 @@ def _on_the_way(drive: Drive) -> list[rr.TimeColumn]:
     ]
 
 
-def _tell_choices(canvas: Canvas, chosen: Sequence[StopReason], told: Sequence[str]) -> None:
+def _describe_choices(canvas: Canvas, chosen: Sequence[StopReason], texts: Sequence[str]) -> None:
     count = len(chosen)
     titles = [
         f"step {step_of_choice(item.step)}: choice {item.step} of {count} is {item.stop}" for item in chosen
     ]
-    pages = [f"# {plain(title.capitalize())}\n\n{text}" for title, text in zip(titles, told, strict=True)]
+    pages = [f"# {plain(title.capitalize())}\n\n{text}" for title, text in zip(titles, texts, strict=True)]
     lines = rr.TextLog.columns(text=titles, level=["INFO"] * count)
     canvas.columns(entities.LOG_PLAN, _steps(count), lines)
     canvas.columns(entities.STORY, _steps(count), _documents(pages))
@@ -79,12 +79,12 @@ def _tell_choices(canvas: Canvas, chosen: Sequence[StopReason], told: Sequence[s
     canvas.at(entities.STORY, overview, mission_s=0.0, candidate=0, stop=1)
 
 
-def _tell_route(canvas: Canvas, route: Route, mission: Mission) -> None:
+def _describe_route(canvas: Canvas, route: Route, mission: Mission) -> None:
     after = step_of_choice(len(route.order) + 1)
     for entity in (entities.SELECTION_SIGHT, entities.SELECTION_NEW):
         canvas.at(entity, rr.LineStrips2D.from_fields(strips=[]), step=after)
     title = f"route ({route.method}, {route.tour}): {route.length:.2f} m, at least {route.bound:.2f} m"
-    tell_step(canvas, after, title, f"It begins at {route.start_reason}.")
+    describe_step(canvas, after, title, f"It begins at {route.start_reason}.")
     legs, colours = legs_of(mission)
     if legs:
         flat, _ = route_lines(canvas, legs, colours)
@@ -94,13 +94,13 @@ def _tell_route(canvas: Canvas, route: Route, mission: Mission) -> None:
 def _draw_outlines(
     canvas: Canvas, entity: str, index: rr.TimeColumn | list[rr.TimeColumn], outlines: Sequence[FloatArray]
 ) -> None:
-    """One outline a row."""
+    """Draw one outline per row."""
     canvas.columns(entity, index, rr.LineStrips2D.columns(strips=canvas.strips(outlines)))
     style(canvas, entity, Pen(palette.EYE, "ray", THIN))
 
 
-def _alone(visibility: Visibility, rows: Sequence[int]) -> list[FloatArray]:
-    """What of each row's sight is seen from too few others of them, of what is visible, as lines."""
+def _seen_alone(visibility: Visibility, rows: Sequence[int]) -> list[FloatArray]:
+    """Return, per row, the visible units that too few other rows see, as lines."""
     targets = visibility.targets
     sights = [visibility.seen_by(row) for row in rows]
     often: IntArray = np.bincount(np.concatenate(sights), minlength=targets.total)
@@ -109,13 +109,13 @@ def _alone(visibility: Visibility, rows: Sequence[int]) -> list[FloatArray]:
 
 
 def _lines(visibility: Visibility, units: IntArray) -> FloatArray:
-    """Units, ascending, as lines (k, 2, 2): neighbours on a segment in one."""
+    """Return units, ascending, as lines (k, 2, 2); neighbours on a segment form one line."""
     if not len(units):
         return np.empty((0, 2, 2))
     segment = visibility.targets.unit_segment[units]
     new = np.flatnonzero((np.diff(units) != 1) | (np.diff(segment) != 0)) + 1
     first, last = np.concatenate([[0], new]), np.concatenate([new - 1, [len(units) - 1]])
-    return strokes.runs(visibility.targets, segment[first], units[first], units[last])
+    return strokes.range_lines(visibility.targets, segment[first], units[first], units[last])
 
 
 def _rows(
@@ -138,10 +138,10 @@ def _draw_stop(canvas: Canvas, index: list[rr.TimeColumn], eyes: FloatArray, nam
 
 def _draw_runners(canvas: Canvas, index: list[rr.TimeColumn], reasons: Sequence[StopReason]) -> None:
     runners = [runner for item in reasons for runner in item.runners]
-    places = np.array([(runner.x, runner.y) for runner in runners]).reshape(-1, 2)
+    positions = np.array([(runner.x, runner.y) for runner in runners]).reshape(-1, 2)
     labels = [f"{runner.new:.1f}" for runner in runners]
     counts = [len(item.runners) for item in reasons]
-    columns = rr.Points2D.columns(positions=canvas.local(places), labels=labels).partition(counts)
+    columns = rr.Points2D.columns(positions=canvas.local(positions), labels=labels).partition(counts)
     canvas.columns(entities.WHY_RUNNERS, index, columns)
     look = rr.Points2D.from_fields(
         colors=palette.RUNNER_UP, radii=on_screen(4), draw_order=ORDER["stop"], show_labels=True

@@ -13,17 +13,17 @@ from stopgo.recordings.drawing.pens import BOLD, HAIR, ORDER, Pen, style
 from stopgo.recordings.plan.story import CANDIDATES
 
 MOST_FANS = 5000
-"""With more candidates than these their rays, most of a large floor's recording, are left out."""
+"""Number of candidates above which rays are left out: they are most of a large floor's recording."""
 
 
 def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
-    """What each candidate sees, as rows on the candidate timeline: its position, rays, and seen pieces."""
+    """Draw what each candidate sees on the candidate timeline: its position, rays and visible lines."""
     if not visibility.rows:
         return
     index = rr.TimeColumn(entities.CANDIDATE, sequence=np.arange(visibility.rows))
     eyes = visibility.candidates.xy[visibility.candidates.kept]
     counts = np.diff(visibility.pointer)
-    seen = strokes.runs(visibility.targets, visibility.segment, visibility.first, visibility.last)
+    seen = strokes.range_lines(visibility.targets, visibility.segment, visibility.first, visibility.last)
     if visibility.rows <= MOST_FANS:
         fans = np.stack([seen[:, 0], np.repeat(eyes, counts, axis=0), seen[:, 1]], axis=1)
         _rows_of_lines(canvas, entities.RAYS, index, fans, counts)
@@ -37,8 +37,8 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     )
     _plot_sight(canvas, visibility, index)
     visible = int(visibility.visible.sum())
-    told = f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any"
-    canvas.say(told, step=CANDIDATES)
+    text = f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any"
+    canvas.say(text, step=CANDIDATES)
 
 
 def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) -> None:

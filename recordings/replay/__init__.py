@@ -1,1 +1,1 @@
-"""A robot's own log laid beside the mission it was to drive: placed, its stand-stills matched, compared."""
+"""Comparison of a robot's own log with its mission: placing, matching of standstills, verdict."""

@@ -1,4 +1,4 @@
-"""Writes replays as one recording, on the axes, entities and timelines of plans and runs."""
+"""Replays as one recording, with the axes, entities and timelines of plans and runs."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.runs.field import FieldRecording
 
 STEP_M, STEP_RAD, STEP_S = 0.02, math.radians(2.0), 2.0
-"""A pose that is as near as this to the one before is left out."""
+"""Limits below which a pose counts as equal to the one before and is left out."""
 
 
 def write_recording(replays: Sequence[Replay], path: Path) -> None:
-    """Draw every run; opened together with the plan's recording they lie on one another."""
+    """Draw every run; opened together with the plan's recording, they overlay."""
     with FieldRecording(path, replays[0].mission) as recording:
         for replay in replays:
             for report in _reports(replay):
@@ -28,21 +28,21 @@ def write_recording(replays: Sequence[Replay], path: Path) -> None:
 
 
 def _reports(replay: Replay) -> Iterator[PoseReport | StateReport | AnyEvent]:
-    """Poses and events in order of time; a state with each event."""
+    """Yield poses and events in order of time; a state with each event."""
     events = list(replay.run.events)
     began = replay.run.began_ns or 0
     for pose in _poses(replay, began):
         while events and events[0].robot_ns <= pose.robot_ns:
-            yield from _told(replay, events.pop(0))
+            yield from _event_and_state(replay, events.pop(0))
         yield pose
     for event in events:
-        yield from _told(replay, event)
+        yield from _event_and_state(replay, event)
 
 
-def _told(replay: Replay, event: AnyEvent) -> Iterator[StateReport | AnyEvent]:
+def _event_and_state(replay: Replay, event: AnyEvent) -> Iterator[StateReport | AnyEvent]:
     yield event
     kind = type(event).__name__
-    battery = [share for ns, share in replay.log.battery if ns <= event.robot_ns]
+    battery = [fraction for ns, fraction in replay.log.battery if ns <= event.robot_ns]
     yield StateReport(
         robot=event.robot, boot_id="", seq=event.number, robot_ns=event.robot_ns,
         state="FINISHED" if kind == "Finished" else "ABORTED" if kind == "Aborted" else "RUNNING",
@@ -53,7 +53,7 @@ def _told(replay: Replay, event: AnyEvent) -> Iterator[StateReport | AnyEvent]:
 
 
 def _poses(replay: Replay, began_ns: int) -> Iterator[PoseReport]:
-    """Those that differ from the one before."""
+    """Yield the poses that differ from the one before."""
     track, run = replay.run.poses, replay.run
     last: tuple[float, float, float, int] | None = None
     rows = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""A telemetry log of a vehicle that drove our mission by itself -> the events of its run, as told live."""
+"""Events of a run from the telemetry log of a vehicle that drove our mission by itself, as in a live run."""
 
 from __future__ import annotations
 
@@ -18,14 +18,19 @@ from stopgo.recordings.replay.log_placing import PlacedLog
 from stopgo.recordings.replay.uploaded import differences
 
 
-def followed_events(log: FieldLog, mission: Mission, laid: PlacedLog) -> tuple[AnyEvent, ...]:
-    """What is seen of the vehicle's newest run of the mission; nothing, where it cannot be followed.
+def followed_events(log: FieldLog, mission: Mission, placed_log: PlacedLog) -> tuple[AnyEvent, ...]:
+    """Return the events of the vehicle's newest run of the mission; none if it cannot be followed.
 
-    It can where the log holds our mission as the vehicle was given it, and poses that are placed by the
-    earth, as the vehicle's items are.
+    That needs our mission as uploaded to the vehicle, and poses placed by latitude and longitude, like its
+    items.
     """
-    system = laid.source.robot
-    if log.format != FORMAT or mission.georeference is None or not laid.by_earth or not system.isdigit():
+    system = placed_log.source.robot
+    if (
+        log.format != FORMAT
+        or mission.georeference is None
+        or not placed_log.by_earth
+        or not system.isdigit()
+    ):
         return ()
     newest: tuple[AnyEvent, ...] = ()
     for number, upload in enumerate(log.uploads):
@@ -33,13 +38,13 @@ def followed_events(log: FieldLog, mission: Mission, laid: PlacedLog) -> tuple[A
         if listed is None:
             continue
         until = log.uploads[number + 1].ns if number + 1 < len(log.uploads) else log.end_ns + 1
-        events = _followed(log, listed, upload, until, int(system), laid.alignment.time_offset_ns)
+        events = _followed(log, listed, upload, until, int(system), placed_log.alignment.time_offset_ns)
         newest = events or newest
     return newest
 
 
 def _listed(upload: LoggedMission, mission: Mission) -> ListedMission | None:
-    """Which of its items belong to which of our stops; None where it is another mission."""
+    """Return the mission's stops by the vehicle's items; None for another mission."""
     assert mission.georeference is not None
     if any(differences(upload, mission)):
         return None
@@ -53,18 +58,18 @@ def _listed(upload: LoggedMission, mission: Mission) -> ListedMission | None:
 def _followed(
     log: FieldLog, listed: ListedMission, upload: LoggedMission, until_ns: int, system: int, offset_ns: int
 ) -> tuple[AnyEvent, ...]:
-    """The events of the newest run between two uploads in which a stop was reached."""
+    """Return the events of the newest run between two uploads in which a stop was reached."""
     run = FollowedRun(
         listed, autopilot_named(upload.autopilot), name=f"replay-{log.digest[:12]}", robot=str(system)
     )
     last_ns = upload.ns
-    for heard in messages_of(Path(log.path)):
-        if heard.system != system or heard.ns >= until_ns:
+    for received in messages_of(Path(log.path)):
+        if received.system != system or received.ns >= until_ns:
             continue
-        if heard.ns < upload.ns:
-            run.take_earlier(heard.message, heard.ns + offset_ns)
+        if received.ns < upload.ns:
+            run.take_earlier(received.message, received.ns + offset_ns)
         else:
-            last_ns = heard.ns
-            run.take(heard.message, heard.ns + offset_ns)
+            last_ns = received.ns
+            run.take(received.message, received.ns + offset_ns)
     run.end(last_ns + offset_ns)
     return tuple(run.events) if any(isinstance(event, Arrived) for event in run.events) else ()

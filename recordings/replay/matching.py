@@ -1,8 +1,8 @@
-"""Which halt was at which planned stop: in the order of the mission, with stops skipped, repeated and added.
+"""Matching of standstills to planned stops, in the mission's order, with skipped, repeated and extra ones.
 
-Of all ways to read the halts as a drive along the mission the one of least cost is taken (dynamic
-programming). A halt costs its squared distance from its stop, in shares of the reach; one that belongs to no
-stop, one at a stop that was visited before, and each stop that is left out cost what is said below.
+Of all readings of the standstills as a drive along the mission, the one of least cost is chosen (dynamic
+programming). A standstill costs its squared distance from its stop, as a fraction of the reach. Extra
+standstills, repeated visits and skipped stops have the costs below.
 """
 
 from __future__ import annotations
@@ -16,147 +16,148 @@ import numpy as np
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.run.run_log import Track
-from stopgo.recordings.replay.standstills import Standing
+from stopgo.recordings.replay.standstills import Standstill
 
-HaltKind = Literal["visit", "again", "back", "extra"]
+VisitKind = Literal["visit", "again", "back", "extra"]
 EXTRA, SKIP, PASSED, AGAIN, BACK = 1.0, 0.4, 0.1, 0.05, 0.6
-"""Of a halt at no stop, of each stop left out, of each left out that the robot passed, of one more halt at
-the same stop, of going back to one."""
+"""Costs of: an extra standstill, a skipped stop, a skipped stop on the path, a repetition, a return."""
 REACH_M, LEAST_REACH_M = 1.0, 0.3
-"""A halt is at a stop only if it is nearer; where stops stand closely, half their distance counts."""
+"""Largest distance of a standstill from its stop, and its least value where stops are close together."""
 
 ENOUGH = 0.9
-"""Of a scan's duration: who stood that long may have scanned."""
+"""Fraction of a scan's duration from which on a robot may have scanned."""
 SLACK_S = 1.0
-"""What is missing at a halt's ends because a robot brakes and starts."""
+"""Time missing at a standstill's ends, because the robot brakes and starts."""
 LEAST_VISITS, NEIGHBOURS = 4, 4
-"""Drift is told from so many visits at least, and at each halt from so many of them."""
+"""Number of visits needed to estimate drift, and of neighbours used at each standstill."""
 AGAIN_REACH_M = 0.25
-"""A halt at a stop that was visited before must be nearer than this."""
+"""Largest distance of a repeated standstill from a visited stop."""
 PASSES = 8
 MOST_POSES = 50_000
-"""Of longer tracks every so many-th pose is looked at to see which stops were passed."""
+"""Limit of poses examined for passed stops; of longer tracks, only every n-th pose is examined."""
 
 
 @dataclass(frozen=True)
 class Match:
-    """What one halt was."""
+    """Meaning of one standstill."""
 
-    standing: Standing
-    how: HaltKind
+    standstill: Standstill
+    how: VisitKind
     stop: int | None
-    """Index into the mission's stops; None of an extra halt."""
+    """Index into the mission's stops; None for an extra standstill."""
     away_m: float
     """Distance from that stop, or from the nearest one."""
     near: int
     """Index of the nearest stop."""
 
 
-def matched(halts: Sequence[Standing], mission: Mission, track: Track | None = None) -> tuple[Match, ...]:
-    """What each halt was, in order of time.
+def matched(
+    standstills: Sequence[Standstill], mission: Mission, track: Track | None = None
+) -> tuple[Match, ...]:
+    """Return the meaning of each standstill, in order of time.
 
-    Where visits lie off their stops all to one side, as when odometry has drifted, halts are matched once
-    more without that; how far they were off stays as it was measured. Stops near which the `track` came
-    are passed by more lightly than those where the robot never was.
+    If visits lie off their stops all to one side, as when odometry has drifted, matching is repeated
+    without that drift; the reported distances still contain it. A skipped stop on the path of the `track`
+    costs less.
     """
     stops = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
-    if not len(halts) or not len(stops):
+    if not len(standstills) or not len(stops):
         return ()
-    places, reach = np.array([halt.xy for halt in halts]), reaches(mission)
-    skips = _skips(halts, stops, reach, track)
-    drift = np.zeros(places.shape)
-    readings: list[tuple[HaltKind, int | None]] = []
+    positions, reach = np.array([standstill.xy for standstill in standstills]), reaches(mission)
+    skips = _skips(standstills, stops, reach, track)
+    drift = np.zeros(positions.shape)
+    readings: list[tuple[VisitKind, int | None]] = []
     for _ in range(PASSES):
         before = readings
-        more = _costs_again(before, places, places - drift, stops)
-        readings = _least(_costs(places - drift, stops, reach), more, skips)
+        more = _costs_again(before, positions, positions - drift, stops)
+        readings = _least(_costs(positions - drift, stops, reach), more, skips)
         if readings == before:
             break
-        drift = _drift(readings, places, stops)
-    away = np.hypot(*(places[:, None] - stops[None]).transpose(2, 0, 1))
+        drift = _drift(readings, positions, stops)
+    away = np.hypot(*(positions[:, None] - stops[None]).transpose(2, 0, 1))
     return tuple(
-        Match(halt, how, stop, float(row[row.argmin() if stop is None else stop]), int(row.argmin()))
-        for halt, (how, stop), row in zip(halts, readings, away, strict=True)
+        Match(standstill, how, stop, float(row[row.argmin() if stop is None else stop]), int(row.argmin()))
+        for standstill, (how, stop), row in zip(standstills, readings, away, strict=True)
     )
 
 
 def _skips(
-    halts: Sequence[Standing], stops: FloatArray, reach: FloatArray, track: Track | None
+    standstills: Sequence[Standstill], stops: FloatArray, reach: FloatArray, track: Track | None
 ) -> FloatArray:
-    """What it costs to have passed by each stop until each halt (halts, stops)."""
+    """Return the cost of having skipped each stop before each standstill (standstills, stops)."""
     if track is None:
-        return np.full((len(halts), len(stops)), SKIP)
+        return np.full((len(standstills), len(stops)), SKIP)
     thin = slice(None, None, max(1, len(track) // MOST_POSES))
     xy, ns = track.xy[thin], track.ns[thin]
     first = np.full(len(stops), np.iinfo(np.int64).max)
-    for k, place in enumerate(stops):
-        near = np.flatnonzero(np.hypot(*(xy - place).T) <= reach[k])
+    for k, position in enumerate(stops):
+        near = np.flatnonzero(np.hypot(*(xy - position).T) <= reach[k])
         first[k] = ns[near[0]] if len(near) else first[k]
-    begins = np.array([halt.begin_ns for halt in halts])
+    begins = np.array([standstill.begin_ns for standstill in standstills])
     return np.where(first[None, :] < begins[:, None], PASSED, SKIP)
 
 
-def long_enough(halt: Standing, stop: Stop) -> bool:
-    """Whether a robot that stood so long may have scanned."""
-    return halt.seconds >= ENOUGH * (stop.settle_s + stop.scan.duration_s) - SLACK_S
+def long_enough(standstill: Standstill, stop: Stop) -> bool:
+    """True if a standstill was long enough for a scan."""
+    return standstill.seconds >= ENOUGH * (stop.settle_s + stop.scan.duration_s) - SLACK_S
 
 
-def _costs(places: FloatArray, stops: FloatArray, reach: FloatArray) -> FloatArray:
-    """Squared distance of each halt from each stop in shares of the reach; infinite beyond it."""
-    share = np.hypot(*(places[:, None] - stops[None]).transpose(2, 0, 1)) / reach
-    return np.where(share <= 1.0, share**2, np.inf)
+def _costs(positions: FloatArray, stops: FloatArray, reach: FloatArray) -> FloatArray:
+    """Squared distance of each standstill from each stop, in fractions of the reach; infinite beyond it."""
+    fraction = np.hypot(*(positions[:, None] - stops[None]).transpose(2, 0, 1)) / reach
+    return np.where(fraction <= 1.0, fraction**2, np.inf)
 
 
 def _costs_again(
-    readings: Sequence[tuple[HaltKind, int | None]],
-    places: FloatArray,
+    readings: Sequence[tuple[VisitKind, int | None]],
+    positions: FloatArray,
     driftless: FloatArray,
     stops: FloatArray,
 ) -> FloatArray:
-    """What it costs that a halt is one more at a stop: near the stop, or near where the robot stood there."""
+    """Return the cost of a repeated standstill: near the stop, or near an earlier standstill there."""
     costs = _costs(driftless, stops, np.full(len(stops), AGAIN_REACH_M))
     for k, (how, stop) in enumerate(readings):
         if how == "visit" and stop is not None:
-            beside = _costs(places, places[k : k + 1], np.array([AGAIN_REACH_M]))[:, 0]
-            costs[:, stop] = np.minimum(costs[:, stop], beside)
+            repeat = _costs(positions, positions[k : k + 1], np.array([AGAIN_REACH_M]))[:, 0]
+            costs[:, stop] = np.minimum(costs[:, stop], repeat)
     return costs
 
 
 def _drift(
-    readings: Sequence[tuple[HaltKind, int | None]], places: FloatArray, stops: FloatArray
+    readings: Sequence[tuple[VisitKind, int | None]], positions: FloatArray, stops: FloatArray
 ) -> FloatArray:
-    """HaltKind far the visits around each halt lie off their stops, itself left out (n, 2)."""
+    """Return the offset of the visits around each standstill from their stops, without its own (n, 2)."""
     visits = np.array([k for k, (how, _) in enumerate(readings) if how == "visit"], np.int64)
-    drift = np.zeros(places.shape)
+    drift = np.zeros(positions.shape)
     if len(visits) < LEAST_VISITS:
         return drift
-    off = np.array([places[k] - stops[readings[k][1] or 0] for k in visits])
-    for k in range(len(places)):
+    offsets = np.array([positions[k] - stops[readings[k][1] or 0] for k in visits])
+    for k in range(len(positions)):
         others = np.flatnonzero(visits != k)
         near = others[np.argsort(np.abs(visits[others] - k), kind="stable")[:NEIGHBOURS]]
-        drift[k] = np.median(off[near], axis=0)
+        drift[k] = np.median(offsets[near], axis=0)
     return drift
 
 
 def reaches(mission: Mission) -> FloatArray:
-    """HaltKind far from each stop a halt may be to be at it (n,), metres."""
+    """Return the largest distance of a standstill from each stop (n,), metres."""
     stops = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
     apart = np.hypot(*(stops[:, None] - stops[None]).transpose(2, 0, 1))
-    apart[apart < LEAST_REACH_M] = np.inf  # stops at one place are told apart by their order alone
+    apart[apart < LEAST_REACH_M] = np.inf  # stops at one position differ only by their order
     return np.clip(apart.min(axis=1) / 2, LEAST_REACH_M, REACH_M)
 
 
-def _least(visits: FloatArray, more: FloatArray, skips: FloatArray) -> list[tuple[HaltKind, int | None]]:
-    """The reading of least cost, by what it costs that a halt is a first visit of a stop, is one more, and
-    that the stop is passed by until then, each (halts, stops).
+def _least(visits: FloatArray, more: FloatArray, skips: FloatArray) -> list[tuple[VisitKind, int | None]]:
+    """Return the reading of least cost.
 
-    `best[k]` is the least cost of the halts so far, `k` stops of the mission being behind, the last of
-    them visited (0: none yet).
+    The arguments are costs, each (standstills, stops): that a standstill is the first visit of a stop, that
+    it is a repetition, and that the stop is skipped before it. `best[k]` is the least cost of the standstills
+    so far if `k` stops of the mission are done and the last of them was visited (0: none yet).
     """
     count = visits.shape[1]
     best = np.full(count + 1, np.inf)
     best[0] = 0.0
-    came: list[tuple[np.ndarray, ...]] = []
+    history: list[tuple[np.ndarray, ...]] = []
     for row, nearer, skip in zip(visits, more, skips, strict=True):
         passed = np.concatenate([[0.0], np.cumsum(skip)])[:-1]
         ahead, source = _running_least(best[:-1] - passed)
@@ -166,27 +167,27 @@ def _least(visits: FloatArray, more: FloatArray, skips: FloatArray) -> list[tupl
         back = best + BACK + earlier
         options = np.stack([best + EXTRA, np.concatenate([[np.inf], visit]), again, back])
         choice = options.argmin(axis=0)
-        came.append((choice, np.concatenate([[0], source]), back_to - 2))
+        history.append((choice, np.concatenate([[0], source]), back_to - 2))
         best = options.min(axis=0)
-    return _traced(came, int((best - 1e-9 * np.arange(count + 1)).argmin()))
+    return _trace_back(history, int((best - 1e-9 * np.arange(count + 1)).argmin()))
 
 
 def _running_least(values: FloatArray) -> tuple[FloatArray, np.ndarray]:
-    """The least value so far, and where it stands, the last of equals."""
+    """Return the least value so far, and its index, the last of equal values."""
     least = np.minimum.accumulate(values)
     at = np.where(values <= least, np.arange(len(values)), 0)
     return least, np.maximum.accumulate(at)
 
 
-def _traced(came: list[tuple[np.ndarray, ...]], behind: int) -> list[tuple[HaltKind, int | None]]:
-    """The choices from the last halt back to the first, then in order."""
-    readings: list[tuple[HaltKind, int | None]] = []
-    for choice, source, back_to in reversed(came):
-        how = HOWS[int(choice[behind])]
-        stop = {"extra": None, "back": int(back_to[behind])}.get(how, behind - 1)
+def _trace_back(history: list[tuple[np.ndarray, ...]], done: int) -> list[tuple[VisitKind, int | None]]:
+    """Return the choices in order; they are traced from the last standstill back to the first."""
+    readings: list[tuple[VisitKind, int | None]] = []
+    for choice, source, back_to in reversed(history):
+        how = KINDS[int(choice[done])]
+        stop = {"extra": None, "back": int(back_to[done])}.get(how, done - 1)
         readings.append((how, stop))
-        behind = int(source[behind]) if how == "visit" else behind
+        done = int(source[done]) if how == "visit" else done
     return readings[::-1]
 
 
-HOWS: tuple[HaltKind, ...] = ("extra", "visit", "again", "back")
+KINDS: tuple[VisitKind, ...] = ("extra", "visit", "again", "back")

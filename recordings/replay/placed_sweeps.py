@@ -1,4 +1,4 @@
-"""A log's laser scans in the mission's frame: those that were made while the robot stood."""
+"""Laser scans of a log in the mission's frame, made while the robot was stationary."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.recordings.logs.field_log import Sweep
-from stopgo.recordings.replay.fitting import turning
+from stopgo.recordings.replay.fitting import rotation
 from stopgo.recordings.replay.replayed import Replay
 
 BAND_M = 1.0
-"""Points of a cloud that lie farther above or below the scanner than this are of floors and ceilings."""
+"""Height in metres from the scanner beyond which points are of floors and ceilings."""
 
 
 def placed_sweeps(replay: Replay) -> Iterator[FloatArray]:
-    """Points (n, 2) of each scan that was made during a halt; of all where the robot never halted."""
+    """Yield points (n, 2) of each scan made during a standstill; of all scans if there is no standstill."""
     offset = replay.placed.alignment.time_offset_ns
     mounts = {name: (x, y, heading) for name, x, y, heading in replay.log.mounts}
     for sweep in replay.log.sweeps():
@@ -26,11 +26,11 @@ def placed_sweeps(replay: Replay) -> Iterator[FloatArray]:
 
 
 def _pose(replay: Replay, ns: int) -> tuple[float, float, float] | None:
-    """Where the robot stood then: the middle pose of its halt, or of no halts at all the newest pose."""
+    """Return the robot's pose: the median of the standstill, or without standstills the newest pose."""
     for match in replay.matches:
-        halt = match.standing
-        if halt.begin_ns <= ns <= halt.end_ns:
-            return (halt.x, halt.y, halt.heading)
+        standstill = match.standstill
+        if standstill.begin_ns <= ns <= standstill.end_ns:
+            return (standstill.x, standstill.y, standstill.heading)
     if replay.matches:
         return None
     track = replay.run.poses
@@ -43,6 +43,6 @@ def _pose(replay: Replay, ns: int) -> tuple[float, float, float] | None:
 
 def _placed(sweep: Sweep, mount: tuple[float, float, float], pose: tuple[float, float, float]) -> FloatArray:
     band = np.abs(sweep.xyz[:, 2]) <= BAND_M
-    on_robot = sweep.xyz[band, :2] @ turning(mount[2]).T + mount[:2]
-    placed: FloatArray = on_robot @ turning(pose[2]).T + pose[:2]
+    on_robot = sweep.xyz[band, :2] @ rotation(mount[2]).T + mount[:2]
+    placed: FloatArray = on_robot @ rotation(pose[2]).T + pose[:2]
     return placed

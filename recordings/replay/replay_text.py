@@ -1,4 +1,4 @@
-"""A replay as a person reads it on a terminal, as one JSON object, and as a table of stops."""
+"""Replay as text for a terminal, as one JSON object, and as a table of stops."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from stopgo.mission.console.table import printable, table
 from stopgo.mission.run.run_log import Alignment
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.logs.field_log import FieldLog
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import drive_verdict
+from stopgo.recordings.replay.path_and_time import driven_path, lost_times
 from stopgo.recordings.replay.replayed import Replay
-from stopgo.recordings.replay.way_and_time import lost_times, way_of
 
 MOST_LOST = 5
-"""Places where time was lost that are listed on a terminal; --json has all."""
+"""Limit of listed causes of lost time on a terminal; --json has all."""
 
 
 def as_text(replay: Replay) -> str:
-    """The stops, the way, the time, and the answer."""
-    judgement = judged(replay)
+    """Return the stops, the path, the time, and the verdict."""
+    judgement = drive_verdict(replay)
     lines = [
         _head(replay.log),
         f"  poses      {replay.placed.source.source}, {len(replay.placed.track)} of them",
@@ -34,7 +34,7 @@ def as_text(replay: Replay) -> str:
         *(f"  {line}" for line in comparison_table(replay.comparison).split("\n")),
         "",
         *truth_lines(replay),
-        *way_lines(replay),
+        *path_lines(replay),
         *(f"  time lost  {item.seconds:+7.1f} s  {item.where}" for item in lost_times(replay)[:MOST_LOST]),
         *_sight(replay),
         *measured_lines(replay),
@@ -48,54 +48,56 @@ def _head(log: FieldLog) -> str:
 
 
 def alignment_text(alignment: Alignment | None) -> str:
-    """How the log was brought to the mission's frame, in a line."""
+    """Return the log's transform to the mission's frame, in one line."""
     if alignment is None:
-        return "as it is"
-    moved = (
-        f"turned {math.degrees(alignment.heading):.2f}°, then shifted by "
+        return "unchanged"
+    transform = (
+        f"rotated {math.degrees(alignment.heading):.2f}°, then shifted by "
         f"({alignment.x:.3f}, {alignment.y:.3f}) m; times {alignment.time_offset_ns / 1e9:+.3f} s"
     )
     if alignment.residual_rms_m is None or alignment.residual_max_m is None:
-        return f"{alignment.how}: {moved}"
-    rest = f"{1000 * alignment.residual_rms_m:.0f} mm rms, {1000 * alignment.residual_max_m:.0f} mm at most"
-    return f"{alignment.how}: {moved}; what is left is {rest}"
+        return f"{alignment.how}: {transform}"
+    residuals = (
+        f"{1000 * alignment.residual_rms_m:.0f} mm rms, {1000 * alignment.residual_max_m:.0f} mm at most"
+    )
+    return f"{alignment.how}: {transform}; residuals {residuals}"
 
 
 def notes_of(replay: Replay) -> tuple[str, ...]:
-    """What is odd about the log, and how missions in it differ from ours."""
+    """Return anomalies of the log, and differences between missions in it and ours."""
     lost = (f"DAMAGED: {replay.log.lost}",) if replay.log.lost else ()
-    turns = (
-        () if replay.placed.turns else ("no headings in the log: the direction of driving stands for them",)
+    headings_note = (
+        () if replay.placed.turns else ("no headings in the log; the direction of driving is used",)
     )
-    return (*lost, *replay.log.oddities, *replay.placed.source.oddities, *turns, *replay.uploads)
+    return (*lost, *replay.log.oddities, *replay.placed.source.oddities, *headings_note, *replay.uploads)
 
 
 def truth_lines(replay: Replay) -> list[str]:
-    """By a simulator's word, where it stood."""
+    """Return the true position errors, if the log is from a simulator."""
     offsets = [(stop.id, replay.true_offset_m(k)) for k, stop in enumerate(replay.mission.stops)]
-    told = [f"{name} {1000 * away:.0f} mm" for name, away in offsets if away is not None]
-    return [f"  in truth   {', '.join(told)}"] if told else []
+    errors = [f"{name} {1000 * away:.0f} mm" for name, away in offsets if away is not None]
+    return [f"  true error {', '.join(errors)}"] if errors else []
 
 
-def way_lines(replay: Replay) -> list[str]:
-    way = way_of(replay)
-    if way.driven_m is None or way.extra_m is None:
-        return [f"  way        not in the log; {way.planned_m:.1f} m planned to the last stop visited"]
+def path_lines(replay: Replay) -> list[str]:
+    path = driven_path(replay)
+    if path.driven_m is None or path.extra_m is None:
+        return [f"  path       not in the log; {path.planned_m:.1f} m planned to the last stop visited"]
     lines = [
-        f"  way        {way.driven_m:.1f} m driven, {way.planned_m:.1f} m planned to the last stop visited "
-        f"({way.extra_m:+.1f} m)"
+        f"  path       {path.driven_m:.1f} m driven, {path.planned_m:.1f} m planned to the last stop visited "
+        f"({path.extra_m:+.1f} m)"
     ]
-    if way.rms_m is not None and way.mean_m is not None:
+    if path.rms_m is not None and path.mean_m is not None:
         lines.append(
-            f"  beside     mean {1000 * way.mean_m:+.0f} mm (left positive), rms {1000 * way.rms_m:.0f}, "
-            f"median {1000 * (way.median_m or 0):.0f}, 95 % below {1000 * (way.p95_m or 0):.0f}, "
-            f"greatest {1000 * (way.greatest_m or 0):.0f} mm at {way.greatest_s or 0:.1f} s"
+            f"  off route  mean {1000 * path.mean_m:+.0f} mm (left positive), rms {1000 * path.rms_m:.0f}, "
+            f"median {1000 * (path.median_m or 0):.0f}, 95 % below {1000 * (path.p95_m or 0):.0f}, "
+            f"greatest {1000 * (path.greatest_m or 0):.0f} mm at {path.greatest_s or 0:.1f} s"
         )
     return lines
 
 
 def _sight(replay: Replay) -> list[str]:
-    """What was in sight, least seen first, beside the plan."""
+    """Return the visible fractions, lowest first, next to those planned."""
     if replay.sight is None:
         return []
     rows = [
@@ -108,12 +110,12 @@ def _sight(replay: Replay) -> list[str]:
         )
         for planned, share in replay.sight.pairs
     ]
-    lines = table(("in sight", "planned %", "as driven %", "asked %"), rows).split("\n")
+    lines = table(("visible", "planned %", "as driven %", "required %"), rows).split("\n")
     return ["", *(f"  {line}" for line in lines), ""]
 
 
 def measured_lines(replay: Replay) -> list[str]:
-    """What the scans show."""
+    """Return the measurements of the scans."""
     found = replay.measured
     if found is None:
         return []
@@ -136,8 +138,8 @@ def measured_lines(replay: Replay) -> list[str]:
 
 
 def as_json(replay: Replay) -> dict[str, Any]:
-    """Everything, for programs: metres, radians and seconds."""
-    judgement, alignment = judged(replay), replay.run.alignment
+    """Return everything, for programs: metres, radians and seconds."""
+    judgement, alignment = drive_verdict(replay), replay.run.alignment
     return {
         "log": replay.log.path,
         "format": replay.log.format,
@@ -149,9 +151,9 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "inferred": replay.inferred,
         "answer": judgement.answer,
         "verdict": judgement.text,
-        "way": {**vars(way_of(replay)), "extra_m": way_of(replay).extra_m},
+        "way": {**vars(driven_path(replay)), "extra_m": driven_path(replay).extra_m},
         "time_lost": [vars(item) for item in lost_times(replay)],
-        "halts": [_halt_json(replay, k) for k in range(len(replay.matches))],
+        "halts": [_standstill_json(replay, k) for k in range(len(replay.matches))],
         "true_offset_m": {stop.id: replay.true_offset_m(k) for k, stop in enumerate(replay.mission.stops)},
         "coverage": None if replay.sight is None else _sight_json(replay.sight),
         "measured": None if replay.measured is None else _measured_json(replay.measured),
@@ -194,10 +196,10 @@ def _measured_json(found: Measured) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _halt_json(replay: Replay, number: int) -> dict[str, Any]:
+def _standstill_json(replay: Replay, number: int) -> dict[str, Any]:
     match = replay.matches[number]
-    halt, stops = match.standing, replay.mission.stops
-    begin, end = replay.run.seconds([halt.begin_ns, halt.end_ns]).tolist()
+    standstill, stops = match.standstill, replay.mission.stops
+    begin, end = replay.run.seconds([standstill.begin_ns, standstill.end_ns]).tolist()
     return {
         "how": match.how,
         "stop": None if match.stop is None else stops[match.stop].id,
@@ -205,10 +207,10 @@ def _halt_json(replay: Replay, number: int) -> dict[str, Any]:
         "away_m": match.away_m,
         "begin_s": begin,
         "end_s": end,
-        "x": halt.x,
-        "y": halt.y,
-        "heading": halt.heading,
-        "moved_m": halt.moved_m,
+        "x": standstill.x,
+        "y": standstill.y,
+        "heading": standstill.heading,
+        "moved_m": standstill.moved_m,
     }
 
 
@@ -219,21 +221,25 @@ COLUMNS = (
 
 
 def as_csv(replay: Replay) -> bytes:
-    """A row per stop: what was planned and what was, how long the robot stood, and how it moved meanwhile."""
+    """Return a row per stop: plan and result, dwell time, and movement during it."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow((*COLUMNS, "stood_s", "moved_m", "true_offset_m"))
     numbers = {stop.id: k for k, stop in enumerate(replay.mission.stops)}
     for item in replay.comparison.asked:
-        halts = replay.at(numbers[item.stop])
-        stood = (halts[-1].standing.seconds, halts[-1].standing.moved_m) if halts else (None, None)
-        cells = (*(getattr(item, name) for name in COLUMNS), *stood, replay.true_offset_m(numbers[item.stop]))
+        standstills = replay.at(numbers[item.stop])
+        dwell = (
+            (standstills[-1].standstill.seconds, standstills[-1].standstill.moved_m)
+            if standstills
+            else (None, None)
+        )
+        cells = (*(getattr(item, name) for name in COLUMNS), *dwell, replay.true_offset_m(numbers[item.stop]))
         writer.writerow("" if cell is None else _cell(cell) for cell in cells)
     return text.getvalue().encode()
 
 
 def _cell(value: object) -> str:
-    """Numbers to a tenth of a millimetre; no text that a spreadsheet would take for a formula."""
+    """Return numbers to a tenth of a millimetre, and texts that no spreadsheet reads as a formula."""
     if isinstance(value, float):
         return f"{value:.4f}"
     text = printable(str(value))

@@ -1,4 +1,4 @@
-"""A log laid beside its mission, whole: what `stopgo replay` knows of one log."""
+"""Replay: one log compared with its mission."""
 
 from __future__ import annotations
 
@@ -22,65 +22,64 @@ from stopgo.recordings.replay.matching import Match
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """One log beside one mission."""
+    """One log compared with one mission."""
 
     log: FieldLog
     mission: Mission
     placed: PlacedLog
     matches: tuple[Match, ...]
-    """What each halt of the robot was, in order of time."""
+    """Meaning of each standstill of the robot, in order of time."""
     run: RunLog
-    """The run that the log tells of, as any other run."""
+    """Run in the log, as of any other source."""
     comparison: Comparison
     uploads: tuple[str, ...]
-    """How the missions in the log differ from this one, a line each."""
+    """Differences between the missions in the log and this one, one line each."""
     inferred: bool
-    """Whether the run's events were inferred from halts, and not told by the log."""
+    """True if the run's events were inferred from standstills, and not read from the log."""
 
     sight: AsDriven | None = None
-    """What was in sight from where the robot stood; None without the floor."""
+    """Targets visible from the robot's stationary poses; None without the floor."""
 
     measured: Measured | None = None
-    """What the scans in the log show of the floor; None without the floor, or without scans."""
+    """Measurements of the floor by the scans in the log; None without the floor, or without scans."""
 
     def with_sight(self, sight: AsDriven) -> Replay:
-        """The same, with what was in sight."""
+        """Return the replay with what was visible."""
         return replace(self, sight=sight)
 
     def with_measured(self, measured: Measured | None) -> Replay:
-        """The same, with what scans show."""
+        """Return the replay with the measurements of scans."""
         return replace(self, measured=measured)
 
     @cached_property
     def scanned_from(self) -> FloatArray:
-        """x, y and heading of every place where a scan was made, or where the robot stood as long as one
-        takes (n, 3)."""
+        """Poses (x, y, heading) of each scan, or of each standstill as long as a scan takes (n, 3)."""
         own = [event.pose for event in self.run.events if isinstance(event, Scanned | Unconfirmed)]
         return np.array([(pose.x, pose.y, pose.heading) for pose in own if pose is not None]).reshape(-1, 3)
 
     @cached_property
     def extra(self) -> tuple[Match, ...]:
-        """Halts at no stop."""
+        """Standstills at no stop."""
         return tuple(match for match in self.matches if match.how == "extra")
 
     def at(self, stop: int) -> tuple[Match, ...]:
-        """Halts at a stop, by its index."""
+        """Return the standstills at a stop, by its index."""
         return tuple(match for match in self.matches if match.stop == stop)
 
     def true_offset_m(self, stop: int) -> float | None:
-        """Distance from the stop of where a simulator says that the robot stood there last."""
-        halts, truth = self.at(stop), self.placed.truth
-        if not halts or truth is None:
+        """Return the stop's distance from the true position of the last standstill there, by a simulator."""
+        standstills, truth = self.at(stop), self.placed.truth
+        if not standstills or truth is None:
             return None
-        halt, place = halts[-1].standing, self.mission.stops[stop]
-        poses = truth.between(halt.begin_ns, halt.end_ns)
+        standstill, position = standstills[-1].standstill, self.mission.stops[stop]
+        poses = truth.between(standstill.begin_ns, standstill.end_ns)
         if not len(poses):
             return None
         x, y = np.median(poses.xy, axis=0)
-        return math.dist((float(x), float(y)), (place.x, place.y))
+        return math.dist((float(x), float(y)), (position.x, position.y))
 
     @cached_property
-    def beside(self) -> FloatArray:
-        """Signed metres beside the route at every pose that was on a leg."""
+    def cross_track(self) -> FloatArray:
+        """Signed cross-track error in metres at every pose on a leg."""
         metres = self.comparison.cross_track.metres
         return metres[np.isfinite(metres)]

@@ -1,4 +1,4 @@
-"""A log and a mission -> the log laid beside the mission; refused where they do not belong together."""
+"""Comparison of a log with a mission; a log that does not match the mission is refused."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.logs.field_log import FieldLog, Remark
 from stopgo.recordings.replay.followed import followed_events
-from stopgo.recordings.replay.inferring import events_of
+from stopgo.recordings.replay.inferred_events import events_of
 from stopgo.recordings.replay.log_placing import PlacedLog, Placing, placed
 from stopgo.recordings.replay.matching import Match, matched, reaches
 from stopgo.recordings.replay.replayed import Replay
-from stopgo.recordings.replay.standstills import Standing, standings
-from stopgo.recordings.replay.told_visits import told_visits
+from stopgo.recordings.replay.reported_visits import reported_visits
+from stopgo.recordings.replay.standstills import Standstill, find_standstills
 from stopgo.recordings.replay.uploaded import differences_of
 
 NEAR_ROUTE_M = 2.0
 LEAST_ON_ROUTE, LEAST_WITHOUT_HALTS = 0.5, 0.9
-"""A log of which less than this share runs within NEAR_ROUTE_M of the route is of another mission."""
+"""Least fraction of the path within NEAR_ROUTE_M of the route; below it, a log is of another mission."""
 
 
-def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight] = ()) -> Replay:
-    """Lay a log beside its mission.
+def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[Sight] = ()) -> Replay:
+    """Compare a log with its mission.
 
     Raises
     ------
@@ -42,28 +42,23 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     NegativeResult
         When `--align stops` finds no placing, or several.
     """
-    laid = placed(log, mission, how)
-    offset = laid.alignment.time_offset_ns
-    events = _own_events(log, mission, offset) or followed_events(log, mission, laid)
-    halts = _halts(laid, mission)
-    matches = told_visits(events, mission, halts) if events else matched(halts, mission, laid.track)
-    _must_belong(log, laid.track, mission, matches, how)
-    remarks = [replace(remark, ns=remark.ns + offset) for remark in log.remarks]
-    told = events or _inferred(log, laid, mission, matches, remarks)
-    run = RunLog(
-        robot=told[0].robot if told else laid.source.robot,
-        run_id=told[0].run_id if told else None,
-        mission_id=mission.id,
-        revision=told[-1].revision if told else mission.revision,
-        source=_source(log, laid),
-        poses=laid.way,
-        events=told,
-        alignment=laid.alignment,
+    placed_log = placed(log, mission, placing)
+    offset = placed_log.alignment.time_offset_ns
+    events = _own_events(log, mission, offset) or followed_events(log, mission, placed_log)
+    standstills = _standstills(placed_log, mission)
+    matches = (
+        reported_visits(events, mission, standstills)
+        if events
+        else matched(standstills, mission, placed_log.track)
     )
+    _check_log_matches(log, placed_log.track, mission, matches, placing)
+    remarks = [replace(remark, ns=remark.ns + offset) for remark in log.remarks]
+    run_events = events or _inferred(log, placed_log, mission, matches, remarks)
+    run = _run_log(log, placed_log, mission, run_events)
     return Replay(
         log=log,
         mission=mission,
-        placed=laid,
+        placed=placed_log,
         matches=matches,
         run=run,
         comparison=compare(run, [mission], sights),
@@ -72,111 +67,129 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     )
 
 
-def _halts(laid: PlacedLog, mission: Mission) -> tuple[Standing, ...]:
-    """Where the robot stood, as its poses between the stops show."""
-    return standings(laid.way, speed=mission.robot.speed, turns=laid.turns)
+def _run_log(log: FieldLog, placed_log: PlacedLog, mission: Mission, events: tuple[AnyEvent, ...]) -> RunLog:
+    """Return the run in the log, with its poses in the mission's frame."""
+    return RunLog(
+        robot=events[0].robot if events else placed_log.source.robot,
+        run_id=events[0].run_id if events else None,
+        mission_id=mission.id,
+        revision=events[-1].revision if events else mission.revision,
+        source=_source(log, placed_log),
+        poses=placed_log.driven_track,
+        events=events,
+        alignment=placed_log.alignment,
+    )
+
+
+def _standstills(placed_log: PlacedLog, mission: Mission) -> tuple[Standstill, ...]:
+    """Return the standstills in the poses between the stops."""
+    return find_standstills(placed_log.driven_track, speed=mission.robot.speed, turns=placed_log.turns)
 
 
 def _inferred(
-    log: FieldLog, laid: PlacedLog, mission: Mission, matches: Sequence[Match], remarks: Sequence[Remark]
+    log: FieldLog,
+    placed_log: PlacedLog,
+    mission: Mission,
+    matches: Sequence[Match],
+    remarks: Sequence[Remark],
 ) -> tuple[AnyEvent, ...]:
-    robot = laid.source.robot or Path(log.path).stem
-    return events_of(matches, mission, laid.track, remarks, run_id=f"replay-{log.digest[:12]}", robot=robot)
+    robot = placed_log.source.robot or Path(log.path).stem
+    return events_of(
+        matches, mission, placed_log.track, remarks, run_id=f"replay-{log.digest[:12]}", robot=robot
+    )
 
 
 def _own_events(log: FieldLog, mission: Mission, offset_ns: int) -> tuple[AnyEvent, ...]:
-    """What a log of stopgo's tells of the newest run of this mission.
+    """Return the events of this mission's newest run from one of stopgo's own logs.
 
     Raises
     ------
     InputError
-        When it tells of runs, and of none of this mission.
+        When it contains runs, but none of this mission.
     """
-    mine = [event for event in log.events if event.mission_id == mission.id and event.run_id]
-    if log.events and not mine:
+    own = [event for event in log.events if event.mission_id == mission.id and event.run_id]
+    if log.events and not own:
         others = ", ".join(dict.fromkeys(event.mission_id[:12] for event in log.events if event.mission_id))
         raise InputError(
-            f"{log.path}: has no run of mission {mission.id[:12]}; it has runs of {others or 'none'}"
+            f"{log.path}: no run of mission {mission.id[:12]}; its runs are of {others or 'none'}"
         )
-    if not mine:
+    if not own:
         return ()
     from msgspec.structs import replace as changed
 
     return tuple(
-        changed(event, robot_ns=event.robot_ns + offset_ns)
-        for event in mine
-        if event.run_id == mine[-1].run_id
+        changed(event, robot_ns=event.robot_ns + offset_ns) for event in own if event.run_id == own[-1].run_id
     )
 
 
-def _source(log: FieldLog, laid: PlacedLog) -> LogSource:
-    notes = (*((f"damaged: {log.lost}",) if log.lost else ()), *log.oddities, *laid.source.oddities)
+def _source(log: FieldLog, placed_log: PlacedLog) -> LogSource:
+    notes = (*((f"damaged: {log.lost}",) if log.lost else ()), *log.oddities, *placed_log.source.oddities)
     return LogSource(Path(log.path).name, log.format, log.digest, log.messages, lost=0, notes=notes)
 
 
-def _must_belong(
-    log: FieldLog, track: Track, mission: Mission, matches: Sequence[Match], how: Placing
+def _check_log_matches(
+    log: FieldLog, track: Track, mission: Mission, matches: Sequence[Match], placing: Placing
 ) -> None:
     """Refuse a log whose robot was never near a stop, or hardly ever near the route.
 
-    One without a pose, as of a run whose every stop was skipped, is told by its events.
+    A log without a pose, as of a run that skipped every stop, is checked by its events.
     """
     if not len(track):
         return
     stops = np.array([(stop.x, stop.y) for stop in mission.stops])
     away, reach = nearest_to(stops, track.xy), reaches(mission)
-    if how.align == "first":  # that puts the robot at the start, wherever it was
+    if placing.align == "first":  # the log is placed at the start in any case
         begins = np.hypot(*(stops - (mission.start.x, mission.start.y)).T) <= reach
         away = np.where(begins, np.inf, away) if not begins.all() else away
     nearest = int(away.argmin())
     name = f"mission {mission.name} ({mission.id[:12]})"
     if away[nearest] > reach[nearest]:
         raise InputError(
-            f"{log.path}: was never near a stop of {name}; nearest was {mission.stops[nearest].id}, "
-            f"{away[nearest]:.1f} m off; the wrong mission, or a frame placed wrong (--map, --align)?"
+            f"{log.path}: never near a stop of {name}; nearest was {mission.stops[nearest].id}, "
+            f"{away[nearest]:.1f} m away; check the mission and the frame (--map, --align)"
         )
-    share, stood = on_route(track, mission), any(match.how == "visit" for match in matches)
-    if share < (LEAST_ON_ROUTE if stood else LEAST_WITHOUT_HALTS):
-        halts = "" if stood else ", and it halted at no stop"
+    fraction, visited = on_route(track, mission), any(match.how == "visit" for match in matches)
+    if fraction < (LEAST_ON_ROUTE if visited else LEAST_WITHOUT_HALTS):
+        note = "" if visited else ", without a standstill at a stop"
         raise InputError(
-            f"{log.path}: only {share:.0%} of the way driven lies within {NEAR_ROUTE_M:g} m of the route of "
-            f"{name}{halts}; the wrong mission, or a frame placed wrong (--map, --align)?"
+            f"{log.path}: only {fraction:.0%} of the driven path is within {NEAR_ROUTE_M:g} m of the route "
+            f"of {name}{note}; check the mission and the frame (--map, --align)"
         )
 
 
 def nearest_to(points: FloatArray, xy: FloatArray) -> FloatArray:
-    """How near poses (n, 2) ever came to each point (m, 2): (m,)."""
+    """Return the least distance of poses (n, 2) from each point (m, 2): (m,)."""
     return np.array([np.hypot(*(xy - point).T).min() for point in points])
 
 
 def on_route(track: Track, mission: Mission) -> float:
-    """Share of the way driven that lies near the route; of poses where nothing was driven."""
-    kept = _thinned(track.xy)
-    pieces = [
+    """Return the fraction of the driven path near the route; without a path, the fraction of poses."""
+    thinned = _thinned(track.xy)
+    segments = [
         np.stack([leg[:-1], leg[1:]], axis=1) for leg in map(np.array, legs_of(mission)) if len(leg) > 1
     ]
-    if not pieces:
+    if not segments:
         stops = np.array([(stop.x, stop.y) for stop in mission.stops])
         return float(
-            (np.hypot(*(kept[:, None] - stops).transpose(2, 0, 1)).min(axis=1) <= NEAR_ROUTE_M).mean()
+            (np.hypot(*(thinned[:, None] - stops).transpose(2, 0, 1)).min(axis=1) <= NEAR_ROUTE_M).mean()
         )
-    near = np.zeros(len(kept), bool)
-    for a, b in np.concatenate(pieces):
-        near |= _away(kept, a, b) <= NEAR_ROUTE_M
+    near = np.zeros(len(thinned), bool)
+    for a, b in np.concatenate(segments):
+        near |= _distance_to_segment(thinned, a, b) <= NEAR_ROUTE_M
     return float(near.mean())
 
 
 def _thinned(xy: FloatArray) -> FloatArray:
-    """Places at least 0.2 m apart along the way, so that standing does not count."""
-    kept = [xy[0]]
-    for place in xy[:: max(1, len(xy) // 100_000)]:
-        if math.dist(place, kept[-1]) >= 0.2:
-            kept.append(place)
-    return np.array(kept)
+    """Return positions at least 0.2 m apart along the path, so that standstills do not count."""
+    thinned = [xy[0]]
+    for position in xy[:: max(1, len(xy) // 100_000)]:
+        if math.dist(position, thinned[-1]) >= 0.2:
+            thinned.append(position)
+    return np.array(thinned)
 
 
-def _away(xy: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Distances of points (n, 2) from a straight piece."""
+def _distance_to_segment(xy: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the distances of points (n, 2) from a straight segment."""
     along, to = b - a, xy - a
     square = float(along @ along)
     t = np.clip(to @ along / square, 0.0, 1.0) if square else np.zeros(len(xy))

@@ -1,4 +1,4 @@
-"""Where and when a robot stood still, from its poses alone, noisy as they may be."""
+"""Standstills of a robot: when and where it was stationary, found from its poses alone, even noisy ones."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.run.run_log import Track
 
 BIN_S = 0.2
-"""Poses are averaged over as long as this first: logs have from one to hundreds a second."""
+"""Length of the bins that poses are averaged over: logs have from one to hundreds of poses a second."""
 HALF = 4
-"""Bins on each side whose means are compared to tell whether the robot moves."""
+"""Number of bins on each side whose means are compared to find movement."""
 STILL_M_S, STILL_RAD_S = 0.04, 0.06
-"""Slower than this a robot stands, as far as poses without noise can tell."""
+"""Speed below which a robot is stationary, if its poses have no noise."""
 SIGMAS = 4.0
-"""Speeds that noise alone brings about are below this many of its standard deviations."""
+"""Number of standard deviations that speeds from noise alone do not exceed."""
 FASTEST_STILL = 0.4
-"""Of the mission's speed: with more noise than that allows nothing can be told."""
+"""Limit as a fraction of the mission's speed: with more noise, nothing can be found."""
 LEAST_S = 2.0
-"""A shorter halt is none."""
+"""Shortest standstill."""
 JOIN_S, JOIN_M = 0.7, 0.3
-"""Two halts so near to each other in time and place are one: the robot's position was corrected meanwhile."""
+"""Two standstills this near in time and position are one: the robot's position was corrected between them."""
 EDGE_M, EDGE_RAD = 0.015, 0.03
-"""A robot that is farther than this, and noise, from where it stands has left, or has not yet come."""
+"""Distance, besides noise, at which a robot has left its standstill, or not yet reached it."""
 BLIND_S, BLIND_M = 3.0, 0.15
-"""A robot that is as far from where it was before a silence as long as this has driven meanwhile."""
+"""Gap without poses, and distance across it, from which on the robot has moved meanwhile."""
 LARGEST_BINS = 5_000_000
 
 
 @dataclass(frozen=True)
-class Standing:
-    """One halt."""
+class Standstill:
+    """One standstill."""
 
     begin_ns: int
     end_ns: int
     x: float
     y: float
     heading: float
-    """The middle one of all poses, each coordinate by itself."""
+    """Median of all poses, each coordinate by itself."""
     moved_m: float
-    """How far the robot's position, averaged over a second, went from there while it stood."""
+    """Greatest distance from there of the robot's position averaged over a second."""
 
     @property
     def seconds(self) -> float:
@@ -53,57 +53,58 @@ class Standing:
         return (self.x, self.y)
 
 
-def standings(track: Track, *, speed: float = 0.5, turns: bool = True) -> tuple[Standing, ...]:
-    """All halts in order of time.
+def find_standstills(track: Track, *, speed: float = 0.5, turns: bool = True) -> tuple[Standstill, ...]:
+    """Return all standstills in order of time.
 
-    A robot halts while neither its place nor, if `turns`, its heading changes faster than noise explains.
-    The noise is measured from the poses themselves, by second differences, which a steady drive does not
-    change. While no poses come, a robot that is where it was has stood, and one that is elsewhere has driven.
+    A robot is stationary while neither its position nor, if `turns`, its heading changes faster than noise
+    explains. The noise is measured from the poses themselves, by second differences, which a steady drive
+    does not change. In a gap without poses, a robot that is where it was has been stationary, else it has
+    moved.
 
     Parameters
     ----------
     speed
-        Of the mission, m/s: halts are looked for far below it.
+        Speed of the mission, m/s: standstills are searched far below it.
     turns
-        Whether the headings are measured, and not made from the way itself.
+        True if the headings are measured, and not made from the path itself.
     """
     if len(track) < 2:
         return ()
     bins = _Bins.of(track, turns=turns)
     if len(bins.xy) <= 2 * HALF:
         return ()
-    still = _still(bins, speed=speed) & ~bins.blind
-    found = [_edged(track, bins, *span) for span in _spans(still)]
-    joined = _joined([span for span in found if span is not None], bins)
-    halts = (_standing(track, bins, *span) for span in joined)
-    return tuple(halt for halt in halts if halt.seconds >= LEAST_S)
+    stationary = _stationary(bins, speed=speed) & ~bins.blind
+    found = [_refined_span(track, bins, *span) for span in _spans(stationary)]
+    merged = _merged([span for span in found if span is not None], bins)
+    standstills = (_standstill(track, bins, *span) for span in merged)
+    return tuple(standstill for standstill in standstills if standstill.seconds >= LEAST_S)
 
 
 @dataclass(frozen=True, eq=False)
 class _Bins:
-    """Poses averaged over pieces of time of the same length."""
+    """Poses averaged over time bins of one length."""
 
     begin_ns: int
     step_ns: int
     xy: FloatArray
     """(n, 2)."""
     heading: FloatArray
-    """Without turns of 360 degrees between neighbours (n,)."""
+    """Headings without jumps of 360 degrees between neighbours (n,)."""
     noise: FloatArray
     """Standard deviation of a bin's x, y (metres) and heading (radians), (3,)."""
     blind: BoolArray
-    """Whether the robot moved there while no poses came (n,)."""
+    """True where the robot moved in a gap without poses (n,)."""
     turns: bool
-    """Whether its headings count."""
+    """True if headings are used."""
 
     @property
     def poses(self) -> FloatArray:
-        """x, y, heading (n, 3)."""
+        """Poses as x, y, heading (n, 3)."""
         return np.column_stack([self.xy, self.heading])
 
     @property
     def reach(self) -> FloatArray:
-        """How far from where it stands the robot may seem to be, in x, y and heading (3,)."""
+        """Greatest apparent distance of a stationary robot from its pose, in x, y and heading (3,)."""
         turn = EDGE_RAD if self.turns else np.inf
         return np.array([EDGE_M, EDGE_M, turn]) + SIGMAS * self.noise
 
@@ -116,53 +117,55 @@ class _Bins:
         table = np.column_stack([track.xy, np.unwrap(track.heading)])
         many = np.bincount(index, minlength=count)
         sums = np.stack([np.bincount(index, column, minlength=count) for column in table.T], axis=-1)
-        held = np.flatnonzero(many)
-        means = sums[held] / many[held, None]
+        occupied = np.flatnonzero(many)
+        means = sums[occupied] / many[occupied, None]
         every = np.arange(count)
-        filled = np.stack([np.interp(every, held, column) for column in means.T], axis=-1)
+        filled = np.stack([np.interp(every, occupied, column) for column in means.T], axis=-1)
         noise = _noise(means)
-        blind = _blind(held, means[:, :2], step / 1e9, BLIND_M + SIGMAS * float(noise[:2].max()))
+        blind = _blind(occupied, means[:, :2], step / 1e9, BLIND_M + SIGMAS * float(noise[:2].max()))
         return cls(int(track.ns[0]), step, filled[:, :2], filled[:, 2], noise, blind, turns)
 
     def index(self, ns: int) -> int:
         return min(max((ns - self.begin_ns) // self.step_ns, 0), len(self.xy) - 1)
 
     def ns(self, index: int) -> int:
-        """When a bin begins."""
+        """Return the begin of a bin."""
         return self.begin_ns + index * self.step_ns
 
 
-def _blind(held: IntArray, xy: FloatArray, step_s: float, reach: float) -> BoolArray:
-    """Bins without poses for a while, at whose end the robot was elsewhere than at their beginning."""
-    blind = np.zeros(int(held[-1]) + 1, bool)
+def _blind(occupied: IntArray, xy: FloatArray, step_s: float, reach: float) -> BoolArray:
+    """Return the bins in gaps without poses across which the robot moved."""
+    blind = np.zeros(int(occupied[-1]) + 1, bool)
     moved = np.hypot(*np.diff(xy, axis=0).T) > reach
-    for k in np.flatnonzero(moved & (np.diff(held) * step_s > BLIND_S)):
-        blind[held[k] + 1 : held[k + 1]] = True
+    for k in np.flatnonzero(moved & (np.diff(occupied) * step_s > BLIND_S)):
+        blind[occupied[k] + 1 : occupied[k + 1]] = True
     return blind
 
 
 def _noise(values: FloatArray) -> FloatArray:
-    """Standard deviation of each column (n, 3), by the median of second differences."""
+    """Return the standard deviation of each column (n, 3), from the median of second differences."""
     if len(values) < 5:
         return np.zeros(3)
     second = np.abs(values[2:] - 2 * values[1:-1] + values[:-2])
     return np.asarray(1.4826 * np.median(second, axis=0) / np.sqrt(6.0))
 
 
-def _still(bins: _Bins, *, speed: float) -> BoolArray:
-    """Whether the robot stands in each bin (n,): means of the bins before and after hardly differ."""
+def _stationary(bins: _Bins, *, speed: float) -> BoolArray:
+    """True where the robot is stationary, per bin (n,): the means before and after hardly differ."""
     apart_s = (HALF + 1) * bins.step_ns / 1e9
     noise = bins.noise * np.sqrt(2.0 / HALF) / apart_s
     limit = max(STILL_M_S, min(SIGMAS * float(noise[:2].max()), FASTEST_STILL * speed))
     moving = np.hypot(*_change(bins.xy).T) / apart_s
-    still: BoolArray = moving < limit
+    stationary: BoolArray = moving < limit
     if bins.turns:
-        still &= np.abs(_change(bins.heading[:, None])[:, 0]) / apart_s < max(STILL_RAD_S, SIGMAS * noise[2])
-    return still
+        stationary &= np.abs(_change(bins.heading[:, None])[:, 0]) / apart_s < max(
+            STILL_RAD_S, SIGMAS * noise[2]
+        )
+    return stationary
 
 
 def _change(values: FloatArray) -> FloatArray:
-    """The mean of the HALF values after each minus that of the HALF before (n, k); at the ends as beside."""
+    """Return the mean of the HALF values after each minus that of the HALF before (n, k)."""
     sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
     count = len(values)
     before = (sums[HALF : count - HALF] - sums[: count - 2 * HALF]) / HALF
@@ -170,15 +173,15 @@ def _change(values: FloatArray) -> FloatArray:
     return np.pad(after - before, ((HALF, HALF), (0, 0)), mode="edge")
 
 
-def _spans(still: BoolArray) -> list[tuple[int, int]]:
-    """First and last bin of each run of true ones."""
-    padded = np.concatenate([[False], still, [False]]).astype(np.int8)
+def _spans(stationary: BoolArray) -> list[tuple[int, int]]:
+    """Return the first and last bin of each run of true values."""
+    padded = np.concatenate([[False], stationary, [False]]).astype(np.int8)
     first, behind = np.flatnonzero(np.diff(padded) == 1), np.flatnonzero(np.diff(padded) == -1)
     return list(zip(first.tolist(), (behind - 1).tolist(), strict=True))
 
 
-def _edged(track: Track, bins: _Bins, first: int, last: int) -> tuple[int, int] | None:
-    """When the halt began and ended: as long as the robot stays as it stood in the middle of it."""
+def _refined_span(track: Track, bins: _Bins, first: int, last: int) -> tuple[int, int] | None:
+    """Return the begin and end of a standstill: while the robot keeps the pose of its middle."""
     quarter, middle = (last - first) // 4, (first + last) // 2
     pose = np.median(bins.poses[first + quarter : last - quarter + 1], axis=0)
     near = _near(bins.poses, pose, bins.reach)
@@ -192,7 +195,7 @@ def _edged(track: Track, bins: _Bins, first: int, last: int) -> tuple[int, int] 
 
 
 def _exact(track: Track, bins: _Bins, pose: FloatArray, begin: int, end: int) -> tuple[int, int]:
-    """The same to a pose: without noise a bin is coarse."""
+    """Return the same, to one pose: without noise, a bin is too coarse."""
     around = track.between(bins.ns(begin) - bins.step_ns, bins.ns(end + 1) + bins.step_ns)
     poses = np.column_stack([around.xy, np.unwrap(around.heading)]) if len(around) else np.empty((0, 3))
     poses[:, 2] += (
@@ -205,30 +208,30 @@ def _exact(track: Track, bins: _Bins, pose: FloatArray, begin: int, end: int) ->
 
 
 def _near(poses: FloatArray, pose: FloatArray, reach: FloatArray) -> BoolArray:
-    """Whether poses (n, 3) are where another is, and turned as it is."""
+    """True for poses (n, 3) that equal another pose within `reach`."""
     away = np.hypot(*(poses[:, :2] - pose[:2]).T)
     near: BoolArray = (away <= reach[:2].max()) & (np.abs(poses[:, 2] - pose[2]) <= reach[2])
     return near
 
 
-def _joined(spans: list[tuple[int, int]], bins: _Bins) -> list[tuple[int, int]]:
-    """Halts that only a correction of the robot's position, or a short twitch, has parted."""
-    joined: list[tuple[int, int]] = []
+def _merged(spans: list[tuple[int, int]], bins: _Bins) -> list[tuple[int, int]]:
+    """Join standstills that are separated only by a position correction or a short twitch."""
+    merged: list[tuple[int, int]] = []
     for begin, end in spans:
-        if joined and (begin - joined[-1][1]) / 1e9 <= JOIN_S:
-            here, there = _middle(bins, begin, end), _middle(bins, *joined[-1])
+        if merged and (begin - merged[-1][1]) / 1e9 <= JOIN_S:
+            here, there = _middle(bins, begin, end), _middle(bins, *merged[-1])
             if math.dist(here, there) <= JOIN_M:
-                joined[-1] = (joined[-1][0], max(end, joined[-1][1]))
+                merged[-1] = (merged[-1][0], max(end, merged[-1][1]))
                 continue
-        joined.append((begin, end))
-    return joined
+        merged.append((begin, end))
+    return merged
 
 
 def _middle(bins: _Bins, begin_ns: int, end_ns: int) -> FloatArray:
     return np.asarray(np.median(bins.xy[bins.index(begin_ns) : bins.index(end_ns) + 1], axis=0))
 
 
-def _standing(track: Track, bins: _Bins, begin_ns: int, end_ns: int) -> Standing:
+def _standstill(track: Track, bins: _Bins, begin_ns: int, end_ns: int) -> Standstill:
     poses = track.between(begin_ns, end_ns)
     x, y = (
         (float(value) for value in np.median(poses.xy, axis=0))
@@ -238,15 +241,15 @@ def _standing(track: Track, bins: _Bins, begin_ns: int, end_ns: int) -> Standing
     turn = np.unwrap(poses.heading)
     heading = float(np.remainder(np.median(turn) + np.pi, 2 * np.pi) - np.pi) if len(poses) else 0.0
     first, last = bins.index(begin_ns) + 1, bins.index(end_ns)
-    return Standing(
+    return Standstill(
         begin_ns, end_ns, float(x), float(y), heading, _moved(bins.xy[first:last], np.array([x, y]))
     )
 
 
-def _moved(xy: FloatArray, place: FloatArray) -> float:
-    """Greatest distance of a second's mean from the place."""
+def _moved(xy: FloatArray, position: FloatArray) -> float:
+    """Return the greatest distance of a one-second mean from the position."""
     over = round(1 / BIN_S)
     if len(xy) < over:
         return 0.0
-    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(xy - place, axis=0)])
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(xy - position, axis=0)])
     return float(np.hypot(*((sums[over:] - sums[:-over]) / over).T).max())

@@ -1,4 +1,4 @@
-"""Give a recording its final name, its many small chunks merged into few: a live one shrinks to a quarter."""
+"""Rename a recording to its final name and merge its small chunks: a live one shrinks to a quarter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stopgo.mission.errors import InputError
 from stopgo.recordings.rrd.read import Contents, check
 
 VIEWER = Path(rerun.__file__).parents[1] / "rerun_cli" / "rerun"
-"""The native program: ending the `rerun` script would leave it running."""
+"""Native program; ending the `rerun` script would not end it."""
 
 
 def compact(source: Path, target: Path) -> None:
@@ -21,31 +21,36 @@ def compact(source: Path, target: Path) -> None:
     Raises
     ------
     InputError
-        When `source` is not readable to its end, as after a full disk; it is left where it is.
+        When `source` is not readable to its end, as after a full disk; it is not moved.
     """
     written = check(source)
     merged = target.with_name(f"{target.name}.tmp")
     try:
-        if _merge(source, merged) and _holds(merged, written):
+        if _merge(source, merged) and _is_complete(merged, written):
             os.replace(merged, target)
             source.unlink()
-        else:  # such as on a disk without room for two
+        else:  # for example, the disk has no room for two
             os.replace(source, target)
     finally:
         merged.unlink(missing_ok=True)
 
 
 def _merge(source: Path, merged: Path) -> bool:
-    """Whether Rerun says that it merged; its exit code alone does not tell that all is there."""
+    """True if Rerun reports that it merged; its exit code alone does not show that all rows are there."""
     command = [str(VIEWER), "rrd", "optimize", str(source), "-o", str(merged)]
     # Ctrl-C ends the recording, not the closing of its file.
     return subprocess.run(command, capture_output=True, check=False, start_new_session=True).returncode == 0
 
 
-def _holds(merged: Path, written: Contents) -> bool:
-    """Whether it is whole, and no entity has fewer rows; Rerun may split a row into its archetypes."""
+def _is_complete(merged: Path, written: Contents) -> bool:
+    """True if the merged file is complete and no entity has fewer rows.
+
+    Rerun may split a row into its archetypes.
+    """
     try:
-        held = check(merged)
+        contents = check(merged)
     except InputError:
         return False
-    return held.complete and all(held.rows.get(name, 0) >= count for name, count in written.rows.items())
+    return contents.complete and all(
+        contents.rows.get(name, 0) >= count for name, count in written.rows.items()
+    )

@@ -1,4 +1,4 @@
-"""Read a recording back to its end: what it holds, or one line that says why it cannot be read."""
+"""Read a recording to its end, and report its contents or the reason why it cannot be read."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from stopgo.mission.errors import InputError
 from stopgo.recordings.drawing import entities
 
 MARK = b"RRF2"
-"""How a recording begins that this Rerun can read."""
+"""First bytes of a recording that this Rerun can read."""
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What a recording holds."""
+    """Contents of a recording."""
 
     application: str
     recording_id: str
     complete: bool
-    """False when the writer was killed before it closed the file."""
+    """False if the writer was killed before it closed the file."""
     rows: dict[str, int]
-    """Rows per entity; all that is static counts as one."""
+    """Rows per entity; all static rows of an entity count as one."""
     timelines: tuple[str, ...]
     properties: dict[str, dict[str, Any]]
     """Values of each property, by the property's name."""
@@ -38,16 +38,16 @@ class Contents:
 
 
 def check(path: Path, *, take: Callable[[Chunk], None] = lambda chunk: None) -> Contents:
-    """Read every chunk of the file, and hand each to `take`.
+    """Read every chunk of the file, and pass each to `take`.
 
     Raises
     ------
     InputError
-        When the file is missing, empty, no recording, cut off, or damaged anywhere.
+        When the file is missing, empty, no recording, truncated, or damaged anywhere.
     """
     reader, stores = _open(path)
     if len(stores) != 1:
-        raise InputError(f"{path}: holds {len(stores)} recordings, expected one")
+        raise InputError(f"{path}: contains {len(stores)} recordings; expected one")
     counts: Counter[str] = Counter()
     timelines: set[str] = set()
     properties: dict[str, dict[str, Any]] = {}
@@ -57,7 +57,7 @@ def check(path: Path, *, take: Callable[[Chunk], None] = lambda chunk: None) -> 
         entity = str(chunk.entity_path)
         if not chunk.is_static:
             counts[entity] += chunk.num_rows
-        elif entity not in fixed:  # of static rows only the last one shows, and compacting drops the others
+        elif entity not in fixed:  # viewers show only the last static row, and compacting drops the others
             fixed.add(entity)
             counts[entity] += 1
         timelines.update(chunk.timeline_names)
@@ -73,7 +73,7 @@ def check(path: Path, *, take: Callable[[Chunk], None] = lambda chunk: None) -> 
 
 
 def chunks(path: Path, reader: RrdReader | None = None) -> Iterator[Chunk]:
-    """Every chunk of the recording, to the end; damage is found only when its chunk is read."""
+    """Yield every chunk of the recording to its end; damage is found only when its chunk is read."""
     reader = reader or _open(path)[0]
     try:
         yield from reader.stream()
@@ -82,13 +82,14 @@ def chunks(path: Path, reader: RrdReader | None = None) -> Iterator[Chunk]:
 
 
 def rows(chunk: Chunk) -> Iterator[tuple[float | None, dict[str, Any]]]:
-    """Mission time in seconds, where a row has one, and its values by component; single values bare."""
+    """Yield mission time in seconds, where a row has one, and the row's values by component."""
     batch = chunk.to_record_batch()
     timed = entities.MISSION_TIME in batch.schema.names
     times = batch.column(entities.MISSION_TIME).cast("int64").to_pylist() if timed else [None] * len(batch)
     data = [name for name in batch.schema.names if name not in _INDEXES and not name.startswith("rerun.")]
     for time, cells in zip(times, batch.select(data).to_pylist(), strict=True):
-        values = {name.rpartition(":")[2]: _bare(cell) for name, cell in cells.items() if cell is not None}
+        present = {name: cell for name, cell in cells.items() if cell is not None}
+        values = {name.rpartition(":")[2]: _unwrapped(cell) for name, cell in present.items()}
         yield None if time is None else time / 1e9, values
 
 
@@ -101,7 +102,7 @@ _INDEXES = (
 )
 
 
-def _bare(cell: list[Any]) -> Any:
+def _unwrapped(cell: list[Any]) -> Any:
     return cell[0] if len(cell) == 1 else cell
 
 
@@ -113,27 +114,27 @@ def _take_property(properties: dict[str, dict[str, Any]], chunk: Chunk) -> None:
 
 
 def _open(path: Path) -> tuple[RrdReader, list[StoreEntry]]:
-    _must_look_like_one(path)
+    _check_is_recording(path)
     try:
         with warnings.catch_warnings():
-            # A file without a footer is told by `Contents.complete`.
+            # `Contents.complete` shows whether the file has a footer.
             warnings.simplefilter("ignore")
             reader = RrdReader(path)
             return reader, reader.recordings()
     except (RuntimeError, ValueError) as error:
-        raise InputError(f"{path}: {_fault(path, error)}") from None
+        raise InputError(f"{path}: {_read_problem(path, error)}") from None
 
 
 def looks_like_one(path: Path) -> bool:
-    """Whether a file begins as a recording does."""
+    """True if a file begins as a recording does."""
     try:
-        _must_look_like_one(path)
+        _check_is_recording(path)
     except InputError:
         return False
     return True
 
 
-def _must_look_like_one(path: Path) -> None:
+def _check_is_recording(path: Path) -> None:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name the recordings in it, as {path}/*.rrd")
     if not path.is_file():
@@ -149,10 +150,10 @@ def _must_look_like_one(path: Path) -> None:
         raise InputError(f"{path}: is not a Rerun recording")
 
 
-def _fault(path: Path, error: Exception) -> str:
+def _read_problem(path: Path, error: Exception) -> str:
     if "Not an RRD file" in str(error) or "too small" in str(error):
         return "is not a Rerun recording"
-    return f"is cut off; what is left can be saved with: rerun rrd optimize {path.name} -o repaired.rrd"
+    return f"is truncated; save the rest with: rerun rrd optimize {path.name} -o repaired.rrd"
 
 
 def _reason(error: Exception) -> str:

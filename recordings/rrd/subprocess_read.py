@@ -1,4 +1,4 @@
-"""Files of unknown history are first read in another process: on some damage Rerun ends whoever reads."""
+"""Read files in another process first: some damage makes Rerun end the process that reads."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ for number, path in enumerate(paths):
     except InputError:
         pass
 """
-"""Reads each file to its end, and says before it which it is."""
+"""Program that reads each file to its end, and prints its number first."""
 
 
 def fatal_faults(paths: Sequence[Path]) -> dict[Path, str]:
-    """The files at which a reader ends, each with a line that says so.
+    """Return the files whose reading ended the process, each with a message.
 
-    One process reads all, and after a file at which it ended another one those behind it.
+    One process reads all files. If it ends at one, another process reads the files after that one.
     """
     faults: dict[Path, str] = {}
     left = [path for path in paths if looks_like_one(path)]
     while left:
-        told = json.dumps([sys.path, [str(path) for path in left]])
+        arguments = json.dumps([sys.path, [str(path) for path in left]])
         reader = subprocess.run(
-            [sys.executable, "-c", CHILD], input=told, capture_output=True, text=True, check=False
+            [sys.executable, "-c", CHILD], input=arguments, capture_output=True, text=True, check=False
         )
         begun = len(reader.stdout.split())
         if reader.returncode == 0 or not begun:
             return faults
         path = left[begun - 1]
-        if reader.returncode < 0:  # what it refuses in words is refused here, too
+        if reader.returncode < 0:  # the reader in this process refuses such a file, too
             faults[path] = f"{path}: damaged (reading it ended with signal {-reader.returncode})"
         left = left[begun:]
     return faults

@@ -1,1 +1,1 @@
-"""A run as it is drawn and told, report by report."""
+"""Drawing of a run in a recording, report by report."""

@@ -1,4 +1,4 @@
-"""What a run acquires, drawn as it grows: bold where a scan saw it, thick where what was planned is lost."""
+"""Acquired coverage of a run, drawn as it grows: bold where a scan covered it, thick where it was lost."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from stopgo.recordings.drawing.pens import ORDER, Pen, style
 from stopgo.recordings.drawing.robot import Draw
 
 BOLD_PX, THICK_PX = 2.5, 5.0
-"""Radii in points of the screen of what was seen and of what was lost."""
+"""Radii in points of the screen of acquired and of lost lines."""
 CROSS_M = 0.3
-"""Half the size of the cross over a stop that was left out, metres."""
+"""Half the size in metres of the cross on a skipped stop."""
 
 
 class AcquiredDrawing:
-    """Knows what the scans of one run have seen so far.
+    """Acquired coverage of one run so far, and its drawing.
 
-    What a skipped stop would have seen is lost once the stops still to come cannot make up for it.
+    Coverage of a skipped stop is lost once the remaining stops cannot replace it.
     """
 
     def __init__(self, sight: Sight) -> None:
         self._sight = sight
         self._stops = {stop.id: stop for stop in sight.stops}
-        self._coming = set(sight.ids)
+        self._remaining = set(sight.ids)
         self._views = np.zeros(len(sight.ledger.weight), dtype=np.int64)
         self._lost = np.zeros(len(sight.ledger.weight), dtype=bool)
         self._styled = False
 
-    def tell(self, event: AnyEvent, *, canvas: Canvas, names: entities.RunEntities, draw: Draw) -> None:
-        """Take an event and draw what it adds; `draw` draws at an entity, at the event's time."""
+    def draw_event(self, event: AnyEvent, *, canvas: Canvas, names: entities.RunEntities, draw: Draw) -> None:
+        """Draw what an event adds; `draw` draws at an entity, at the event's time."""
         self._style(canvas, names)
         if isinstance(event, Scanned) and event.stop in self._stops:
-            self._coming.discard(event.stop)
+            self._remaining.discard(event.stop)
             before = self._seen
             self._views = self._views + self._sight.views_from([event.stop])
             new = self._seen & ~before
@@ -47,36 +47,36 @@ class AcquiredDrawing:
         elif isinstance(event, Skipped) and event.stop in self._stops:
             self._give_up([self._stops[event.stop]], canvas, names, draw)
         elif isinstance(event, Finished | Aborted):
-            left = [stop for stop in self._sight.stops if stop.id in self._coming]
+            left = [stop for stop in self._sight.stops if stop.id in self._remaining]
             self._give_up(left, canvas, names, draw)
 
-    def in_words(self) -> str:
-        """What was acquired so far, in a sentence."""
+    def sentence(self) -> str:
+        """Return the coverage acquired so far, in a sentence."""
         now, planned = self._sight.ledger.shares(self._seen).whole, self._sight.planned.whole
-        asked = "" if now.required is None else f"{percent(now.required)} asked, "
-        share, wanted = percent(now.coverage), percent(planned.coverage)
-        return f"**{share}** of what is visible is scanned ({asked}{wanted} planned)"
+        required = "" if now.required is None else f"{percent(now.required)} required, "
+        acquired, planned_percent = percent(now.coverage), percent(planned.coverage)
+        return f"**{acquired}** of what is visible is scanned ({required}{planned_percent} planned)"
 
     @property
     def _seen(self) -> BoolArray:
-        """Whether each unit counts as seen so far (n,)."""
+        """Units covered so far, as a mask (n,)."""
         return self._sight.ledger.enough(self._views)
 
     def _give_up(
         self, stops: list[SeenFrom], canvas: Canvas, names: entities.RunEntities, draw: Draw
     ) -> None:
-        """These stops will not be scanned: what those to come do not make up for is lost."""
-        self._coming -= {stop.id for stop in stops}
-        still = self._views + self._sight.views_from(self._coming)
-        given_up = self._sight.views_from([stop.id for stop in stops]) > 0
-        lost = given_up & ~self._lost & ~self._sight.ledger.enough(still)
+        """Draw what these skipped stops lose, and the remaining stops do not replace."""
+        self._remaining -= {stop.id for stop in stops}
+        possible = self._views + self._sight.views_from(self._remaining)
+        skipped_units = self._sight.views_from([stop.id for stop in stops]) > 0
+        lost = skipped_units & ~self._lost & ~self._sight.ledger.enough(possible)
         self._lost |= lost
         self._draw(canvas, names.flat(entities.LOST), lost, draw)
         if stops:
             crosses = canvas.strips(line for stop in stops for line in _cross(stop))
             above = ORDER["scan"] + 1
             mark = rr.LineStrips2D(crosses, colors=palette.LOST, radii=on_screen(3), draw_order=above)
-            draw(entities.part(names.flat(entities.MISSING), stops[0].id), mark)
+            draw(entities.child(names.flat(entities.MISSING), stops[0].id), mark)
 
     def _draw(self, canvas: Canvas, entity: str, units: BoolArray, draw: Draw) -> None:
         lines = self._lines(units)
@@ -84,7 +84,7 @@ class AcquiredDrawing:
             draw(entity, rr.LineStrips2D.from_fields(strips=canvas.strips(lines)))
 
     def _lines(self, units: BoolArray) -> FloatArray:
-        """The stretches of a mask of units (n,) as segments (k, 2, 2)."""
+        """Return a mask of units (n,) as segments (k, 2, 2)."""
         targets, runs = self._sight.targets, runs_of(self._sight.targets, units)
         a, b = targets.a[runs.segment], targets.b[runs.segment]
         return np.stack([a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None]], axis=1)

@@ -1,4 +1,4 @@
-"""One run as it is drawn: pose and driven path, events at stops, state, battery, distance from the route."""
+"""Drawing of one run: pose and driven path, events at stops, state, battery, cross-track error."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ from stopgo.recordings.runs.revision import change_between, draw_change
 from stopgo.recordings.runs.trail import Thinner, Trail
 
 SOLID_S = 0.5
-"""How often the robot moves in 3D."""
+"""Interval in seconds of the robot's poses in 3D."""
 WARNINGS = (Skipped, Failed, Unconfirmed, Held, LinkLost, Aborted)
-"""Events that somebody should look at."""
+"""Events that need attention."""
 MARKS = {
     Arrived: (entities.ARRIVED, palette.ARRIVED, ORDER["arrival"]),
     Scanned: (entities.SCANNED, palette.SCANNED, ORDER["scan"]),
     Skipped: (entities.SKIPPED, palette.SKIPPED, ORDER["scan"]),
     Failed: (entities.FAILED, palette.FAILED, ORDER["scan"]),
 }
-"""Where, as what, and above what an event is marked on the plan."""
+"""Entity, class and drawing order of an event's mark on the plan."""
 
 
 class RunDrawing:
-    """The entities of one run id on a canvas; grows as the robot tells more."""
+    """Entities of one run id on a canvas; it grows with each report of the robot."""
 
     def __init__(self, canvas: Canvas, run_id: str, mission: Mission, sights: Sequence[Sight] = ()) -> None:
         self.canvas = canvas
@@ -69,9 +69,9 @@ class RunDrawing:
         self.stops = {stop.id: stop for stop in mission.stops}
         self.records: dict[str, StopRecord] = {}
         self._began_ns: int | None = None
-        self._place: FloatArray | None = None
-        self._growth = AcquiredDrawing(sights[-1]) if sights else None
-        self._thinner, self._trail, self._way = Thinner(), Trail(), DelayedDeviation(mission)
+        self._last_xy: FloatArray | None = None
+        self._acquired = AcquiredDrawing(sights[-1]) if sights else None
+        self._thinner, self._trail, self._cross_track = Thinner(), Trail(), DelayedDeviation(mission)
         self._stops: dict[str, bool | None] = {}
         self._style()
         self._describe()
@@ -79,8 +79,8 @@ class RunDrawing:
     def follow(
         self, mission: Mission, report: StateReport | PoseReport | AnyEvent | PosesMissing | Health
     ) -> None:
-        """Go on by another revision of the mission from `report` on, and draw what it changes."""
-        self.tell_time(report)
+        """Continue with another revision of the mission from `report` on, and draw its changes."""
+        self.read_start_time(report)
         change, names = change_between(self.mission, mission), self.names.revision(mission.revision)
         draw_change(self.canvas, change, names, partial(self._at, robot_ns=report.robot_ns))
         self.mission = mission
@@ -88,23 +88,23 @@ class RunDrawing:
         self.stops = {stop.id: stop for stop in mission.stops}
         self._describe()
 
-    def poses(self, told: Track) -> None:
-        """Move the robot, and lengthen its path; what waits for events is plotted by `measure`."""
-        poses = self._thinner.thin(told)
+    def poses(self, track: Track) -> None:
+        """Move the robot, and extend its path. `measure` plots what depends on later events."""
+        poses = self._thinner.thin(track)
         if not len(poses):
             return
-        if self._place is None:
+        if self._last_xy is None:
             draw = partial(self._at, robot_ns=int(poses.ns[0]))
             robots = (self.names.flat(entities.ROBOT), self.names.solid(entities.ROBOT))
             draw_robot(draw, *robots, radius=self.mission.robot.radius, colour=palette.DRIVEN)
         self._move(poses)
-        self._lengthen(poses)
-        self._way.poses(poses)
-        self._place = poses.xy[-1]
+        self._extend_path(poses)
+        self._cross_track.poses(poses)
+        self._last_xy = poses.xy[-1]
 
     def state(self, report: StateReport) -> None:
-        """Put the robot's and the stop's state on their lanes, and the battery on its plot."""
-        if self._way.knows(report.last_event):
+        """Draw the robot's and the stop's state on their lanes, and the battery on its plot."""
+        if self._cross_track.knows(report.last_event):
             self.measure(report.robot_ns)
         self._at(self.names.flat(entities.STATE), rr.StateChange(state=report.state), report.robot_ns)
         stop_state = "" if report.stop_state is None else report.stop_state
@@ -114,48 +114,50 @@ class RunDrawing:
         self._at(self.names.metric(entities.METRIC_BATTERY), battery, report.robot_ns)
 
     def missing(self, gap: PosesMissing) -> None:
-        """Say for how long nobody knows where the robot was; its path ends before that, and begins anew."""
-        self.tell_time(gap)
+        """Log how long the robot's position was unknown; its path ends before, and begins again after."""
+        self.read_start_time(gap)
         self._trail.end()
         line = rr.TextLog(gap.words, level="WARN")
         self._at(self.names.log, line, gap.robot_ns)
 
-    def health(self, told: Health) -> None:
-        """Keep how the base was, and say what of it stops a robot, when that changes."""
-        known = {name: value for name in HEALTH_FIELDS if (value := getattr(told, name)) is not None}
-        self._at(self.names.health, rr.DynamicArchetype("Health", components=known), told.robot_ns)
-        stops = {name: getattr(told, name) for name in HEALTH_FIELDS[2:]}
+    def health(self, report: Health) -> None:
+        """Write the base's health, and log each change of a value that stops a robot."""
+        known = {name: value for name in HEALTH_FIELDS if (value := getattr(report, name)) is not None}
+        self._at(self.names.health, rr.DynamicArchetype("Health", components=known), report.robot_ns)
+        stops = {name: getattr(report, name) for name in HEALTH_FIELDS[2:]}
         changed = {name for name, value in stops.items() if bool(value) != bool(self._stops.get(name))}
         self._stops = stops
         for name in sorted(changed):
             words = f"{name.replace('_', ' ')}: {'yes' if stops[name] else 'no'}"
             self._at(
-                self.names.log, rr.TextLog(words, level="WARN" if stops[name] else "INFO"), told.robot_ns
+                self.names.log, rr.TextLog(words, level="WARN" if stops[name] else "INFO"), report.robot_ns
             )
 
     def event(self, event: AnyEvent) -> None:
-        """Write the event down whole, mark it on the plan, and bring the report up to date."""
-        self.tell_time(event)
-        self._way.event(event, self.mission)
-        told = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
-        told["body"] = msgspec.json.encode(event).decode()
-        self._at(self.names.events, rr.DynamicArchetype("Event", components=told), event.robot_ns)
+        """Write the whole event, mark it on the plan, and update the report."""
+        self.read_start_time(event)
+        self._cross_track.event(event, self.mission)
+        fields = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
+        fields["body"] = msgspec.json.encode(event).decode()
+        self._at(self.names.events, rr.DynamicArchetype("Event", components=fields), event.robot_ns)
         stop = self.stops.get(getattr(event, "stop", ""))
-        beside = outside_tolerance_text(event, stop)
-        level = "WARN" if isinstance(event, WARNINGS) or beside else "INFO"
-        line = rr.TextLog(f"{type(event).__name__} {_about(event, stop)}".rstrip(), level=level)
+        off_stop = outside_tolerance_text(event, stop)
+        level = "WARN" if isinstance(event, WARNINGS) or off_stop else "INFO"
+        line = rr.TextLog(f"{type(event).__name__} {_details(event, stop)}".rstrip(), level=level)
         self._at(self.names.log, line, event.robot_ns)
         if isinstance(event, Arrived):
             self._plot_deviation(event.deviation_m, stop, event.robot_ns)
-        elif isinstance(event, Scanned) and stop is not None and beside:
+        elif isinstance(event, Scanned) and stop is not None and off_stop:
             self._plot_deviation(deviation(event.pose, stop), stop, event.robot_ns)
         self._mark(event)
-        if self._growth is not None:
-            self._growth.tell(event, canvas=self.canvas, names=self.names, draw=self._at_time(event.robot_ns))
+        if self._acquired is not None:
+            self._acquired.draw_event(
+                event, canvas=self.canvas, names=self.names, draw=self._at_time(event.robot_ns)
+            )
         self._report(event)
 
     def _style(self) -> None:
-        """What things look like, which stays the same for the whole run."""
+        """Set the looks that stay the same for the whole run."""
         canvas, names = self.canvas, self.names
         states = state_colours()
         for lane in (entities.STATE, entities.STOP_STATE):
@@ -174,7 +176,7 @@ class RunDrawing:
             canvas.show(names.tolerance(metric), lines)
 
     def _describe(self) -> None:
-        """What the run is of, as a property."""
+        """Write the run's mission and origin as a property."""
         about = {
             "run_id": self.run_id,
             "mission_id": self.mission.id,
@@ -187,28 +189,28 @@ class RunDrawing:
         self.canvas.describe(entities.PROPERTY_RUN, about)
 
     def _move(self, poses: Track) -> None:
-        """Put the robot at its poses; they are kept whole beside what Rerun draws, which is less exact."""
-        turn = quaternions(poses.heading)
-        places = strokes.level(self.canvas.local(poses.xy), 0.0)
-        told = {"x": poses.xy[:, 0], "y": poses.xy[:, 1], "heading": poses.heading}
-        moves = rr.Transform3D.columns(translation=places, quaternion=turn)
-        kept = rr.DynamicArchetype.columns(archetype="Pose", components=told)
-        self._columns(self.names.flat(entities.ROBOT), poses.ns, moves, kept)
-        seldom = self._seldom(poses.ns)
+        """Move the robot to its poses, and write them as exact values: Rerun draws in float32."""
+        rotation = quaternions(poses.heading)
+        positions = strokes.level(self.canvas.local(poses.xy), 0.0)
+        exact = {"x": poses.xy[:, 0], "y": poses.xy[:, 1], "heading": poses.heading}
+        moves = rr.Transform3D.columns(translation=positions, quaternion=rotation)
+        values = rr.DynamicArchetype.columns(archetype="Pose", components=exact)
+        self._columns(self.names.flat(entities.ROBOT), poses.ns, moves, values)
+        thinned = self._thinned_for_3d(poses.ns)
         self._columns(
             self.names.solid(entities.ROBOT),
-            poses.ns[seldom],
-            rr.Transform3D.columns(translation=places[seldom], quaternion=turn[seldom]),
+            poses.ns[thinned],
+            rr.Transform3D.columns(translation=positions[thinned], quaternion=rotation[thinned]),
         )
 
-    def _seldom(self, ns: IntArray) -> IntArray:
-        """Indices of poses for 3D: the first, the last, and one each SOLID_S."""
-        beat = np.flatnonzero(np.diff(ns // round(SOLID_S * 1e9)) > 0) + 1
-        return np.unique(np.concatenate([[0], beat, [len(ns) - 1]]))
+    def _thinned_for_3d(self, ns: IntArray) -> IntArray:
+        """Return indices of poses for 3D: the first, the last, and one every SOLID_S."""
+        ticks = np.flatnonzero(np.diff(ns // round(SOLID_S * 1e9)) > 0) + 1
+        return np.unique(np.concatenate([[0], ticks, [len(ns) - 1]]))
 
-    def _lengthen(self, poses: Track) -> None:
-        """Add what the robot has driven since it was last told of."""
-        ns, strips = self._trail.lengthened(poses)
+    def _extend_path(self, poses: Track) -> None:
+        """Add the path driven since the last poses."""
+        ns, strips = self._trail.extended(poses)
         if strips:
             flat = self.canvas.strips(strips)
             self._columns(self.names.flat(entities.DRIVEN), ns, rr.LineStrips2D.columns(strips=flat))
@@ -216,11 +218,11 @@ class RunDrawing:
             self._columns(self.names.solid(entities.DRIVEN), ns, rr.LineStrips3D.columns(strips=raised))
 
     def measure(self, until_ns: int | None = None) -> None:
-        """Plot how far beside the way the robot was; up to a time until which all events are known."""
-        ns, beside = self._way.measured(until_ns)
-        known = np.isfinite(beside)
+        """Plot the cross-track error, up to a time until which all events are known."""
+        ns, errors_m = self._cross_track.measured(until_ns)
+        known = np.isfinite(errors_m)
         if known.any():
-            values = rr.Scalars.columns(scalars=beside[known] * 1000)
+            values = rr.Scalars.columns(scalars=errors_m[known] * 1000)
             self._columns(self.names.metric(entities.METRIC_CROSS_TRACK), ns[known], values)
 
     def _mark(self, event: AnyEvent) -> None:
@@ -228,19 +230,19 @@ class RunDrawing:
         if type(event) not in MARKS or stop is None:
             return
         name, meaning, order = MARKS[type(event)]
-        place = getattr(event, "pose", None) or stop
+        position = getattr(event, "pose", None) or stop
         mark = rr.Points2D(
-            [self.canvas.local(np.array([place.x, place.y]))],
+            [self.canvas.local(np.array([position.x, position.y]))],
             class_ids=meaning.number,
             radii=on_screen(3),
-            labels=[f"{type(event).__name__} {_about(event, stop)}"],
+            labels=[f"{type(event).__name__} {_details(event, stop)}"],
             show_labels=False,
             draw_order=order,
         )
         self._at(self.names.flat(name), mark, event.robot_ns)
 
     def _plot_deviation(self, away_m: float, stop: Stop | None, robot_ns: int) -> None:
-        """In millimetres, with what the mission tolerates at this stop, to both sides of the route too."""
+        """Plot the deviation in millimetres, with the stop's tolerance, also for both sides of the route."""
         self._at(self.names.metric(entities.METRIC_DEVIATION), rr.Scalars(away_m * 1000), robot_ns)
         if stop is not None:
             limit = stop.tolerance_m * 1000
@@ -252,20 +254,20 @@ class RunDrawing:
         stop = getattr(event, "stop", None)
         if stop is not None:
             self.records[stop] = self.records.get(stop, StopRecord()).after(event, self.stops.get(stop))
-        coverage = "" if self._growth is None else self._growth.in_words()
+        coverage = "" if self._acquired is None else self._acquired.sentence()
         text = run_report(self.revisions, self.run_id, self.records, event, coverage)
         document = rr.TextDocument(text, media_type="text/markdown")
         for entity in (self.names.flat(entities.RUN_REPORT), entities.LATEST_REPORT):
             self._at(entity, document, event.robot_ns)
 
-    def tell_time(self, report: StateReport | PoseReport | AnyEvent | PosesMissing | Health) -> None:
-        """Learn when the mission began, from a report that tells."""
+    def read_start_time(self, report: StateReport | PoseReport | AnyEvent | PosesMissing | Health) -> None:
+        """Read the mission's start time from a report that contains mission time."""
         seconds = getattr(report, "mission_time_s", None)
         if seconds is not None:
             self._began_ns = report.robot_ns - round(seconds * 1e9)
 
     def _at(self, entity: str, archetype: object, robot_ns: int) -> None:
-        """At the robot's time, and at mission time once it is known when the mission began."""
+        """Draw at the robot's time, and at mission time once the mission's start is known."""
         mission_s = None if self._began_ns is None else (robot_ns - self._began_ns) / 1e9
         self.canvas.at(entity, archetype, mission_s=mission_s, robot_ns=robot_ns)
 
@@ -273,7 +275,7 @@ class RunDrawing:
         return partial(self._at, robot_ns=robot_ns)
 
     def _columns(self, entity: str, ns: IntArray, *groups: Any) -> None:
-        """The same for many rows, one at each time."""
+        """Draw many rows, one at each time."""
         indexes = [rr.TimeColumn(entities.ROBOT_TIME, timestamp=np.asarray(ns).astype("datetime64[ns]"))]
         if self._began_ns is not None:
             since = (np.asarray(ns) - self._began_ns).astype("timedelta64[ns]")
@@ -286,7 +288,7 @@ EVENT_FIELDS = (
     *("event", "number", "revision", "stop", "reason", "deviation_m", "commander"),
     *("file", "size", "sha256", "points"),
 )
-"""What is kept of an event as values, each of one type in all events."""
+"""Fields of an event that are written as values; each has one type in all events."""
 
 _PLOTTED = {
     entities.METRIC_CROSS_TRACK: "distance from the route",
@@ -295,15 +297,15 @@ _PLOTTED = {
 
 
 _LIMITED = {entities.METRIC_DEVIATION: (1,), entities.METRIC_CROSS_TRACK: (-1, 1)}
-"""Metrics with a tolerance, and on which sides."""
+"""Metrics with a tolerance, and the sides that it applies to."""
 
 
-def _about(event: AnyEvent, stop: Stop | None) -> str:
-    """The event's particulars in a few words; `stop` is the one it is of."""
+def _details(event: AnyEvent, stop: Stop | None) -> str:
+    """Return the event's details in a few words; `stop` is the event's stop."""
     words = [getattr(event, name, "") for name in ("stop", "reason", "commander", "kind")]
     words.append(outside_tolerance_text(event, stop))
     if isinstance(event, Arrived):
-        words.append(f"{event.deviation_m * 1000:.0f} mm beside")
+        words.append(f"{event.deviation_m * 1000:.0f} mm deviation")
     if isinstance(event, Scanned):
         words.append(f"{event.file}, {event.points} points")
     if isinstance(event, RevisionTaken):

@@ -1,4 +1,4 @@
-"""A run in words: what became of each stop, as the markdown report inside a field recording."""
+"""Markdown report inside a field recording: the outcome of each stop of a run."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
 
 @dataclass(frozen=True)
 class StopRecord:
-    """What is known of one stop of a run."""
+    """State of one stop of a run."""
 
     arrived_s: float | None = None
     deviation_m: float | None = None
-    outcome: str = "on the way"
+    outcome: str = "driving there"
     """`arrived`, `scanned`, `unconfirmed`, `skipped` or `failed`, with the reason."""
     scanned: bool = False
 
     def after(self, event: AnyEvent, stop: Stop | None) -> StopRecord:
-        """The record once the event has happened at the stop."""
+        """Return the record after an event at the stop."""
         if isinstance(event, Arrived):
             return replace(
                 self, arrived_s=event.mission_time_s, deviation_m=event.deviation_m, outcome="arrived"
             )
         if isinstance(event, Scanned):
-            away = self.deviation_m if stop is None else deviation(event.pose, stop)
+            deviation_m = self.deviation_m if stop is None else deviation(event.pose, stop)
             outcome = f"scanned {outside_tolerance_text(event, stop)}".rstrip()
-            return replace(self, deviation_m=away, outcome=outcome, scanned=True)
+            return replace(self, deviation_m=deviation_m, outcome=outcome, scanned=True)
         if isinstance(event, Unconfirmed | Skipped | Failed):
-            told = (outside_tolerance_text(event, stop), event.reason)
-            words = "; ".join(word for word in told if word)
+            details = (outside_tolerance_text(event, stop), event.reason)
+            words = "; ".join(word for word in details if word)
             return replace(self, outcome=f"{type(event).__name__.lower()}: {words}", scanned=False)
         return self
 
@@ -54,9 +54,9 @@ def run_report(
     latest: AnyEvent,
     coverage: str = "",
 ) -> str:
-    """The run so far in markdown; of the mission's revisions the run follows the last.
+    """Return the run so far as markdown; the run follows the last of the mission's revisions.
 
-    `coverage` tells what was acquired, where that is known.
+    `coverage` describes the acquired coverage, if it is known.
     """
     mission = revisions[-1]
     scanned = sum(record.scanned for record in records.values())
@@ -75,38 +75,38 @@ def run_report(
     rows = [_row(stop, records.get(stop)) for stop in _listed(mission, latest)]
     rows += [f"| {stop} | | | withdrawn by revision {by} |" for stop, by in _withdrawn(revisions).items()]
     rest = len(mission.stops) - MOST_STOPS
-    note = ["", f"*{rest} stops farther off are listed when the run is over.*"]
+    note = ["", f"*{rest} other stops are listed when the run is over.*"]
     return "\n".join([*lines, *rows, *(note if len(rows) < len(mission.stops) else [])])
 
 
 MOST_STOPS = 60
-"""Stops that are listed while a run goes on: of more, a report for each event would fill the disk."""
+"""Limit of stops listed during a run: with more, a report for each event would fill the disk."""
 
 
 def _listed(mission: Mission, latest: AnyEvent) -> list[str]:
-    """All stops once the run is over; before that those around the one that was last told of."""
+    """Return all stops once the run is over; before that, those around the stop of the last report."""
     ids = [stop.id for stop in mission.stops]
     if len(ids) <= MOST_STOPS or isinstance(latest, Finished | Aborted):
         return ids
-    told = getattr(latest, "stop", None)
-    middle = ids.index(told) if told in ids else 0
+    last = getattr(latest, "stop", None)
+    middle = ids.index(last) if last in ids else 0
     first = max(0, min(middle - MOST_STOPS // 2, len(ids) - MOST_STOPS))
     return ids[first : first + MOST_STOPS]
 
 
 def _numbers(revisions: Sequence[Mission]) -> str:
-    """The revision that is followed, and those before it."""
+    """Return the current revision, and those before it."""
     before = ", ".join(str(mission.revision) for mission in revisions[:-1])
     return f"{revisions[-1].revision}" + (f" (before: {before})" if before else "")
 
 
 def _withdrawn(revisions: Sequence[Mission]) -> dict[str, int]:
-    """Stops that the last revision has not, and the revision that withdrew each."""
-    gone: dict[str, int] = {}
+    """Return stops that the last revision does not have, and the revision that withdrew each."""
+    withdrawn: dict[str, int] = {}
     for before, after in pairwise(revisions):
         ids = {stop.id for stop in after.stops}
-        gone.update({stop.id: after.revision for stop in before.stops if stop.id not in ids})
-    return {stop: by for stop, by in gone.items() if stop not in {s.id for s in revisions[-1].stops}}
+        withdrawn.update({stop.id: after.revision for stop in before.stops if stop.id not in ids})
+    return {stop: by for stop, by in withdrawn.items() if stop not in {s.id for s in revisions[-1].stops}}
 
 
 def _row(stop: str, record: StopRecord | None) -> str:

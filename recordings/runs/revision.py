@@ -1,4 +1,4 @@
-"""What a new revision changes of the mission a run follows: stops and legs it withdraws, and new ones."""
+"""Changes of a new revision: withdrawn stops and legs, and new ones."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from stopgo.recordings.drawing.robot import Draw
 from stopgo.recordings.plan.mission import Leg, StopMarks, legs_of, route_lines, stop_marks
 
 STEP = 0.02
-"""How far what a revision changes lies above what was drawn before, as a share of a step of ORDER."""
+"""Distance of a revision's changes above earlier drawings, as a fraction of a step of ORDER."""
 
 
 @dataclass(frozen=True)
 class RevisionChange:
-    """What one revision has and another has not; a stop that has moved is withdrawn and new."""
+    """Differences between two revisions; a moved stop is withdrawn and new."""
 
     withdrawn: tuple[Stop, ...]
     added: tuple[Stop, ...]
@@ -28,12 +28,12 @@ class RevisionChange:
 
 
 def change_between(before: Mission, after: Mission) -> RevisionChange:
-    """From one revision of a mission to another."""
+    """Return the differences between two revisions of a mission."""
     (old_legs, _), (new_legs, colours) = legs_of(before), legs_of(after)
-    old, new = ({_place(stop) for stop in mission.stops} for mission in (before, after))
+    old, new = ({_pose_key(stop) for stop in mission.stops} for mission in (before, after))
     return RevisionChange(
-        withdrawn=tuple(stop for stop in before.stops if _place(stop) not in new),
-        added=tuple(stop for stop in after.stops if _place(stop) not in old),
+        withdrawn=tuple(stop for stop in before.stops if _pose_key(stop) not in new),
+        added=tuple(stop for stop in after.stops if _pose_key(stop) not in old),
         withdrawn_legs=tuple(leg for leg in old_legs if leg not in new_legs),
         added_legs=tuple(
             (leg, colour) for leg, colour in zip(new_legs, colours, strict=True) if leg not in old_legs
@@ -41,12 +41,12 @@ def change_between(before: Mission, after: Mission) -> RevisionChange:
     )
 
 
-def _place(stop: Stop) -> tuple[object, ...]:
+def _pose_key(stop: Stop) -> tuple[object, ...]:
     return (stop.id, stop.x, stop.y, stop.heading, stop.doorway)
 
 
 def draw_change(canvas: Canvas, change: RevisionChange, names: entities.Revision, draw: Draw) -> None:
-    """Grey over what is withdrawn, and what is new in the colours of stops and routes.
+    """Draw withdrawn stops and legs grey, and new ones in the colours of stops and routes.
 
     `draw` draws an archetype at an entity, at the time of the change.
     """

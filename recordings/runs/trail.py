@@ -1,4 +1,4 @@
-"""What of a robot's poses is worth drawing: those that differ, and the path through them."""
+"""Poses and path of a robot that are worth drawing: poses that differ, and the path through them."""
 
 from __future__ import annotations
 
@@ -10,32 +10,34 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.run.run_log import Track
 
 SAME_M, SAME_RAD, SAME_S = 0.001, math.radians(0.1), 1.0
-"""A pose this near to the last one is left out, but for one each second."""
-PIECE_M = 0.05
-"""The driven path goes from pose to pose at least this far apart."""
+"""Limits below which a pose counts as equal to the last one and is left out, except one each second."""
+POINT_DISTANCE_M = 0.05
+"""Smallest distance between two points of the driven path."""
 STRIP_S = 1.0
-"""For how long one strip of the path goes on."""
-SILENT_S = 10.0
-"""After a silence as long as this nobody knows the way the robot took, and none is drawn."""
+"""Duration of one strip of the path."""
+GAP_S = 10.0
+"""Gap in seconds after which the path is unknown, and is not drawn."""
 
 
 class Thinner:
-    """Leaves out poses that are as the one before, over any number of tracks."""
+    """Leaves out poses that equal the one before, over any number of tracks."""
 
     def __init__(self) -> None:
         self._last: tuple[int, float, float, float] | None = None
 
     def thin(self, track: Track) -> Track:
-        """The poses that differ from the last one that was kept."""
-        kept = []
+        """Return the poses that differ from the last one returned."""
+        indices = []
         last = self._last
         rows = zip(track.ns.tolist(), *track.xy.T.tolist(), track.heading.tolist(), strict=True)
         for index, pose in enumerate(rows):
             if last is None or not _same(last, pose):
-                kept.append(index)
+                indices.append(index)
                 last = pose
         self._last = last
-        return Track(frozen(track.ns[kept], np.int64), frozen(track.xy[kept]), frozen(track.heading[kept]))
+        return Track(
+            frozen(track.ns[indices], np.int64), frozen(track.xy[indices]), frozen(track.heading[indices])
+        )
 
 
 def _same(a: tuple[int, float, float, float], b: tuple[int, float, float, float]) -> bool:
@@ -47,30 +49,30 @@ def _same(a: tuple[int, float, float, float], b: tuple[int, float, float, float]
 
 
 class Trail:
-    """The path that a robot has driven, strip by strip, each a second long or as long as a track."""
+    """Path that a robot has driven, in strips of a second or of one track."""
 
     def __init__(self) -> None:
         self._end: tuple[float, float] | None = None
-        """Where the path was drawn to."""
-        self._heard_ns = 0
+        """End of the path drawn so far."""
+        self._last_ns = 0
 
     def end(self) -> None:
-        """Begin anew with the next pose: nobody knows the way to it."""
+        """Begin again with the next pose: the path to it is unknown."""
         self._end = None
 
-    def lengthened(self, track: Track) -> tuple[IntArray, list[FloatArray]]:
-        """The strips that these poses add, and when each ends."""
+    def extended(self, track: Track) -> tuple[IntArray, list[FloatArray]]:
+        """Return the strips that these poses add, and the end time of each."""
         times: list[int] = []
         strips: list[list[tuple[float, float]]] = []
-        begun_ns = None
+        strip_begin_ns = None
         for ns, x, y in zip(track.ns.tolist(), *track.xy.T.tolist(), strict=True):
-            if self._end is None or ns - self._heard_ns > SILENT_S * 1e9:
-                self._end, begun_ns = (x, y), None
-            self._heard_ns = ns
-            if math.hypot(x - self._end[0], y - self._end[1]) < PIECE_M:
+            if self._end is None or ns - self._last_ns > GAP_S * 1e9:
+                self._end, strip_begin_ns = (x, y), None
+            self._last_ns = ns
+            if math.hypot(x - self._end[0], y - self._end[1]) < POINT_DISTANCE_M:
                 continue
-            if begun_ns is None or ns - begun_ns > STRIP_S * 1e9:
-                begun_ns = ns
+            if strip_begin_ns is None or ns - strip_begin_ns > STRIP_S * 1e9:
+                strip_begin_ns = ns
                 strips.append([self._end])
                 times.append(ns)
             self._end = (x, y)

@@ -1,1 +1,1 @@
-"""Inputs that ship with stopgo, drawn by the project itself."""
+"""Sample floors that stopgo contains, drawn by the project itself."""

@@ -2,7 +2,7 @@
 
     python -m stopgo.recordings.samples.draw_office [office.dxf]
 
-The same bytes come out every time, so that a plan of the sample can be repeated.
+Its bytes are the same every time, so that a plan of the sample can be repeated.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ WALLS_ALONG_X: dict[str, tuple[Interval, Interval, tuple[Interval, ...], tuple[I
     ),
     "lift north": ((10.52, 13.2), (9.36, 9.56), (), ()),
 }
-"""Walls along x: from and to in x, from and to in y, the doors in them, the windows in them."""
+"""Walls along x: range in x, range in y, their doors, their windows."""
 
 WALLS_ALONG_Y: dict[str, tuple[Interval, Interval, tuple[Interval, ...], tuple[Interval, ...]]] = {
     "west": ((0.3, 12.7), (0.0, 0.3), ((5.95, 7.05),), ((1.6, 3.6), (9.4, 11.4))),
@@ -93,7 +93,7 @@ WALLS_ALONG_Y: dict[str, tuple[Interval, Interval, tuple[Interval, ...], tuple[I
     "108-109": ((7.46, 12.7), (13.2, 13.32), ((10.4, 11.3),), ()),
     "109-110": ((7.46, 12.7), (16.8, 16.92), (), ()),
 }
-"""Walls along y: from and to in y, from and to in x, the doors in them, the windows in them."""
+"""Walls along y: range in y, range in x, their doors, their windows."""
 
 SQUARE_COLUMNS = ((18.8, 2.4), (22.6, 2.4))
 ROUND_COLUMNS = ((18.8, 5.2), (22.6, 5.2))
@@ -103,7 +103,7 @@ OPEN_BOUNDARY = ((16.06, 5.66), (16.06, 7.34))
 
 
 def draw() -> bytes:
-    """The DXF file."""
+    """Return the DXF file."""
     with reproducible():
         drawing = _empty_drawing()
         _draw_all(drawing.modelspace())
@@ -124,9 +124,9 @@ def _draw_all(model: Modelspace) -> None:
     for name, box in ROOMS.items():
         _room(model, name, box)
     for name, (along, across, doors, windows) in WALLS_ALONG_X.items():
-        _wall(model, name, along, across, doors=doors, windows=windows, turned=False)
+        _wall(model, name, along, across, doors=doors, windows=windows, along_y=False)
     for name, (along, across, doors, windows) in WALLS_ALONG_Y.items():
-        _wall(model, name, along, across, doors=doors, windows=windows, turned=True)
+        _wall(model, name, along, across, doors=doors, windows=windows, along_y=True)
     _structure(model)
     _stairs(model)
     model.add_line(*OPEN_BOUNDARY, dxfattribs={"layer": "PASSAGES"})
@@ -142,7 +142,7 @@ def _rectangle(model: Modelspace, box: Box, *, layer: str, global_id: str | None
 
 def _room(model: Modelspace, name: str, box: Box) -> None:
     _rectangle(model, box, layer="ROOMS", global_id=_global_id(f"room {name}"))
-    # The name stands where neither stairs nor columns are.
+    # The name is placed where neither stairs nor columns are.
     at = (box[0] + 0.4, box[1] + 0.4)
     label = model.add_text(name, height=0.25, dxfattribs={"layer": "ROOMS"})
     label.set_placement(at, align=TextEntityAlignment.LEFT)
@@ -156,25 +156,28 @@ def _wall(
     *,
     doors: Sequence[Interval],
     windows: Sequence[Interval],
-    turned: bool,
+    along_y: bool,
 ) -> None:
-    """One wall, cut by its doors and windows; all its pieces carry the wall's GlobalId."""
-    for piece in _pieces(along, (*doors, *windows)):
+    """Draw one wall, cut by its doors and windows; all its parts have the wall's GlobalId."""
+    for wall_part in _wall_parts(along, (*doors, *windows)):
         _rectangle(
-            model, _box(piece, across, turned=turned), layer="WALLS", global_id=_global_id(f"wall {name}")
+            model,
+            _box(wall_part, across, along_y=along_y),
+            layer="WALLS",
+            global_id=_global_id(f"wall {name}"),
         )
     middle = (across[0] + across[1]) / 2
     for number, door in enumerate(doors):
-        x0, y0, x1, y1 = _box(door, (middle, middle), turned=turned)
+        x0, y0, x1, y1 = _box(door, (middle, middle), along_y=along_y)
         line = model.add_line((x0, y0), (x1, y1), dxfattribs={"layer": "DOORS"})
         line.set_xdata("IFC", [(1000, _global_id(f"door {name} {number}"))])
     glass = (middle - 0.04, middle + 0.04)
     for number, window in enumerate(windows):
-        box = _box(window, glass, turned=turned)
+        box = _box(window, glass, along_y=along_y)
         _rectangle(model, box, layer="WINDOWS", global_id=_global_id(f"window {name} {number}"))
 
 
-def _pieces(along: Interval, gaps: Sequence[Interval]) -> Iterator[Interval]:
+def _wall_parts(along: Interval, gaps: Sequence[Interval]) -> Iterator[Interval]:
     start = along[0]
     for gap in sorted(gaps):
         yield (start, gap[0])
@@ -182,8 +185,8 @@ def _pieces(along: Interval, gaps: Sequence[Interval]) -> Iterator[Interval]:
     yield (start, along[1])
 
 
-def _box(along: Interval, across: Interval, *, turned: bool) -> Box:
-    if turned:
+def _box(along: Interval, across: Interval, *, along_y: bool) -> Box:
+    if along_y:
         return (across[0], along[0], across[1], along[1])
     return (along[0], across[0], along[1], across[1])
 
@@ -203,7 +206,7 @@ def _structure(model: Modelspace) -> None:
 
 
 def _stairs(model: Modelspace) -> None:
-    """A flight up along the wall, the well of the flight down beside it, and a railing around the well."""
+    """Draw a flight up along the wall, next to it the well of the flight down, and its railing."""
     _rectangle(model, FLIGHT, layer="STAIRS", global_id=_global_id("stairs up"))
     x0, y0, x1, y1 = FLIGHT
     for tread in range(1, TREADS):
@@ -219,7 +222,7 @@ def _stairs(model: Modelspace) -> None:
 
 
 def _global_id(name: str) -> str:
-    """An IFC GlobalId, 22 digits to base 64, made from a name."""
+    """Return an IFC GlobalId, 22 digits to base 64, made from a name."""
     digits = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
     number = int.from_bytes(hashlib.sha256(name.encode()).digest()[:16], "big")
     return "".join(digits[number >> shift & 63] for shift in range(126, -1, -6))

@@ -1,1 +1,1 @@
-"""Recordings in a viewer: live, headless, and as an importer of Rerun."""
+"""Viewers of recordings: live, headless, and as an importer of Rerun."""

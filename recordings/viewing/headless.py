@@ -1,4 +1,4 @@
-"""Pictures of every view of recordings, by a Rerun viewer without a window, on loopback."""
+"""Pictures of every view of recordings, made by a Rerun viewer without a window, on loopback."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from stopgo.recordings.drawing import entities
 from stopgo.recordings.rrd.compact import VIEWER
 
 PATIENCE_S = 120.0
-"""Of real time: the last net."""
+"""Limit of waiting, in real time."""
 REDRAW_S = 0.3
-"""A picture taken sooner shows the view as it was: the viewer does not tell when it has drawn."""
+"""Pause before a picture: the viewer does not report when it has drawn."""
 SIZE = "1600x1000"
 DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
-"""Where Vulkan's loader looks for drivers."""
+"""Folders in which Vulkan's loader searches for drivers."""
 
 Blueprint = Mapping[str, Any]
-"""A viewer's layout: what is told at each of its paths."""
+"""Layout of a viewer: components at each of its paths."""
 
 
 def write_pictures(recordings: Sequence[Path], folder: Path) -> list[Path]:
@@ -40,23 +40,24 @@ def write_pictures(recordings: Sequence[Path], folder: Path) -> list[Path]:
     Raises
     ------
     InputError
-        When there is no viewer, nothing to draw with, or no room in `folder`.
+        When there is no viewer, no graphics driver, or no room in `folder`.
     """
     must_be_drawable()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be made a folder ({error.strerror}); name another") from None
+        raise InputError(f"{folder}: cannot create this folder ({error.strerror}); name another") from None
     with viewer(recordings) as client, TemporaryDirectory() as temporary:
         wait_until(lambda: bool(_outermost(client)))
         return [
-            _written(folder / f"{number:02}-{file_name(_words(name))}.png", picture)
+            _write(folder / f"{number:02}-{file_name(_file_words(name))}.png", picture)
             for number, (name, picture) in enumerate(_pictures(client, Path(temporary)), start=1)
         ]
 
 
 def must_be_drawable() -> None:
-    """
+    """Refuse where no pictures can be drawn.
+
     Raises
     ------
     InputError
@@ -66,13 +67,13 @@ def must_be_drawable() -> None:
         raise InputError(f"--png: there is no Rerun viewer at {VIEWER}; install rerun-sdk again")
     if not has_vulkan():
         raise InputError(
-            "--png: no Vulkan driver here, of a graphics card or in software; install one, such as Debian's "
-            "mesa-vulkan-drivers"
+            "--png: no Vulkan driver, neither for a graphics card nor in software; install one, such as "
+            "Debian's mesa-vulkan-drivers"
         )
 
 
 def has_vulkan() -> bool:
-    """Whether any Vulkan driver is installed; other systems than Linux bring what the viewer draws with."""
+    """True if a Vulkan driver is installed; outside Linux, the system has what the viewer needs."""
     named = os.environ.get("VK_ICD_FILENAMES") or os.environ.get("VK_DRIVER_FILES")
     elsewhere = not sys.platform.startswith("linux")
     return elsewhere or bool(named) or any(list(Path(root).glob("*.json")) for root in DRIVERS)
@@ -80,7 +81,7 @@ def has_vulkan() -> bool:
 
 @contextmanager
 def viewer(files: Sequence[Path | str], *, size: str = SIZE) -> Iterator[ViewerClient]:
-    """A viewer that opened the files, or follows `--connect ADDRESS`; it ends with the block.
+    """Open a viewer on the files, or on `--connect ADDRESS`; it ends with the block.
 
     The files are given on the command line, as a person would: opened later they would not be merged.
     """
@@ -96,7 +97,7 @@ def viewer(files: Sequence[Path | str], *, size: str = SIZE) -> Iterator[ViewerC
     )
     try:
         client = _connected(process, port)
-        wait_until(lambda: _settled(client))
+        wait_until(lambda: _is_ready(client))
         yield client
     finally:
         process.kill()
@@ -104,7 +105,8 @@ def viewer(files: Sequence[Path | str], *, size: str = SIZE) -> Iterator[ViewerC
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
-    """
+    """Wait until the viewer fulfils a condition.
+
     Raises
     ------
     InputError
@@ -118,19 +120,19 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 def container(parts: Blueprint, path: str) -> dict[str, Any]:
-    """What a layout tells of tabs, a row, a column or a grid; nothing of others."""
+    """Return the part of a layout about tabs, a row, a column or a grid; empty for other parts."""
     found: dict[str, Any] = parts.get(path, {}).get("ContainerBlueprint", {})
     return found
 
 
 def view_name(parts: Blueprint, path: str) -> str | None:
-    """The name of a view in a layout, if it is one."""
+    """Return the name of a view in a layout; None for other parts."""
     found: str | None = parts.get(path, {}).get("ViewBlueprint", {}).get("display_name")
     return found
 
 
 def outermost(parts: Blueprint) -> str | None:
-    """The container that is in no other."""
+    """Return the container that is in no other."""
     inner = {part for path in parts for part in container(parts, path).get("contents", ())}
     return next((path for path in parts if container(parts, path) and path.strip("/") not in inner), None)
 
@@ -140,11 +142,11 @@ def _outermost(client: ViewerClient) -> str | None:
 
 
 Front = tuple[tuple[str, str], ...]
-"""Tabs, and which of their parts is in front."""
+"""Tabs, and the part of each that is in front."""
 
 
 def _pictures(client: ViewerClient, folder: Path) -> Iterator[tuple[str, bytes]]:
-    """Each view's name, and its picture."""
+    """Yield each view's name, and its picture."""
     parts = client.get_blueprint().blueprint
     shown: Front = ()
     for part, front in _leaves(parts, str(outermost(parts)).strip("/")):
@@ -162,9 +164,9 @@ def _pictures(client: ViewerClient, folder: Path) -> Iterator[tuple[str, bytes]]
 
 
 def _go_to_the_end(client: ViewerClient, name: str) -> None:
-    """Of the timeline that the view's name tells, else of the mission's."""
-    told = re.search(r"\(timeline: (\w+)\)", name)
-    wanted = told[1] if told else entities.MISSION_TIME
+    """Show the newest moment of the timeline in the view's name, else of the mission's timeline."""
+    timeline_in_name = re.search(r"\(timeline: (\w+)\)", name)
+    wanted = timeline_in_name[1] if timeline_in_name else entities.MISSION_TIME
     state = client.get_state()
     active = next(item for item in state.recordings if item.store_id == state.active_recording)
     if active.current_timeline != wanted and wanted in {line.name for line in active.timelines}:
@@ -173,7 +175,7 @@ def _go_to_the_end(client: ViewerClient, name: str) -> None:
 
 
 def _leaves(parts: Blueprint, part: str, front: Front = ()) -> Iterator[tuple[str, Front]]:
-    """Every view in a part of a layout, and what must be in front for it to be seen."""
+    """Yield every view in a part of a layout, with the tabs that must be in front to show it."""
     held = container(parts, f"/{part}")
     if not held:
         yield part, front
@@ -183,12 +185,12 @@ def _leaves(parts: Blueprint, part: str, front: Front = ()) -> Iterator[tuple[st
         yield from _leaves(parts, item, (*front, (f"/{part}", item)) if tabs else front)
 
 
-def _words(name: str) -> str:
-    """The name of a view without what explains it, as words that a file's name can hold."""
+def _file_words(name: str) -> str:
+    """Return the name of a view without its explanation, as words for a file name."""
     return "-".join(re.findall(r"\w+", name.partition(" (")[0]))
 
 
-def _written(path: Path, picture: bytes) -> Path:
+def _write(path: Path, picture: bytes) -> Path:
     write_atomic(path, picture)
     return path
 
@@ -204,9 +206,9 @@ def _connected(process: subprocess.Popen[bytes], port: int) -> ViewerClient:
         else:
             return client
     ended = "does not answer" if process.poll() is None else f"ended with code {process.returncode}"
-    raise InputError(f"the Rerun viewer {ended}; `rerun --headless` tells why")
+    raise InputError(f"the Rerun viewer {ended}; run `rerun --headless` for the reason")
 
 
-def _settled(client: ViewerClient) -> bool:
+def _is_ready(client: ViewerClient) -> bool:
     state = client.get_state()
     return not state.loading and state.active_recording is not None

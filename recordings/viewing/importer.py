@@ -1,8 +1,8 @@
-"""What Rerun asks of a program that opens files for it: is the file ours, and if so, what is to be shown.
+"""Importer for Rerun: checks whether a file is ours, and returns the recording to show.
 
 Rerun calls every `rerun-importer-*` on the PATH for every file that is opened, and reads a recording from its
-stdout (https://rerun.io/docs/concepts/logging-and-ingestion/importers/overview). The code that says that a
-file is another's is 66.
+stdout (https://rerun.io/docs/concepts/logging-and-ingestion/importers/overview). Exit code 66 means that
+another importer must read the file.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from stopgo.mission.document import SCHEMA, Mission
 from stopgo.mission.floor import FloorPlan
 
 NOT_OURS = 66
-"""Rerun's EXTERNAL_IMPORTER_INCOMPATIBLE_EXIT_CODE; told without loading Rerun."""
+"""Rerun's EXTERNAL_IMPORTER_INCOMPATIBLE_EXIT_CODE; known without loading Rerun."""
 FLOORS = (".dxf", ".ifc", ".ifczip")
-"""What is read as a floor, whatever is in it: a damaged one is told of."""
+"""Suffixes of files that are read as a floor in any case: a damaged one is reported."""
 MAPS = (".yaml", ".yml")
-"""What is read as a floor if it says that it is a robot's map."""
+"""Suffixes of files that are read as a floor if they describe a robot's map."""
 
 
 def is_ours(path: Path) -> bool:
-    """Whether a file is a mission or a floor; other JSON and YAML are left to others."""
+    """True if a file is a mission or a floor; other JSON and YAML files are left to other importers."""
     suffix = path.suffix.lower()
     if suffix in FLOORS:
         return path.is_file()
@@ -32,32 +32,33 @@ def is_ours(path: Path) -> bool:
 
 
 def recording_of(path: Path, recording_id: str | None, read_floor: Callable[[Path], FloorPlan]) -> bytes:
-    """A mission's stops and route, or a floor, as a recording.
+    """Return a mission's stops and route, or a floor, as a recording.
 
-    A mission's has the mission's id, so that it lies on its plan and runs; a floor's has the one asked for.
+    A mission's recording has the mission's id, so that it overlays its plan and runs; a floor's has the given
+    id.
 
     Raises
     ------
     InputError
-        When the file cannot be read as what it is.
+        When the file cannot be read as a mission or a floor.
     """
     from stopgo.recordings.plan import PlanRecording
 
-    noun = _noun(path, read_floor)
-    own = noun.id if isinstance(noun, Mission) else recording_id or noun.digest
+    content = _content(path, read_floor)
+    own = content.id if isinstance(content, Mission) else recording_id or content.digest
     recording = PlanRecording(own)
-    recording.observe(noun)
+    recording.observe(content)
     return recording.streamed()
 
 
-def _noun(path: Path, read_floor: Callable[[Path], FloorPlan]) -> Mission | FloorPlan:
+def _content(path: Path, read_floor: Callable[[Path], FloorPlan]) -> Mission | FloorPlan:
     from stopgo.mission.files.mission_json import read
 
     return read(path) if path.suffix.lower() == ".json" else read_floor(path)
 
 
 def _bytes(path: Path) -> bytes:
-    """Nothing, where it cannot be read: whoever can, may."""
+    """Return the file's bytes; none if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError:

@@ -1,7 +1,7 @@
-"""Opens the Rerun viewer: on recordings that are closed, or on a run that is being recorded.
+"""Rerun viewer on closed recordings, or on a run that is being recorded.
 
-A viewer reads a file once and does not see it grow, so it is told of a run while that is recorded. Both
-listen on this machine only.
+A viewer reads a file once and does not see it grow, so a live run is also sent to it while it is recorded.
+Both listen on this machine only.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def open_viewer(recordings: Sequence[Path]) -> None:
 
 
 def start_viewer(address: str) -> None:
-    """Show what is recorded live, in a viewer that stays open, also after Ctrl-C here."""
+    """Show a live recording in a viewer that stays open, also after Ctrl-C here."""
     subprocess.Popen(
         _command(["--connect", address]),
         stdout=subprocess.DEVNULL,
@@ -39,17 +39,18 @@ def start_viewer(address: str) -> None:
 
 
 def must_have_screen() -> None:
-    """
+    """Refuse where no window can be shown.
+
     Raises
     ------
     InputError
-        If there is nothing to show a window on, or no viewer.
+        If there is no screen, or no viewer.
     """
     if not VIEWER.exists():
         raise InputError(f"--view: there is no Rerun viewer at {VIEWER}; install rerun-sdk again")
     screens = ("DISPLAY", "WAYLAND_DISPLAY")
     if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in screens):
-        raise InputError(f"--view: no screen here ({' and '.join(screens)} are not set); leave out --view")
+        raise InputError(f"--view: no screen ({' and '.join(screens)} are not set); leave out --view")
 
 
 def _command(what: Sequence[str]) -> list[str]:
@@ -57,7 +58,7 @@ def _command(what: Sequence[str]) -> list[str]:
 
 
 class Viewed:
-    """A field recording that is looked at: the viewer opens once there is something to be seen."""
+    """Field recording with a viewer that opens once there is something to show."""
 
     def __init__(self, record: FieldRecording, start: Callable[[str], None] = start_viewer) -> None:
         self._record = record
@@ -89,8 +90,8 @@ class Viewed:
     def event(self, event: AnyEvent) -> None:
         self._record.event(event)
 
-    def health(self, told: Health) -> None:
-        self._record.health(told)
+    def health(self, report: Health) -> None:
+        self._record.health(report)
 
     def missing(self, gap: PosesMissing) -> None:
         self._record.missing(gap)

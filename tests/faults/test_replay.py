@@ -12,7 +12,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import NegativeResult
 from stopgo.recordings.replay.fitting import fitted
 from stopgo.recordings.replay.matching import Match, long_enough, matched
-from stopgo.recordings.replay.standstills import standings
+from stopgo.recordings.replay.standstills import find_standstills
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 
@@ -52,7 +52,7 @@ def run_of(seed: int) -> Run:
 
 def truth_of(run: Run, match: Match) -> int | None:
     """At which stop the robot really was during a halt; -1 where it did not halt at all."""
-    middle = ((match.standing.begin_ns + match.standing.end_ns) / 2 - BEGIN_NS) / 1e9
+    middle = ((match.standstill.begin_ns + match.standstill.end_ns) / 2 - BEGIN_NS) / 1e9
     seconds = (middle - run.senses.clock_offset_s) / (1 + run.senses.clock_drift)
     for halt in run.drive.halts:
         if halt.begin_s - 0.5 <= seconds <= halt.end_s + 0.5:
@@ -65,7 +65,7 @@ def counts_of(run: Run, matches: tuple[Match, ...]) -> Counter[str]:
     found: Counter[str] = Counter()
     for match in matches:
         true = truth_of(run, match)
-        called = match.stop is not None and long_enough(match.standing, run.mission.stops[match.stop])
+        called = match.stop is not None and long_enough(match.standstill, run.mission.stops[match.stop])
         found["right" if true == match.stop else "false" if called else "unsure"] += 1
     found["unsure"] += max(0, len(run.drive.halts) - len(matches))
     return found
@@ -76,7 +76,7 @@ def test_halts_are_matched_right_and_never_falsely() -> None:
     for seed in range(RUNS):
         run = run_of(seed)
         track = logged(run.drive, run.senses, seed)
-        total += counts_of(run, matched(standings(track, speed=1.0), run.mission, track))
+        total += counts_of(run, matched(find_standstills(track, speed=1.0), run.mission, track))
     assert total["false"] == 0
     assert total["right"] >= 0.99 * sum(total.values()), total
 
@@ -84,7 +84,7 @@ def test_halts_are_matched_right_and_never_falsely() -> None:
 def test_offsets_without_noise_are_true_to_a_centimetre() -> None:
     for seed in range(RUNS):
         run = run_of(seed)
-        halts = standings(logged(run.drive), speed=1.0)
+        halts = find_standstills(logged(run.drive), speed=1.0)
         for found, halt in zip(halts, run.drive.halts, strict=True):
             assert math.dist(found.xy, (halt.x, halt.y)) < 0.01
 
@@ -99,7 +99,7 @@ def test_a_fit_to_the_stops_is_right_or_refused() -> None:
             noise_m=0.05, noise_rad=0.03, slip=run.senses.slip, turned=float(rng.uniform(-3, 3)),
             shifted=(float(rng.uniform(-50, 50)), float(rng.uniform(-50, 50))),
         )  # fmt: skip
-        halts = standings(logged(run.drive, senses, seed), speed=1.0)
+        halts = find_standstills(logged(run.drive, senses, seed), speed=1.0)
         try:
             fit = fitted(halts, run.mission)
         except NegativeResult:

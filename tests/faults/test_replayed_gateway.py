@@ -17,9 +17,9 @@ from stopgo.mission.document import Mission
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, StateReport
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.path_and_time import driven_path
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.way_and_time import way_of
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.driving.world import SITE, gateway, rover, site_mission
 from tests.faults.sizes import size
@@ -73,7 +73,7 @@ def test_a_run_through_the_gateway_is_told_as_the_vehicle_drove_it(
         assert told.comparison.seconds_in("HELD", "PAUSED") > 0
         _is_true(told, rows)
     driven = sum(math.dist(a[1:], b[1:]) for a, b in pairwise(rows))
-    assert way_of(told).driven_m == pytest.approx(driven, abs=0.05)
+    assert driven_path(told).driven_m == pytest.approx(driven, abs=0.05)
 
 
 def _drive(mission: Mission, station: Any, halt: Callable[[], None], path: Path) -> None:
@@ -104,7 +104,7 @@ def _is_true(told: Replay, rows: Rows) -> None:
         if item.outcome != "scanned":
             assert not visits and item.deviation_m is None
             continue
-        halt = visits[0].standing
+        halt = visits[0].standstill
         during = [(x, y) for ns, x, y in rows if halt.begin_ns <= ns <= halt.end_ns]
         x, y = during[-1]
         assert max(math.dist(place, (x, y)) for place in during) < ROLLS_M

@@ -12,9 +12,9 @@ from stopgo.mission.comparing.comparison import StopComparison
 from stopgo.mission.document import Stop
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.path_and_time import driven_path
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.way_and_time import way_of
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import wandering
 from tests.recordings.replay.witnessed import Witness, run_of, troubles_of
@@ -68,17 +68,17 @@ def _is_true_of_run(witness: Witness, told: Replay) -> None:
         shots, visits = witness.shots_at(stop), told.at(number)
         assert len(visits) == bool(witness.arrivals(stop))
         if shots and shots[-1].good:
-            halt = visits[0].standing
+            halt = visits[0].standstill
             assert (halt.begin_ns, halt.end_ns) == (witness.arrivals(stop)[0][0], shots[-1].end_ns)
 
 
 def _is_true_of_way(witness: Witness, told: Replay) -> None:
     """The way and the halts beside it, from poses of which those that hardly differ were left out."""
-    way, travelled = way_of(told), told.comparison.log.poses.length_m
+    way, travelled = driven_path(told), told.comparison.log.poses.length_m
     assert travelled == pytest.approx(witness.length_m, rel=0.002, abs=0.02 + SHAKEN * witness.shakes_m)
     assert way.driven_m == pytest.approx(witness.length_m, rel=0.005, abs=0.02 + SHAKEN * witness.shakes_m)
-    visits = [match.standing for match in told.matches if match.how == "visit"]
-    halts = [(match.standing.begin_ns, match.standing.end_ns) for match in told.extra]
+    visits = [match.standstill for match in told.matches if match.how == "visit"]
+    halts = [(match.standstill.begin_ns, match.standstill.end_ns) for match in told.extra]
     for rest in witness.rests(least_s=6.0):
         at_stop = any(rest[0] <= one.end_ns and one.begin_ns <= rest[1] for one in visits)
         assert at_stop or any(rest == pytest.approx(halt, abs=THIN_NS, rel=0) for halt in halts)

@@ -19,7 +19,7 @@ from tests.recordings import run, world
 
 @pytest.fixture(scope="package", autouse=True)
 def _read_in_this_process() -> Iterator[None]:
-    """What the tests themselves have recorded needs no process that reads it first."""
+    """Read recordings of the tests in this process: they are not damaged."""
     with pytest.MonkeyPatch.context() as patch:
         if not FULL:
             patch.setattr(reading, "fatal_faults", lambda paths: {})

@@ -1,6 +1,6 @@
-"""How much a picture of a view differs from a small one that was looked at once and kept.
+"""Difference between a picture of a view and a small reference picture that a person has checked.
 
-`python -m tests.recordings.pictures` makes the kept ones anew; look at them before they are committed.
+`python -m tests.recordings.pictures` makes new reference pictures; look at them before they are committed.
 """
 
 from __future__ import annotations
@@ -35,8 +35,9 @@ def kept(name: str) -> Path:
 
 
 def difference(found: Fields, expected: Fields) -> float:
-    """What differs, as a share of all that stands out from the expected picture's background; or of its
-    colours alone, where it has any and they differ more.
+    """Return the difference as a fraction of all that contrasts with the expected picture's background.
+
+    If the expected picture has colours and they differ more, return the difference of the colours.
     """
     background = np.median(expected.reshape(-1, 3), axis=0)
     whole = np.abs(found - expected).sum() / np.abs(expected - background).sum()
@@ -45,7 +46,7 @@ def difference(found: Fields, expected: Fields) -> float:
 
 
 def _colours(picture: Fields) -> Fields:
-    """What is not grey, the background's tint aside."""
+    """Return the colours of a picture, without grey and without the tint of the background."""
     tint = picture - picture.mean(axis=2, keepdims=True)
     return tint - np.median(tint.reshape(-1, 3), axis=0)
 

@@ -28,7 +28,7 @@ def _version(path: Path) -> tuple[int, ...]:
 
 @lru_cache(maxsize=4)
 def _chunks(path: Path, version: tuple[int, ...]) -> list[Any]:
-    """What a file holds, read once for all that a test asks of it."""
+    """Content of a file, read once for all questions of a test."""
     return list(chunks(path))
 
 

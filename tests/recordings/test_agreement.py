@@ -47,7 +47,7 @@ def test_candidates_stops_and_coverage_agree_wherever_they_are_told(tmp_path: Pa
     (report,) = static(path, "/report", "TextDocument:text")
     assert re.search(r"\| reachable candidates \| 3 \|", report) and "| stops | 2 |" in report
     page = report_html(subject_of(reviewed([read_recording(path)]))).decode()
-    assert "Why each stop" in page and ">0.3</td>" in page and "21.4 %" in page
+    assert "Reasons for each stop" in page and ">0.3</td>" in page and "21.4 %" in page
     assert "78.5 %" in page and ">2</b>" in page
     log = [line for _, (line,) in cells(path, "/log/plan", "TextLog:text")]
     assert "selection (greedy): 2 stops, coverage 78.5 %, at least 2 are needed" in log

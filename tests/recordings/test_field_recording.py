@@ -19,7 +19,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Pose, PoseReport, Scanned, StateReport
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.drawing import entities
-from stopgo.recordings.rrd import pieces
+from stopgo.recordings.rrd import segment_file
 from stopgo.recordings.rrd.compact import compact
 from stopgo.recordings.rrd.read import check
 from stopgo.recordings.runs.field import FieldRecording
@@ -235,7 +235,7 @@ def test_what_finds_no_room_waits_until_there_is_some(tmp_path: Path, mission: M
             tell(recording, report)
     assert said == [
         f"{partial}: cannot be written (File too large); the recording waits in memory for room",
-        f"{partial}: there is room again; what waited is written",
+        f"{partial}: the disk has room again; waiting data was written",
     ]
     held, whole = check(path), check(field)
     assert held.complete
@@ -250,8 +250,8 @@ def test_what_finds_no_room_to_the_end_is_told_and_keeps_its_partial_name(
     with pytest.raises(InputError) as raised, small_disk(180_000), FieldRecording(path, mission) as recording:
         for report in run.reports(mission):
             tell(recording, report)
-    why = "could not be written whole (File too large)"
-    assert str(raised.value) == f"{path}: {why}; what could be is in {partial}"
+    why = "could not be written completely (File too large)"
+    assert str(raised.value) == f"{path}: {why}; the saved part is in {partial}"
     assert os.listdir(tmp_path) == [partial.name]
     events = check(partial).rows[f"{RUN}/events"]
     assert 0 < events < check(field).rows[f"{RUN}/events"]
@@ -260,9 +260,9 @@ def test_what_finds_no_room_to_the_end_is_told_and_keeps_its_partial_name(
 def test_what_is_too_much_for_the_memory_is_not_called_whole(
     tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pieces, "MOST_WAITING", 150_000)
+    monkeypatch.setattr(segment_file, "MOST_WAITING", 150_000)
     path = tmp_path / "field.rrd"
-    why = "could not be written whole (too much waited for room); what could be is in"
+    why = "could not be written completely (too much data waited for room); the saved part is in"
     with (
         pytest.raises(InputError, match=re.escape(why)),
         small_disk(0) as full_at,
@@ -286,7 +286,7 @@ def test_how_a_run_ended_is_not_hidden_by_what_became_of_its_recording(
         FieldRecording(path, mission, say=said.append),
     ):
         raise KeyboardInterrupt
-    assert said[-1] == f"{path}: could not be written whole (File too large); nothing is kept"
+    assert said[-1] == f"{path}: could not be written completely (File too large); the file was not saved"
     assert not os.listdir(tmp_path)
 
 
@@ -318,7 +318,7 @@ def test_a_recording_that_was_cut_is_left_under_its_partial_name(tmp_path: Path,
     whole = write_field(tmp_path / "whole.rrd", mission).read_bytes()
     partial = tmp_path / "field.partial.rrd"
     partial.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match="cut off"):
+    with pytest.raises(InputError, match="is truncated"):
         compact(partial, path)
     assert partial.exists()
     assert not path.exists()
@@ -360,7 +360,7 @@ def test_the_report_of_a_large_mission_stays_short_until_the_run_is_over(mission
     arrived, finished = events[1], events[-1]
     going = run_report([large], "run-1", {}, arrived)
     assert (going.count("| S"), "| S1 |" in going, "| S999 |" in going) == (60, True, False)
-    assert "940 stops farther off" in going
+    assert "940 other stops are listed" in going
     assert run_report([large], "run-1", {}, finished).count("| S") == 1000
 
 
@@ -375,9 +375,9 @@ def test_names_of_a_thousand_stops_do_not_bury_the_plan(tmp_path: Path, mission:
 
 def test_no_path_is_drawn_through_what_nobody_knows_of() -> None:
     trail = Trail()
-    _, first = trail.lengthened(Track.of([0, 10**9], [(0.0, 0.0), (1.0, 0.0)], [0.0, 0.0]))
+    _, first = trail.extended(Track.of([0, 10**9], [(0.0, 0.0), (1.0, 0.0)], [0.0, 0.0]))
     trail.end()
-    _, second = trail.lengthened(Track.of([2 * 10**9, 3 * 10**9], [(5.0, 0.0), (6.0, 0.0)], [0.0, 0.0]))
+    _, second = trail.extended(Track.of([2 * 10**9, 3 * 10**9], [(5.0, 0.0), (6.0, 0.0)], [0.0, 0.0]))
     assert [strip.tolist() for strip in (*first, *second)] == [
         [[0.0, 0.0], [1.0, 0.0]],
         [[5.0, 0.0], [6.0, 0.0]],

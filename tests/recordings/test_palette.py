@@ -1,4 +1,4 @@
-"""What colour alone tells apart is told apart by every eye, and what is written is read on light and dark."""
+"""Colours with different meanings differ for every eye, and texts are readable on light and dark."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_a_skipped_stop_is_told_with_what_it_cost(
     assert "skip by ann" in text
     command = f"stopgo replay {skipping} --mission mission.json --floor FLOOR --top-up next.json"
     assert text.rstrip().endswith(
-        f"For what is missing, a further mission (FLOOR is the file of small.dxf): {command}"
+        f"For the missing coverage, plan a follow-up mission (FLOOR is the file of small.dxf): {command}"
     )
     page = tmp_path / "report.html"
     assert main(["review", str(sighted), str(skipping), "--html", str(page)]) == 1
@@ -69,7 +69,7 @@ def test_nothing_is_to_be_done_after_a_run_as_planned(
     sighted: Path, field: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["review", str(sighted), str(field)]) == 0
-    assert "a further mission" not in capsys.readouterr().out
+    assert "a follow-up mission" not in capsys.readouterr().out
 
 
 def test_without_its_plan_a_skipped_stop_is_a_no(skipping: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -91,7 +91,7 @@ def test_a_folder_is_read_and_one_bad_file_hides_no_other(
 
 def test_an_empty_folder_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["review", str(tmp_path)]) == 2
-    assert "there is no .rrd file in this folder" in capsys.readouterr().err
+    assert "no .rrd file in this folder" in capsys.readouterr().err
 
 
 def test_whole_recordings_pass_the_check(plan: Path, field: Path) -> None:
@@ -115,7 +115,7 @@ def test_a_recording_of_another_mission_than_it_says_fails_the_check(field: Path
     other = sealed(msgspec.structs.replace(mission, name="other"))
     assert problems_of(read) == ()
     (problem,) = problems_of(replace(read, missions=(other,)))
-    assert "its run is of digest" in problem
+    assert "its run has digest" in problem
 
 
 def test_junk_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

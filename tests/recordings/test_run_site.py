@@ -135,7 +135,7 @@ def test_a_run_that_is_copied_with_its_old_date_is_in_the_recording(
 def test_a_folder_that_goes_away_is_told_on_the_page(tmp_path: Path) -> None:
     answer = RunSite(tmp_path / "gone", "http://127.0.0.1:1", tmp_path).answer("/")
     assert answer.status == 409
-    assert b"is no folder" in answer.body
+    assert b"not a folder" in answer.body
 
 
 def test_a_browser_that_goes_away_is_no_error(site: RunSite, capsys: pytest.CaptureFixture[str]) -> None:

@@ -51,7 +51,7 @@ def test_a_name_stands_where_the_room_is_wide() -> None:
 def test_units_with_one_value_are_drawn_as_one_piece() -> None:
     targets = world.space_of(world.floor_at()).targets
     value = np.repeat([1, 2], [6, 26])
-    lines, values = strokes.pieces(targets, value)
+    lines, values = strokes.lines_by_value(targets, value)
     # The first face has one value, the second is cut in its middle, six faces are whole.
     assert len(lines) == 1 + 2 + 6
     assert list(values[:3]) == [1, 1, 2]

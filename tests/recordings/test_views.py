@@ -185,7 +185,7 @@ def _difference(picture: Path, which: str, view: str) -> float:
 
 
 def shows(picture: Path, colour: palette.Colour | None) -> bool:
-    """Whether at least ten pixels have the colour, but for rounding; without one, whether it is not blank."""
+    """Return True if at least ten pixels have the colour; without a colour, if the picture is not blank."""
     if colour is None:
         return len(np.unique(pixels(picture).astype(np.int64) @ (1, 256, 256**2))) > 20
     away = np.abs(pixels(picture).astype(int) - colour[:3]).max(axis=1)

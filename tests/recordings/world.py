@@ -156,6 +156,10 @@ def route_of(selection: Selection) -> Route:
     )
 
 
+def origin() -> Origin:
+    return Origin(floor="small.dxf", floor_digest=FLOOR_DIGEST, parameters={"seed": 1}, stopgo="0.1.0")
+
+
 def mission_of(route: Route) -> Mission:
     sees = (Sees(units=8, new_units=8), Sees(units=7, new_units=3))
     stops = tuple(
@@ -189,12 +193,7 @@ def mission_of(route: Route) -> Mission:
             stops=stops,
             return_=None,
             policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
-            origin=Origin(
-                floor="small.dxf",
-                floor_digest=FLOOR_DIGEST,
-                parameters={"seed": 1},
-                stopgo="0.1.0",
-            ),
+            origin=origin(),
         )
     )
 

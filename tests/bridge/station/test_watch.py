@@ -325,5 +325,6 @@ def test_a_run_is_followed_to_its_end_though_its_recording_finds_no_room(
     assert [line for line in told.err.splitlines() if "field" in line] == [
         f"{rrd.with_name('field.partial.rrd')}: cannot be written (File too large); "
         "the recording waits in memory for room",
-        f"{'stopgo: ' * (code == 2)}{rrd}: could not be written whole (File too large); nothing is kept",
+        f"{'stopgo: ' * (code == 2)}{rrd}: could not be written completely (File too large); "
+        "the file was not saved",
     ]

@@ -48,7 +48,7 @@ def test_a_proof_is_written_read_back_and_told(planned: Path) -> None:
     assert (held.complete, held.recording_id) == (True, mission["id"])
     assert "/world/proof/clouds/s01" in held.rows
     page = (planned / "proof.html").read_text(encoding="utf-8")
-    assert "proof by simulation" in page and mission["digest"] in page
+    assert "verification by simulation" in page and mission["digest"] in page
 
 
 def test_a_damaged_coverage_beside_the_mission_is_told(planned: Path, tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def test_a_vehicle_that_is_switched_off_cuts_its_last_message(tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:-5])
     log = read_log(path)
     assert log.lost == ""
-    assert "last message is cut off" in log.oddities[0]
+    assert "last message is truncated" in log.oddities[0]
 
 
 def told(count: int = 50) -> list[tuple[int, int, object]]:
@@ -121,7 +121,7 @@ def test_noise_inside_a_telemetry_log_costs_no_more_than_what_it_hits(tmp_path: 
 def test_a_log_of_neither_kind_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.tlog"
     path.write_bytes(b"x" * 1000)
-    with pytest.raises(InputError, match="no packet"):
+    with pytest.raises(InputError, match="no readable packet"):
         read_log(path)
     path = tmp_path / "a.ulg"
     path.write_bytes(b"ULog\x01\x12\x35" + b"\0" * 30)
@@ -152,14 +152,14 @@ def test_a_ulog_gives_its_valid_positions_east_and_north_of_its_origin(tmp_path:
     assert [(remark.kind, remark.ns) for remark in log.remarks if remark.kind != "text"] == [
         ("mode", 0), ("trigger", 2_500_000_000), ("mode", 3_000_000_000)
     ]  # fmt: skip
-    assert track.oddities == ("10 of 60 poses are no numbers, left out",)
+    assert track.oddities == ("10 of 60 poses are not finite; left out",)
 
 
 def test_a_ulog_without_a_valid_position_says_so(tmp_path: Path) -> None:
     rows = [(k * 100_000, 47.0, 8.0, 0.0, 0.0, 0.0, False, False) for k in range(5)]
     log = read_log(write_ulog(tmp_path / "a.ulg", {"vehicle_local_position": (LOCAL, rows)}))
     assert log.poses == ()
-    assert "none of its 5 positions is valid" in log.oddities[0]
+    assert "none of its 5 positions is marked valid" in log.oddities[0]
 
 
 def test_missions_that_were_sent_one_after_another_have_their_times(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def test_gaps_jumps_and_poses_that_are_no_numbers_are_told(tmp_path: Path) -> No
     late = [(topic, kind, ns + 4 * 10**9, m) for topic, kind, ns, m in rows[25:]]
     log = read_log(write_bag(tmp_path / "a.mcap", [*rows[:25], *late]), Reading(stamps="log"))
     told = " | ".join(log.poses[0].oddities)
-    assert "1 of 30 poses are no numbers" in told
+    assert "1 of 30 poses are not finite" in told
     assert "1 gaps without poses, 4.1 s" in told
     assert "1 jumps of position, the largest 5.01 m" in told
 

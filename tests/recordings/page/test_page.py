@@ -57,14 +57,21 @@ def test_a_run_tells_its_verdict_and_every_figure() -> None:
     assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was asked, 78.5 % planned." in text
     assert "stops scanned 1 / 2" in text
     assert "−21.4 %" in text
-    assert "off the route, worst 10.0 mm" in text
-    assert "stood still 0:16 paused 1, held 0" in text
+    assert "greatest cross-track error 10.0 mm" in text
+    assert "stationary 0:16 paused 1, held 0" in text
+
+
+def test_a_bar_marks_the_required_coverage() -> None:
+    mission, sight = planned()
+    asked = replace(sight, ledger=replace(sight.ledger, kind_required=0.7))
+    page = report_html(ReportSubject((mission,), (), asked)).decode()
+    assert '<i style="left:70.0%"></i>' in page
 
 
 def test_a_plan_alone_has_a_page() -> None:
     mission, sight = planned()
     text = words(report_html(ReportSubject((mission,), sight=sight)))
-    assert "Planned. 78.5 % of what is visible will be scanned; 70.0 % was asked." in text
+    assert "Planned. 78.5 % of what is visible will be scanned; 70.0 % is required." in text
     assert "stops 2" in text
 
 
@@ -114,8 +121,8 @@ def test_alignment_and_losses_of_a_log_are_told() -> None:
     source = replace(comparison.log.source, name="robot.bag", format="rosbag", messages=9, lost=3)
     log = replace(comparison.log, alignment=fit, source=source)
     text = words(report_html(replace(subject, comparisons=(replace(comparison, log=log),))))
-    assert "fitted to 2 stops: turned by 5.730°, shifted by (1.000, 2.000) m" in text
-    assert "of 2 pairs 12.0 mm rms are left, 20.0 mm at most" in text
+    assert "fitted to 2 stops: rotated by 5.730°, shifted by (1.000, 2.000) m" in text
+    assert "residuals of 2 pairs: 12.0 mm rms, 20.0 mm at most" in text
     assert "robot.bag (rosbag): 9 messages read, 3 lost" in text
 
 
@@ -138,7 +145,7 @@ def test_recordings_of_two_missions_are_no_one_report(
     (item,) = found.recordings
     contents = replace(item.recording.contents, recording_id="f" * 32)
     other = replace(item, recording=replace(item.recording, contents=contents))
-    with pytest.raises(Exception, match="a report is of one mission"):
+    with pytest.raises(Exception, match="needs recordings of one mission"):
         subject_of(replace(found, recordings=(item, other)))
 
 

@@ -67,7 +67,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Odd:
-    """What goes otherwise than planned: indices of stops, and how far off the robot stands (m, 1 sigma)."""
+    """Deviations from the plan: indices of stops, and the robot's position error (m, 1 sigma)."""
 
     skipped: frozenset[int] = frozenset()
     repeated: frozenset[int] = frozenset()
@@ -102,7 +102,7 @@ def driven(mission: Mission, odd: Odd = Odd(), seed: int = 1) -> Drive:
 
 @dataclass(frozen=True)
 class Senses:
-    """What a log makes of a drive."""
+    """Log of a drive."""
 
     noise_m: float = 0.0
     noise_rad: float = 0.0

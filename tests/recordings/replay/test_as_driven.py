@@ -1,4 +1,4 @@
-"""What a robot saw from where it really stood, and the further mission that sees the rest."""
+"""Targets visible from the robot's true stationary poses, and the follow-up mission for the rest."""
 
 from __future__ import annotations
 

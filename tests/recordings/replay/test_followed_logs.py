@@ -11,7 +11,6 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.transform import SiteOrigin
@@ -20,7 +19,7 @@ from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Pose, Scanned, Unconfirmed
 from stopgo.recordings.logs import read_log
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_text
 from stopgo.recordings.replay.replayed import Replay
@@ -42,6 +41,12 @@ def mission(**details: Any) -> Mission:
     return msgspec.structs.replace(tour(**{"settle_s": 3.0, **details}), georeference=ORIGIN)
 
 
+def rover_setting(folder: Path, faults: tuple[str, ...]) -> VehicleSetup:
+    start = Pose(x=0.0, y=0.0, heading=0.0)
+    found = VehicleFaults(tuple(map(read_vehicle_fault, faults)))
+    return VehicleSetup(PROFILES["ardupilot"], folder, ORIGIN, start, found, seed=1)
+
+
 def logged(
     path: Path, plan: Mission, *, faults: tuple[str, ...] = (), orders: dict[float, Any] | None = None
 ) -> Path:
@@ -49,14 +54,7 @@ def logged(
     clock, rows = SimulatedClock(), list[tuple[int, int, Any]]()
     sent = translate(plan, "ardupilot", trigger="auto")
     vehicle = complete_vehicle(
-        VehicleSetup(
-            PROFILES["ardupilot"],
-            path.parent / "vehicle",
-            ORIGIN,
-            Pose(x=0.0, y=0.0, heading=0.0),
-            VehicleFaults(tuple(map(read_vehicle_fault, faults))),
-            seed=1,
-        ),
+        rover_setting(path.parent / "vehicle", faults),
         clock=clock,
         wall=clock,
         send=lambda message: rows.append((clock.now_ns(), ROVER, message)),
@@ -119,12 +117,12 @@ def test_stops_scanned_outside_their_tolerance_are_told_and_not_driven_as_planne
     laid = replayed(path, narrow)
     assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
     assert [item.stop for item in laid.comparison.outside] == ["S1", "S2", "S3"]
-    assert judged(laid).exit_code == 1
+    assert drive_verdict(laid).exit_code == 1
     for item in laid.comparison.stops:
         assert 0.08 < (item.deviation_m or 0.0) < 0.4
-        away = f"{item.stop} was missed by {1000 * (item.deviation_m or 0.0):.0f} mm (50 mm are tolerated)."
-        assert away in judged(laid).text and away in as_text(laid)
-    assert judged(replayed(path, wide)).exit_code == 0
+        away = f"{item.stop}: position error {1000 * (item.deviation_m or 0.0):.0f} mm (tolerance 50 mm)."
+        assert away in drive_verdict(laid).text and away in as_text(laid)
+    assert drive_verdict(replayed(path, wide)).exit_code == 0
 
 
 def test_a_scan_that_failed_is_told_and_the_way_goes_on(tmp_path: Path) -> None:

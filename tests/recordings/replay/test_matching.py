@@ -13,7 +13,7 @@ from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.fitting import fitted
 from stopgo.recordings.replay.matching import Match, matched
-from stopgo.recordings.replay.standstills import standings
+from stopgo.recordings.replay.standstills import find_standstills
 from tests.mission.worlds import mission_of, stop
 from tests.recordings.replay.driving import BEGIN_NS, Odd, Senses, driven, logged, wandering
 
@@ -27,7 +27,7 @@ def readings(matches: tuple[Match, ...]) -> list[tuple[str, int | None]]:
 @pytest.mark.parametrize("senses", [Senses(), NOISY])
 def test_every_halt_is_found_at_its_place_and_time(senses: Senses) -> None:
     drive = driven(wandering(1), Odd(extra_before=frozenset({3})))
-    halts = standings(logged(drive, senses), speed=1.0)
+    halts = find_standstills(logged(drive, senses), speed=1.0)
     truth = drive.halts
     assert len(halts) == len(truth)
     reach = 0.001 if senses == Senses() else 0.03
@@ -40,8 +40,8 @@ def test_every_halt_is_found_at_its_place_and_time(senses: Senses) -> None:
 def test_turning_on_the_spot_is_no_halt() -> None:
     seconds = np.arange(0, 20, 0.1)
     track = Track.of(seconds * 1e9, np.zeros((200, 2)), 0.5 * seconds)
-    assert standings(track) == ()
-    (halt,) = standings(track, turns=False)
+    assert find_standstills(track) == ()
+    (halt,) = find_standstills(track, turns=False)
     assert halt.seconds == pytest.approx(19.9, abs=0.3)
 
 
@@ -49,20 +49,20 @@ def test_a_correction_of_the_position_does_not_part_a_halt_and_is_told_as_motion
     seconds = np.arange(0, 30, 0.1)
     xy = np.zeros((300, 2))
     xy[150:, 0] = 0.12
-    (halt,) = standings(Track.of(seconds * 1e9, xy, np.zeros(300)))
+    (halt,) = find_standstills(Track.of(seconds * 1e9, xy, np.zeros(300)))
     assert halt.seconds > 29
     assert 0.05 < halt.moved_m < 0.13
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_a_log_of_few_poses_has_no_halt(count: int) -> None:
-    assert standings(Track.of(np.arange(count) * 1e9, np.zeros((count, 2)), np.zeros(count))) == ()
+    assert find_standstills(Track.of(np.arange(count) * 1e9, np.zeros((count, 2)), np.zeros(count))) == ()
 
 
 def test_skipped_repeated_and_extra_halts_are_told_apart() -> None:
     odd = Odd(frozenset({2}), frozenset({4}), frozenset({1, 6}))
     drive = driven(wandering(2), odd)
-    matches = matched(standings(logged(drive, NOISY), speed=1.0), wandering(2))
+    matches = matched(find_standstills(logged(drive, NOISY), speed=1.0), wandering(2))
     visits = [0, 1, 3, 4, 5, 6, 7, 8]
     assert [stop for how, stop in readings(matches) if how == "visit"] == visits
     assert [stop for how, stop in readings(matches) if how == "again"] == [4]
@@ -88,20 +88,20 @@ def test_a_halt_beside_a_later_stop_does_not_skip_those_between() -> None:
         *(stop(f"s{k}", (0.0, 0.0), (4.0 * k, 0.0)) for k in (1, 2, 3, 4)),
         stop("s5", (16.0, 0.0), (6.0, 0.5)),
     )
-    halts = standings(standing_at((4, 0), (6, 0.4), (8, 0), (12, 0), (16, 0), (6, 0.5)))
+    halts = find_standstills(standing_at((4, 0), (6, 0.4), (8, 0), (12, 0), (16, 0), (6, 0.5)))
     assert readings(matched(halts, mission)) == [
         ("visit", 0), ("extra", None), ("visit", 1), ("visit", 2), ("visit", 3), ("visit", 4),
     ]  # fmt: skip
 
 
 def test_going_back_to_a_stop_is_told_as_that() -> None:
-    halts = standings(standing_at((4, 0), (8, 0), (4, 0), (12, 0)))
+    halts = find_standstills(standing_at((4, 0), (8, 0), (4, 0), (12, 0)))
     assert readings(matched(halts, line(4, 8, 12))) == [("visit", 0), ("visit", 1), ("back", 0), ("visit", 2)]
 
 
 def test_halts_between_two_close_stops_are_at_none_of_them() -> None:
     """Stops 0.7 m apart: what is 0.35 m from both is not called either."""
-    halts = standings(standing_at((3.0, 0), (3.35, 0.1)))
+    halts = find_standstills(standing_at((3.0, 0), (3.35, 0.1)))
     assert readings(matched(halts, line(3.0, 3.7))) == [("visit", 0), ("extra", None)]
 
 
@@ -109,7 +109,7 @@ def test_a_turned_and_shifted_log_is_fitted_to_the_stops() -> None:
     senses = Senses(noise_m=0.05, noise_rad=0.03, turned=2.0, shifted=(40.0, -7.0))
     mission = wandering(3)
     track = logged(driven(mission, Odd(frozenset({1}), frozenset({2}), frozenset({5}))), senses)
-    fit = fitted(standings(track, speed=1.0), mission)
+    fit = fitted(find_standstills(track, speed=1.0), mission)
     assert fit.pairs == 9
     assert math.remainder(fit.heading + 2.0, math.tau) == pytest.approx(0, abs=0.005)
     assert np.allclose(fit.placed(np.array([(40.0, -7.0)])), 0, atol=0.05)
@@ -119,7 +119,7 @@ def test_a_turned_and_shifted_log_is_fitted_to_the_stops() -> None:
 @pytest.mark.parametrize("stops", [line(4, 8, 12, 16), line(3, 6)])
 def test_a_fit_that_is_not_the_only_one_is_refused(stops: Mission) -> None:
     """Three halts on four equal steps may be the first three or the last three; two stops tell nothing."""
-    halts = standings(standing_at((4, 0), (8, 0), (12, 0)))
+    halts = find_standstills(standing_at((4, 0), (8, 0), (12, 0)))
     with pytest.raises(NegativeResult, match="--map"):
         fitted(halts, stops)
 
@@ -127,4 +127,4 @@ def test_a_fit_that_is_not_the_only_one_is_refused(stops: Mission) -> None:
 def test_a_log_of_another_mission_is_not_fitted() -> None:
     track = logged(driven(wandering(8)))
     with pytest.raises(NegativeResult, match="--map"):
-        fitted(standings(track, speed=1.0), wandering(9))
+        fitted(find_standstills(track, speed=1.0), wandering(9))

@@ -1,4 +1,4 @@
-"""What scans in a log show: targets hit, deviations, and what stands there unplanned."""
+"""Scans in a log show targets with points, deviations, and unplanned objects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.placed_sweeps import placed_sweeps
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.standstills import standings
+from stopgo.recordings.replay.standstills import find_standstills
 from tests.planner.test_command import drawn
 from tests.recordings.replay.driving import driven, logged
 from tests.recordings.replay.test_as_driven import PLAN
@@ -54,7 +54,7 @@ def scanned(planned: PlannedFloor, *heaps: tuple[float, float, float, float], of
     walls = [shapely.Polygon(shape.exterior, shape.holes) for shape in planned.space.occluders]
     solid = shapely.union_all([*walls, *(shapely.box(*heap) for heap in heaps)])
     solid = shapely.affinity.translate(solid, xoff=off)
-    halts = standings(track, speed=mission.robot.speed)
+    halts = find_standstills(track, speed=mission.robot.speed)
 
     def sweeps() -> Iterator[Sweep]:
         for halt in halts:

@@ -14,7 +14,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Arrived, Finished, Scanned, Skipped, Started
 from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs import read_log
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
@@ -66,7 +66,7 @@ def test_our_own_logs_are_told_by_their_own_events(tmp_path: Path, written: Call
     assert set(outcomes.values()) == {"scanned"}
     assert not found.inferred
     assert found.comparison.greatest_deviation_m == pytest.approx(0.012, abs=1e-6)
-    assert judged(found).answer == "no"
+    assert drive_verdict(found).answer == "no"
     assert len(found.scanned_from) == len(MISSION.stops) - 1
 
 
@@ -84,7 +84,7 @@ def test_a_run_whose_every_stop_was_skipped_has_no_pose_and_is_told(tmp_path: Pa
                 recording.event(event)
     found = replayed(tmp_path / "state")
     assert {item.outcome for item in found.comparison.stops} == {"skipped"}
-    assert judged(found).answer == "no"
+    assert drive_verdict(found).answer == "no"
 
 
 def test_a_run_of_another_mission_is_refused_by_name(tmp_path: Path) -> None:

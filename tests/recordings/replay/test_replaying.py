@@ -21,11 +21,11 @@ from stopgo.mission.files.mission_json import write
 from stopgo.mission.frames.transform import SiteOrigin, Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
-from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.path_and_time import driven_path, lost_times
 from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.way_and_time import lost_times, way_of
 from tests.recordings.logs.writing import Messages, write_bag
 from tests.recordings.replay.driving import Drive, Odd, Senses, driven, logged, wandering
 
@@ -62,17 +62,17 @@ def test_every_figure_of_a_clean_log_is_that_of_the_drive() -> None:
             assert item.deviation_m == pytest.approx(offset_of(drive, MISSION, k), abs=1e-6)
             truth = next(halt for halt in drive.halts if halt.stop == k)
             assert item.arrived_s == pytest.approx(truth.begin_s, abs=0.2)
-    assert judged(found).answer == "no"
+    assert drive_verdict(found).answer == "no"
 
 
 def test_a_drive_as_planned_is_one() -> None:
     found = replay(log_of(logged(driven(MISSION))), MISSION, FIRST)
-    assert judged(found).answer == "yes"
-    assert judged(found).exit_code == 0
-    way = way_of(found)
+    assert drive_verdict(found).answer == "yes"
+    assert drive_verdict(found).exit_code == 0
+    way = driven_path(found)
     assert way.driven_m == pytest.approx(way.planned_m, rel=0.01)
     noisy = replay(log_of(logged(driven(MISSION), Senses(noise_m=0.05))), MISSION, FIRST)
-    assert way_of(noisy).driven_m == pytest.approx(way.planned_m, rel=0.05)
+    assert driven_path(noisy).driven_m == pytest.approx(way.planned_m, rel=0.05)
     assert way.greatest_m == pytest.approx(0, abs=1e-9)
 
 
@@ -91,7 +91,7 @@ def test_a_log_in_another_frame_is_placed_in_every_way(
     mission = sealed(changed(MISSION, **changes))
     track = logged(driven(mission), Senses(turned=0.8, shifted=(5.0, -3.0)))
     found = replay(log_of(track, frame=frame), mission, how)
-    assert judged(found).answer == "yes"
+    assert drive_verdict(found).answer == "yes"
     assert found.comparison.greatest_deviation_m == pytest.approx(0, abs=0.002)
     assert found.run.alignment is not None
     assert math.remainder(found.run.alignment.heading + 0.8, math.tau) == pytest.approx(0, abs=1e-3)
@@ -105,7 +105,7 @@ def test_a_log_on_the_earth_is_placed_by_the_georeference() -> None:
     found = replay(log_of(track, frame="local", **about), mission, Placing())
     assert found.comparison.greatest_deviation_m == pytest.approx(0, abs=1e-6)
     about["origin"] = SiteOrigin(lat=48.0, lon=8.0, alt=0.0, heading_deg=0.0)
-    with pytest.raises(InputError, match="wrong mission"):
+    with pytest.raises(InputError, match="check the mission"):
         replay(log_of(track, frame="local", **about), mission, Placing())
 
 
@@ -116,7 +116,7 @@ def test_a_log_is_never_placed_by_a_guess() -> None:
 
 def test_a_log_of_another_mission_is_refused() -> None:
     track = logged(driven(MISSION))
-    with pytest.raises(InputError, match="wrong mission"):
+    with pytest.raises(InputError, match="check the mission"):
         replay(log_of(track), MISSION, Placing(to_map=Transform(x=500.0, y=0.0, heading=0.0)))
 
 
@@ -163,7 +163,7 @@ def test_a_short_halt_takes_nothing_from_a_long_one_before() -> None:
     found = replay(log_of(Track.of(rows[:, 0] * 1e9, rows[:, 1:3], rows[:, 3])), MISSION, FIRST)
     stop = found.comparison.stops[4]
     assert stop.outcome == "unconfirmed"
-    assert stop.reason.count("stood") == 1
+    assert stop.reason.count("stationary") == 1
 
 
 def test_time_lost_is_found_where_it_was() -> None:
@@ -171,7 +171,7 @@ def test_time_lost_is_found_where_it_was() -> None:
     found = replay(log_of(logged(drive)), MISSION, FIRST)
     stood = next(halt for halt in drive.halts if halt.stop is None)
     worst = lost_times(found)[0]
-    assert worst.where.endswith("at no stop")
+    assert worst.where.endswith("not at a stop")
     assert worst.seconds == pytest.approx(stood.end_s - stood.begin_s, abs=0.5)
 
 
@@ -231,7 +231,7 @@ def test_from_python_a_log_is_replayed_in_one_call(tmp_path: Path) -> None:
     rows = "".join(f"{ns},{x},{y},{heading}\n" for ns, (x, y), heading in table)
     (tmp_path / "run.csv").write_text("time_ns,x,y,heading\n" + rows)
     found = stopgo.replay(tmp_path / "run.csv", MISSION, align="stops")
-    assert judged(found).answer == "yes"
+    assert drive_verdict(found).answer == "yes"
     assert stopgo.replay(tmp_path / "run.csv", MISSION, to_map=(0.0, 0.0, 0.0)).run.alignment is not None
 
 

@@ -64,9 +64,9 @@ def test_it_stood_at_each_stop_while_the_vehicle_says_it_waited(
     delays = [k for k, item in enumerate(executed) if item.CId == DELAY]
     for match, k in zip(found.matches, delays, strict=True):
         begin_ns = executed[k].TimeUS * 1000
-        assert match.standing.begin_ns <= begin_ns - 10**9  # it held for a second before
+        assert match.standstill.begin_ns <= begin_ns - 10**9  # it held for a second before
         ends = executed[k + 1].TimeUS if k + 1 < len(executed) else executed[k].TimeUS + 3_000_000
-        assert match.standing.end_ns >= ends * 1000 - 5 * 10**8
+        assert match.standstill.end_ns >= ends * 1000 - 5 * 10**8
         assert (ends - executed[k].TimeUS) / 1e6 == pytest.approx(3.0, abs=0.05)
     told = [item.reason for item in found.comparison.stops]
     assert all("then waited 3.00 s" in reason for reason in told[:4])
@@ -77,7 +77,7 @@ def test_true_errors_are_those_of_the_simulators_own_position(
 ) -> None:
     home = messages["CMD"][-16]
     for k, stop in enumerate(found.mission.stops):
-        halt = found.matches[k].standing
+        halt = found.matches[k].standstill
         inside = [m for m in messages["SIM"] if halt.begin_ns <= m.TimeUS * 1000 <= halt.end_ns]
         places = np.median([metres(m.Lat, m.Lng, home) for m in inside], axis=0)
         assert found.true_offset_m(k) == pytest.approx(math.dist(places, (stop.x, stop.y)), abs=0.002)
@@ -86,7 +86,7 @@ def test_true_errors_are_those_of_the_simulators_own_position(
 
 def test_offsets_are_those_of_the_vehicles_own_filter(found: Replay, messages: dict[str, list[Any]]) -> None:
     for k, stop in enumerate(found.mission.stops):
-        halt = found.matches[k].standing
+        halt = found.matches[k].standstill
         inside = [
             (m.PE, m.PN)
             for m in messages["XKF1"]

@@ -28,7 +28,7 @@ from tests.bridge.world import Field
 GOES_ON = ("resume", "retry", "skip")
 SILENCE_S = 60.0
 LOOK_S = 0.05
-"""How often the witness looks."""
+"""Interval of the witness's observations."""
 
 
 class WatchedClock(SimulatedClock):
@@ -56,7 +56,7 @@ class Drove:
 
     to: Point
     to_stay: bool
-    """Whether it was to turn to a heading there; past a stop that is left out it is not."""
+    """True if the robot was to rotate to a heading there; it does not at a skipped stop."""
     end_ns: int
     outcome: Outcome
     end: Pose
@@ -83,11 +83,11 @@ class Witness:
     shots: list[Shot] = field(default_factory=list)
     orders: list[tuple[int, str]] = field(default_factory=list)
     shakes_m: float = 0.0
-    """How far a shaking robot is from where it stands."""
+    """Distance of a shaking robot from its stationary position."""
     began_ns: int = 0
     ended_ns: int = 0
     events: tuple[AnyEvent, ...] = ()
-    """What the robot's journal came to; the truth is told by all the others."""
+    """Result of the robot's journal; all other fields are the truth."""
 
     def look(self) -> None:
         pose = self.base.pose()
@@ -173,14 +173,14 @@ def watch(field_: Field, clock: WatchedClock) -> Witness:
 
 @dataclass(frozen=True)
 class Troubles:
-    """What befalls a run: faults, the seconds at which somebody pauses it, and stops that he skips."""
+    """Events of a run: faults, the seconds at which an operator pauses it, and stops that he skips."""
 
     faults: tuple[Fault, ...] = ()
     pauses: tuple[float, ...] = ()
     skips: frozenset[str] = frozenset()
     """Left out once the robot is under way to them."""
     gives_up: float = 0.5
-    """How likely the operator skips a stop at which the robot is held, and does not try again."""
+    """Probability that the operator skips a stop at which the robot is held, instead of retrying."""
     silences: tuple[float, ...] = ()
     """Seconds at which the robot has heard no station for too long."""
     revised: tuple[float, Mission] | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stopgo.mission.run.events import Arrived, Failed, Homing, Scanned
-from stopgo.recordings.replay.told_visits import told_visits
+from stopgo.recordings.replay.reported_visits import reported_visits
 from tests.mission.comparing.told import SCAN, at, told
 from tests.mission.worlds import square_tour
 
@@ -19,8 +19,8 @@ def test_who_drove_home_from_a_stop_stood_there_twice() -> None:
         (Arrived, 90.0, {**there, "deviation_m": 0.0}),
         (Scanned, 120.0, {**there, **SCAN}),
     )
-    visits = told_visits(run.events, square_tour(), ())
-    assert [(visit.how, visit.stop, visit.standing.seconds) for visit in visits] == [
+    visits = reported_visits(run.events, square_tour(), ())
+    assert [(visit.how, visit.stop, visit.standstill.seconds) for visit in visits] == [
         ("visit", 0, 10.0),
         ("back", 0, 30.0),
     ]

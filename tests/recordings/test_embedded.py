@@ -1,4 +1,4 @@
-"""What recordings carry is read back as it was: the mission, what its stops see, and runs."""
+"""Embedded data is read back unchanged: the mission, what its stops see, and runs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stopgo.mission.run.events import PoseReport, StateReport
 from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.drawing.canvas import Sheet, open_canvas
 from stopgo.recordings.embedded.reading import Recording, read_recording
-from stopgo.recordings.embedded.sight import carry_sight, sights_in
+from stopgo.recordings.embedded.sight import embed_sight, sights_in
 from stopgo.recordings.embedded.values import Values
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world
@@ -26,11 +26,11 @@ def read(field: Path) -> Recording:
     return read_recording(field)
 
 
-def carried(sight: Sight, path: Path) -> Values:
+def embedded(sight: Sight, path: Path) -> Values:
     sheet = Sheet(recording_id="a" * 32, name="n", origin=(0.0, 0.0), extent=(0.0, 0.0, 1.0, 1.0))
     with open_canvas(sheet) as canvas:
-        carry_sight(canvas, sight)
-        path.write_bytes(canvas.taken())
+        embed_sight(canvas, sight)
+        path.write_bytes(canvas.drain())
     values = Values()
     for chunk in RrdReader(path).stream():
         values.take(chunk)
@@ -65,7 +65,7 @@ def test_every_revision_travels(revised: Path, mission: Mission) -> None:
 
 def test_what_stops_see_comes_back_whole(tmp_path: Path) -> None:
     _, sight = planned()
-    (back,) = sights_in(carried(sight, tmp_path / "sight.rrd"), "sight.rrd")
+    (back,) = sights_in(embedded(sight, tmp_path / "sight.rrd"), "sight.rrd")
     for name in ("mission_id", "revision", "digest", "stops"):
         assert getattr(back, name) == getattr(sight, name)
     for name in ("weight", "visible", "room", "element"):
@@ -81,7 +81,7 @@ def test_how_many_views_are_asked_for_travels(tmp_path: Path) -> None:
     asked = np.ones(len(sight.ledger.weight), dtype=np.int64)
     asked[::2] = 2
     twice = replace(sight, ledger=replace(sight.ledger, asked=asked))
-    (back,) = sights_in(carried(twice, tmp_path / "sight.rrd"), "sight.rrd")
+    (back,) = sights_in(embedded(twice, tmp_path / "sight.rrd"), "sight.rrd")
     assert np.array_equal(back.ledger.asked, asked)
     assert back.planned == twice.planned != sight.planned
 
@@ -89,5 +89,5 @@ def test_how_many_views_are_asked_for_travels(tmp_path: Path) -> None:
 def test_sight_that_does_not_fit_is_told(tmp_path: Path) -> None:
     _, sight = planned()
     object.__setattr__(sight, "last", sight.last + 1000)
-    with pytest.raises(InputError, match=r"sight\.rrd: what its stops see is damaged"):
-        sights_in(carried(sight, tmp_path / "sight.rrd"), "sight.rrd")
+    with pytest.raises(InputError, match=r"sight\.rrd: visibility of its stops is damaged"):
+        sights_in(embedded(sight, tmp_path / "sight.rrd"), "sight.rrd")

@@ -1,4 +1,4 @@
-"""Whether a replay shows that the mission was driven as planned: one answer, and why."""
+"""Verdict on a replay: one answer to whether the mission was driven as planned, and the reasons."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from stopgo.mission.stages.figures import percent
 from stopgo.recordings.replay.replayed import Replay
 
 
-def judged(replay: Replay) -> Judgement:
-    """Yes, if the robot stood at every stop within its tolerance for as long as its scan takes.
+def drive_verdict(replay: Replay) -> Judgement:
+    """Return yes if the robot was stationary at every stop within its tolerance, as long as its scan takes.
 
-    Where the floor is known, all that was asked for must have been in sight as well.
+    If the floor is known, all required targets must have been visible as well.
     """
     unseen = replay.sight is not None and not replay.sight.enough
     answer: Certainty = "no" if missing(replay) or outside(replay) or unseen else "yes"
@@ -22,7 +22,7 @@ def judged(replay: Replay) -> Judgement:
 
 
 class DriveJudgement(Judgement):
-    """An answer to how a mission was driven; whether it was scanned is another question."""
+    """Verdict on how a mission was driven; it does not say whether the scans succeeded."""
 
     @property
     def headline(self) -> str:
@@ -30,12 +30,12 @@ class DriveJudgement(Judgement):
 
 
 def missing(replay: Replay) -> list[StopComparison]:
-    """Stops at which the robot did not stand, or not long enough."""
+    """Return stops at which the robot was not stationary, or not long enough."""
     return [item for item in replay.comparison.asked if item.outcome not in DONE]
 
 
 def outside(replay: Replay) -> list[StopComparison]:
-    """Stops at which it stood too far away, or, by a simulator's truth, in truth did."""
+    """Return stops at which it was too far away, by its own poses or by a simulator's truth."""
     return [item for item in replay.comparison.asked if item.outside_text]
 
 
@@ -49,24 +49,24 @@ def _sentences(replay: Replay) -> Iterator[str]:
             yield f"{words} {named(stops)}."
     for item in outside(replay):
         far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
-        yield f"{item.stop} was missed by {far:.0f} mm ({limit:.0f} mm are tolerated)."
+        yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
     if replay.sight is not None:
         whole = replay.sight.shares.whole
         short = [share for share in replay.sight.shares.short if share is not whole]
         for share in (whole, *short):
             name, least = share.name if share is not whole else "what is visible", percent(share.required)
-            yield f"Of {name}, {percent(share.coverage)} was in sight; {least} was asked."
+            yield f"Of {name}, {percent(share.coverage)} was visible; {least} is required."
     if replay.extra:
-        yield f"The robot halted {len(replay.extra)} times at no stop."
+        yield f"{len(replay.extra)} standstills were not at a stop."
     if replay.inferred:
-        yield "Visits were told from where the robot stood; that scans were made is not in the log."
+        yield "Visits are inferred from standstills; the log does not show whether scans were made."
     if replay.log.lost:
-        yield f"The log is damaged, and this is of what could be read: {replay.log.lost}."
+        yield f"The log is damaged; this is the result of the readable part: {replay.log.lost}."
 
 
 WORDS = {
-    "skipped": "No halt at",
-    "failed": "Too short a halt at",
+    "skipped": "No standstill at",
+    "failed": "Standstill too short at",
     "arrived": "No scan at",
     "not reached": "Not reached:",
 }

@@ -1,0 +1,144 @@
+"""Events of a run, inferred from standstills and from what the log contains.
+
+A log without scans has stops that are `Unconfirmed`: the robot was stationary as long as a scan takes, and no
+more is known. A standstill that was too short is `Failed`, a stop that was passed is `Skipped`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.run.events import (
+    AnyEvent,
+    Arrived,
+    Failed,
+    Finished,
+    Pose,
+    Settled,
+    Skipped,
+    Started,
+    Unconfirmed,
+)
+from stopgo.mission.run.run_log import Track
+from stopgo.recordings.logs.field_log import Remark
+from stopgo.recordings.replay.matching import Match, long_enough
+from stopgo.recordings.replay.standstills import Standstill
+
+
+@dataclass(frozen=True)
+class InferredEvent:
+    """Event without the fields that all events have."""
+
+    ns: int
+    kind: type
+    fields: dict[str, Any]
+
+
+def events_of(
+    matches: Sequence[Match],
+    mission: Mission,
+    track: Track,
+    remarks: Sequence[Remark],
+    *,
+    run_id: str,
+    robot: str,
+) -> tuple[AnyEvent, ...]:
+    """Return the events of a run according to its standstills; it is over if the last stop was visited."""
+    began, ended = _begin(track, matches, remarks), int(track.ns[-1])
+    inferred = [InferredEvent(began, Started, {"commander": "not in the log"})]
+    inferred += sorted(_stop_events(matches, mission, track, remarks), key=lambda item: item.ns)
+    if len(mission.stops) - 1 in {match.stop for match in matches}:
+        inferred.append(InferredEvent(ended, Finished, {}))
+    about = {
+        "robot": robot, "boot_id": "", "run_id": run_id,
+        "mission_id": mission.id, "revision": mission.revision,
+    }  # fmt: skip
+    return tuple(
+        item.kind(
+            number=number, robot_ns=item.ns, mission_time_s=(item.ns - began) / 1e9, **about, **item.fields
+        )
+        for number, item in enumerate(inferred, 1)
+    )
+
+
+def _begin(track: Track, matches: Sequence[Match], remarks: Sequence[Remark]) -> int:
+    """Return when the vehicle last began its mission before the first stop, else the log's begin."""
+    first = next((match.standstill.begin_ns for match in matches if match.stop is not None), None)
+    modes = [remark.ns for remark in remarks if remark.kind == "mode" and remark.text in DRIVES]
+    before = [ns for ns in modes if first is None or ns <= first]
+    return max(before[-1], int(track.ns[0])) if before else int(track.ns[0])
+
+
+DRIVES = ("AUTO", "MISSION")
+"""Modes in which a vehicle follows its mission."""
+
+
+def _stop_events(
+    matches: Sequence[Match], mission: Mission, track: Track, remarks: Sequence[Remark]
+) -> Iterator[InferredEvent]:
+    farthest, left_ns, visited = -1, int(track.ns[0]), set[int]()
+    for match in matches:
+        if match.stop is None:
+            continue
+        for passed in range(farthest + 1, match.stop):
+            left_ns = _passing_ns(mission.stops[passed], track, left_ns, match.standstill.begin_ns)
+            reason = "no standstill there in the log"
+            yield InferredEvent(left_ns, Skipped, {"stop": mission.stops[passed].id, "reason": reason})
+        farthest, left_ns = max(farthest, match.stop), match.standstill.end_ns
+        stop = mission.stops[match.stop]
+        enough = long_enough(match.standstill, stop)
+        if enough or match.stop not in visited:  # a short standstill does not replace a long one before
+            yield from _visit(stop, match.standstill, remarks)
+        visited |= {match.stop} if enough else set()
+
+
+def _during(standstill: Standstill, remark: Remark) -> bool:
+    return standstill.begin_ns - 10**9 <= remark.ns <= standstill.end_ns + 10**9
+
+
+def _scan_evidence(trigger: Remark | None, standstill: Standstill, remarks: Sequence[Remark]) -> str:
+    """Return the log's evidence of a scan, and the time waited for it."""
+    if trigger is None:
+        return "no scan in the log"
+    items = [remark for remark in remarks if remark.kind == "command" and remark.ns >= trigger.ns]
+    waits = (
+        items[:1] if items and items[0].text.startswith("NAV_DELAY") and _during(standstill, items[0]) else []
+    )
+    if len(items) < 2 or not waits:
+        return f"{trigger.text} in the log"
+    return f"{trigger.text}, then waited {(items[1].ns - waits[0].ns) / 1e9:.2f} s"
+
+
+def _passing_ns(stop: Stop, track: Track, after_ns: int, before_ns: int) -> int:
+    """Return when the robot was nearest to a skipped stop, on its path to the next standstill."""
+    poses = track.between(after_ns + 1, before_ns - 1)
+    if not len(poses):
+        return after_ns + 1
+    return int(poses.ns[int(np.hypot(*(poses.xy - (stop.x, stop.y)).T).argmin())])
+
+
+def _visit(stop: Stop, standstill: Standstill, remarks: Sequence[Remark]) -> Iterator[InferredEvent]:
+    pose = Pose(x=standstill.x, y=standstill.y, heading=standstill.heading)
+    deviation_m = math.dist(standstill.xy, (stop.x, stop.y))
+    yield InferredEvent(
+        standstill.begin_ns, Arrived, {"stop": stop.id, "pose": pose, "deviation_m": deviation_m}
+    )
+    trigger = next(
+        (remark for remark in remarks if remark.kind == "trigger" and _during(standstill, remark)), None
+    )
+    if trigger is not None:
+        yield InferredEvent(max(trigger.ns, standstill.begin_ns), Settled, {"stop": stop.id, "pose": pose})
+    evidence = f"; {_scan_evidence(trigger, standstill, remarks)}"
+    if not long_enough(standstill, stop):
+        planned = stop.settle_s + stop.scan.duration_s
+        reason = f"stationary {standstill.seconds:.1f} s of {planned:.1f} s{evidence}"
+        yield InferredEvent(standstill.end_ns, Failed, {"stop": stop.id, "reason": reason})
+    else:
+        reason = f"stationary {standstill.seconds:.1f} s{evidence}"
+        yield InferredEvent(standstill.end_ns, Unconfirmed, {"stop": stop.id, "pose": pose, "reason": reason})

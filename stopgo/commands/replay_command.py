@@ -1,0 +1,272 @@
+"""`stopgo replay`: compares robots' own logs with the mission, and writes recording, table and report."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import must_be_writable, must_not_replace
+
+if TYPE_CHECKING:
+    from stopgo.mission.document import Mission
+    from stopgo.recordings.logs import FieldLog, Reading
+    from stopgo.recordings.page.reviewed import Review
+    from stopgo.recordings.replay.log_placing import Align, Placing
+    from stopgo.recordings.replay.replayed import Replay
+
+EXAMPLE_REPLAY = "Example: stopgo replay field.bag --mission plan/mission.json --align stops -o replay.rrd"
+
+ReplayLogs = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG...", help=".bag, rosbag2, .mcap, .db3, .tlog, .BIN, .ulg, TUM, CSV, journal"),
+]
+ReplayMission = Annotated[
+    Path | None, typer.Option(help="Planned mission; without it the MAVLink mission in the log.")
+]
+ReplayOut = Annotated[Path | None, typer.Option("-o", "--out", help="Recording to write (.rrd).")]
+ReplayList = Annotated[bool, typer.Option("--list", help="Only list the content of each log.")]
+ReplayMap = Annotated[
+    str | None, typer.Option("--map", help="X,Y,HEADING (m, degrees) of the site in the log's frame.")
+]
+ReplayAlign = Annotated[
+    str | None, typer.Option(help="first: the log begins at the start; stops: fit standstills to stops.")
+]
+ReplayTimeOffset = Annotated[float, typer.Option(help="Seconds to add to the log's times.")]
+ReplayPoses = Annotated[str | None, typer.Option(help="Source of the poses, as --list names it.")]
+ReplayRobot = Annotated[str | None, typer.Option(help="Robot to replay, where a log has several.")]
+ReplayStamps = Annotated[
+    str, typer.Option(help="header: time stamps in the messages; log: times of logging.")
+]
+ReplayFrame = Annotated[str | None, typer.Option(help="Take the poses in this frame from transforms (tf).")]
+ReplayFloor = Annotated[
+    Path | None, typer.Option(help="Floor file of the plan; reports what the robot saw of it.")
+]
+ReplayClouds = Annotated[
+    Path | None, typer.Option(help="With --floor: folder of clouds (.e57 .las .laz .ply) in its metres.")
+]
+ReplayTopUp = Annotated[
+    Path | None, typer.Option(help="With --floor: follow-up mission to write that covers the rest (.json).")
+]
+ReplayCsv = Annotated[Path | None, typer.Option(help="Table of stops to write (.csv).")]
+ReplayHtml = Annotated[
+    Path | None, typer.Option(metavar="REPORT.html", help="Report to write, as one HTML file.")
+]
+ReplayPlan = Annotated[
+    Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording: its floor, for the report.")
+]
+ReplayAsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
+
+
+def add_commands(app: typer.Typer) -> None:
+    """Add the command to `stopgo`."""
+    app.command(epilog=EXAMPLE_REPLAY)(replay)
+
+
+def replay(
+    logs: ReplayLogs,
+    mission: ReplayMission = None,
+    out: ReplayOut = None,
+    list_: ReplayList = False,
+    map_: ReplayMap = None,
+    align: ReplayAlign = None,
+    time_offset: ReplayTimeOffset = 0.0,
+    poses: ReplayPoses = None,
+    robot_name: ReplayRobot = None,
+    stamps: ReplayStamps = "header",
+    frame: ReplayFrame = None,
+    floor: ReplayFloor = None,
+    clouds: ReplayClouds = None,
+    top_up: ReplayTopUp = None,
+    csv: ReplayCsv = None,
+    html: ReplayHtml = None,
+    plan: ReplayPlan = None,
+    json_: ReplayAsJson = False,
+) -> int:
+    """Compare a robot's own log with the mission: stops visited, deviations, and what was missed.
+
+    The log's frame is never guessed: its transform comes from the georeference, --map or --align.
+
+    Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log cannot be read, or is of
+    another mission.
+    """
+    read = [_read(path, stamps, frame) for path in logs]
+    if list_:
+        _print_logs(read, as_json=json_)
+        return 0
+    files = _ReplayFiles(logs, mission, floor, clouds, out, csv, top_up, html)
+    files.check()
+    driven = _mission(mission, read)
+    placing = _placing(map_, align, time_offset, poses, robot_name)
+    plans = None if plan is None else _plans(plan, driven)
+    replays = files.with_floor(_replays(read, driven, placing, plans))
+    files.write(replays, plans)
+    _print_replays(replays, as_json=json_)
+    return _exit_code(replays)
+
+
+@dataclass(frozen=True)
+class _ReplayFiles:
+    """Files that `replay` reads, and files that it writes; None where the user gave no path."""
+
+    logs: list[Path]
+    mission: Path | None
+    floor: Path | None
+    clouds: Path | None
+    out: Path | None
+    csv: Path | None
+    follow_up: Path | None
+    html: Path | None
+
+    def check(self) -> None:
+        """Raise InputError where an option needs another one, or a file cannot be written."""
+        if self.follow_up is not None and self.floor is None:
+            raise InputError(f"--top-up {self.follow_up}: needs the floor; give its file with --floor")
+        if self.clouds is not None and self.floor is None:
+            raise InputError(f"--clouds {self.clouds}: needs the floor; give its file with --floor")
+        for path in (self.out, self.csv, self.follow_up, self.html):
+            if path is not None:
+                must_be_writable(path)
+                must_not_replace(path, *self.logs, self.mission, self.floor)
+        if self.csv is not None and len(self.logs) > 1:
+            raise InputError(f"--csv {self.csv}: is a table of one log, not {len(self.logs)}; give one log")
+
+    def with_floor(self, replays: list[Replay]) -> list[Replay]:
+        """Return the replays with what was visible on the floor, and write the follow-up mission."""
+        if self.floor is None:
+            return replays
+        from stopgo.commands.replay_on_floor import follow_up_of, on_floor, write_follow_up
+        from stopgo.planner.pipeline.follow_up_mission import planned_floor
+
+        planned = planned_floor(self.floor, replays[0].mission)
+        found = on_floor(replays, planned, self.clouds)
+        if self.follow_up is not None:
+            write_follow_up(follow_up_of(found, planned), self.follow_up)
+        return found
+
+    def write(self, replays: list[Replay], plans: Review | None) -> None:
+        """Write recording, table and report."""
+        from stopgo.mission.files.atomic import write_atomic
+        from stopgo.recordings.replay.replay_text import as_csv
+
+        if self.out is not None:
+            from stopgo.recordings.replay.drawing import write_recording
+
+            write_recording(replays, self.out)
+        if self.csv is not None:
+            write_atomic(self.csv, as_csv(replays[0]))
+        if self.html is not None:
+            from stopgo.recordings.page import report_html
+            from stopgo.recordings.replay.replay_page import page_of
+
+            write_atomic(self.html, report_html(page_of(replays, plans)))
+
+
+def _read(path: Path, stamps: str, frame: str | None) -> FieldLog:
+    from stopgo.recordings.logs import read_log
+
+    return read_log(path, _reading(stamps, frame, path))
+
+
+def _reading(stamps: str, frame: str | None, path: Path) -> Reading:
+    """Return the options for reading a log, with progress on a terminal."""
+    from stopgo.recordings.logs import Reading
+
+    if stamps not in ("header", "log"):
+        raise InputError(f"--stamps {stamps}: must be header or log")
+
+    def tick(fraction: float) -> None:
+        if sys.stderr.isatty():
+            typer.echo(f"\r\033[K{path.name} {fraction:.0%}", err=True, nl=fraction >= 1)
+
+    return Reading(stamps="log" if stamps == "log" else "header", frame=frame, tick=tick)
+
+
+def _mission(path: Path | None, logs: list[FieldLog]) -> Mission:
+    """Return the mission in the given file, else the one in the first log."""
+    from stopgo.mission.document.problems import problems_of
+    from stopgo.mission.files.mission_json import read
+    from stopgo.recordings.replay.uploaded import mission_in
+
+    if path is None:
+        return mission_in(logs[0])
+    document = read(path)
+    for problem in problems_of(document)[:1]:
+        raise InputError(f"{path}: {problem} (stopgo check {path} lists all)")
+    return document
+
+
+def _placing(
+    map_: str | None, align: str | None, time_offset: float, poses: str | None, robot: str | None
+) -> Placing:
+    from stopgo.mission.files.exports.placing import map_transform
+    from stopgo.recordings.replay.log_placing import Placing
+
+    if align is not None and map_ is not None:
+        raise InputError("--map, --align: both place the log; give one of them")
+    if not math.isfinite(time_offset) or abs(time_offset) > 1e9:
+        raise InputError(f"--time-offset {time_offset}: must be seconds")
+    known: dict[str | None, Align | None] = {None: None, "first": "first", "stops": "stops"}
+    if align not in known:
+        raise InputError(f"--align {align}: must be first or stops")
+    to_map = None if map_ is None else map_transform(map_)
+    return Placing(to_map, known[align], time_offset, poses, robot)
+
+
+def _plans(path: Path, mission: Mission) -> Review:
+    """Return a plan's recording, if it is of the mission."""
+    from stopgo.recordings.page.reviewed import review as read
+
+    found = read([path])
+    for fault in found.faults:
+        raise InputError(fault)
+    recording = found.recordings[0].recording
+    if recording.mission_id != mission.id:
+        raise InputError(f"--plan {path}: is of mission {recording.mission_id[:12]}, not {mission.id[:12]}")
+    return found
+
+
+def _replays(logs: list[FieldLog], mission: Mission, placing: Placing, plans: Review | None) -> list[Replay]:
+    """Compare each log with the mission, with the coverage that the plan's recording contains."""
+    from stopgo.recordings.replay.replaying import replay as replay_of
+
+    items = () if plans is None else plans.recordings
+    sights = tuple(sight for item in items for sight in item.recording.sights)
+    return [replay_of(log, mission, placing, sights) for log in logs]
+
+
+def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:
+    from stopgo.mission.console.table import printable_lines
+    from stopgo.recordings.logs import listing
+
+    if as_json:
+        _print_json([listing.as_json(log) for log in logs], "logs")
+    else:
+        typer.echo(printable_lines("\n".join(map(listing.as_text, logs))))
+
+
+def _print_replays(replays: list[Replay], *, as_json: bool) -> None:
+    from stopgo.recordings.replay import replay_text
+
+    if as_json:
+        _print_json([replay_text.as_json(item) for item in replays], "replays")
+    else:
+        typer.echo("\n\n".join(map(replay_text.as_text, replays)))
+
+
+def _print_json(items: list[dict[str, Any]], name: str) -> None:
+    """Print one object; several as a list under a name."""
+    typer.echo(json.dumps(items[0] if len(items) == 1 else {name: items}, ensure_ascii=False))
+
+
+def _exit_code(replays: list[Replay]) -> int:
+    """Return the exit code of the worst replay."""
+    from stopgo.recordings.replay.drive_verdict import drive_verdict
+
+    return max(drive_verdict(item).exit_code for item in replays)

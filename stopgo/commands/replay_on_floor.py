@@ -1,0 +1,62 @@
+"""Replays on the floor of their plan: visible and measured targets, and the follow-up mission."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from stopgo.mission.comparing.measured import Measured
+    from stopgo.mission.document import Mission
+    from stopgo.planner.pipeline.follow_up_mission import PlannedFloor
+    from stopgo.recordings.replay.replayed import Replay
+
+
+def on_floor(replays: list[Replay], planned: PlannedFloor, clouds: Path | None) -> list[Replay]:
+    """Return the replays with what was visible from the robot's stationary poses, and what scans measured."""
+    from stopgo.planner.pipeline.follow_up_mission import as_driven
+
+    found = [item.with_sight(as_driven(planned, item.scanned_from)) for item in replays]
+    return [item.with_measured(_measured(planned, item, clouds)) for item in found]
+
+
+def _measured(planned: PlannedFloor, replay: Replay, clouds: Path | None) -> Measured | None:
+    """Measurements of the scanner's own clouds, else of the scans in the log; None where there is neither."""
+    from stopgo.planner.pipeline.measuring import measured
+    from stopgo.recordings.clouds import clouds_in, levels
+    from stopgo.recordings.replay.placed_sweeps import placed_sweeps
+
+    if clouds is not None:
+        return measured(planned, levels(clouds_in(clouds)), least_sweeps=1)
+    found = measured(planned, placed_sweeps(replay))
+    return found if found.points else None
+
+
+def follow_up_of(replays: list[Replay], planned: PlannedFloor) -> Mission | None:
+    """Plan a mission for what all replays together missed; None if they missed nothing required."""
+    import numpy as np
+
+    from stopgo.planner.pipeline.follow_up_mission import top_up
+
+    scanned_from = np.concatenate([item.scanned_from for item in replays])
+    evidence = " ".join(item.log.digest for item in replays)
+    obstacles = [
+        item.outline
+        for replay in replays
+        if replay.measured is not None
+        for item in replay.measured.unplanned
+    ]
+    return top_up(planned, scanned_from, obstacles=obstacles, evidence=evidence)
+
+
+def write_follow_up(mission: Mission | None, path: Path) -> None:
+    """Write the follow-up mission, and print its number of stops."""
+    from stopgo.mission.files.mission_json import write
+
+    if mission is None:
+        typer.echo(f"{path}: not written: all required targets were visible", err=True)
+        return
+    write(mission, path)
+    typer.echo(f"{path}: {len(mission.stops)} follow-up stops", err=True)

@@ -1,0 +1,57 @@
+"""`stopgo runs`: lists the plans and runs in a folder, in the terminal or in a browser."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stopgo.mission.errors import InputError
+
+
+def add_commands(app: typer.Typer) -> None:
+    """Add the command to `stopgo`."""
+    app.command(epilog="Example: stopgo runs recordings")(runs)
+
+
+def runs(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder; those below it count too.")],
+    json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="Show them in a browser on this machine, until Ctrl-C.")
+    ] = False,
+    port: Annotated[int | None, typer.Option(help="With --web: port to listen on; else a free one.")] = None,
+) -> None:
+    """List plans and runs in a folder, the newest run first, with what each acquired.
+
+    Keeps an index in the folder, and reads only recordings that are new or have changed.
+    """
+    if web:
+        _serve_runs(folder, port)
+        return
+    if port is not None:
+        raise InputError(f"--port {port}: needs --web; add --web or leave out --port")
+    from stopgo.mission.console.table import printable, printable_lines
+    from stopgo.recordings.catalog.run_index import index_json, index_of, index_text
+
+    index = index_of(folder, say=lambda line: typer.echo(printable(line), err=True))
+    text = json.dumps(index_json(index), ensure_ascii=False) if json_ else printable_lines(index_text(index))
+    typer.echo(text)
+    for fault in index.faults():
+        typer.echo(f"stopgo: {printable(fault)}", err=True)
+
+
+def _serve_runs(folder: Path, port: int | None) -> None:
+    """Serve the pages until Ctrl-C."""
+    import threading
+
+    from stopgo.mission.console.table import printable
+    from stopgo.recordings.catalog.run_site import serving
+
+    with serving(folder, port=port) as address:
+        typer.echo(
+            printable(f"{folder}: {address} shows its runs, with reports and Rerun's viewer; Ctrl-C ends")
+        )
+        threading.Event().wait()
