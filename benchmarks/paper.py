@@ -256,7 +256,7 @@ def _reselected(selection: Selection, **changes: Any) -> Selection:
 def _sections(ours: list[Ours]) -> Iterator[str]:
     yield (
         "Paper | ours. The paper's times are of its machine (2019), ours medians of "
-        f"{RUNS} warm runs on two shared cores; compare ours with ours. Structural cases with `--edge 0`, "
+        f"{RUNS} warm runs on two shared cores; compare ours with ours. Structural cases with `--edge-clearance 0`, "
         "rooms with `--doors closed` and `--robot-radius 0.34` (a column of the reconstruction stands "
         "0.685 m from two doors). " + versions("numpy", "scipy", "shapely", "numba", "highspy")
     )

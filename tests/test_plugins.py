@@ -130,7 +130,7 @@ def test_a_plug_in_that_misbehaves_is_named_in_one_line(case: str, module: Write
     stage, code, said = WRONG[case]
     module("bad", code)
     settings = Settings(**{stage: "bad:f"}, range=2.0, room_coverage=0.9)  # type: ignore[arg-type]
-    with pytest.raises(StopgoError, match=f"^{stage} = bad:f: .*(?:{said})") as caught:
+    with pytest.raises(StopgoError, match=f"^--{stage} bad:f: .*(?:{said})") as caught:
         plan(FLOOR, settings)
     assert "\n" not in str(caught.value)
     assert caught.value.exit_code == 2
@@ -139,8 +139,22 @@ def test_a_plug_in_that_misbehaves_is_named_in_one_line(case: str, module: Write
 @pytest.mark.parametrize("stage", ["candidates", "visibility", "selector", "router", "graph"])
 @pytest.mark.parametrize("name", ["luck", "no.such.module:f", ":f", "x:"])
 def test_a_variant_that_is_not_there_is_named(stage: str, name: str) -> None:
-    with pytest.raises(InputError, match=f"^{stage} = {name}: "):
+    with pytest.raises(InputError, match=f"^--{stage} {name}: "):
         plan(FLOOR, Settings(**{stage: name}))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "old", ["mission.events", "planner.routing.ways", "recordings.logs", "bridge.robot.base"]
+)
+def test_an_import_path_of_the_first_release_is_named_with_todays(module: Write, old: str) -> None:
+    module("older", f"from {old} import Anything\ndef f(space): return space")
+    folder = old.partition(".")[0]
+    with pytest.raises(InputError) as caught:
+        plan(FLOOR, Settings(candidates="older:f"))
+    line = str(caught.value)
+    assert f"imports {folder}, a package of stopgo 0.1; import stopgo.{folder} instead" in line
+    assert ("stopgo.mission.run.events" in line) == (folder == "mission")
+    assert line.endswith("(older.py, line 1)")
 
 
 def test_a_method_added_to_the_dictionary_is_called_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,7 +105,7 @@ def variant(stage: str, name: str, known: Mapping[str, T], *, said: str = "") ->
     InputError
         Naming the stage, the variant, and the known variants, or why it cannot be loaded.
     """
-    said = said or f"{stage} = {name}"
+    said = said or f"--{stage} {name}"
     if name in known:
         return Variant(said, name, known[name])
     points = {point.name: point for point in entry_points(group=f"stopgo.{stage}")}
@@ -155,7 +155,7 @@ def _errors_named(who: str) -> Iterator[None]:
 
 def _error_text(error: Exception) -> str:
     """Return the error in words, with the line in the file that was called."""
-    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    text = _moved(error) or (f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
     frames = [
         (frame.f_code.co_filename, line)
         for frame, line in walk_tb(error.__traceback__)
@@ -165,6 +165,19 @@ def _error_text(error: Exception) -> str:
         return text
     file, line = next(found for found in reversed(frames) if found[0] == frames[0][0])
     return f"{text} ({os.path.basename(file)}, line {line})"
+
+
+FORMER_FOLDERS = ("mission", "planner", "bridge", "recordings")
+"""Packages of 0.1 at the top level; since 0.2 they are below `stopgo`."""
+
+
+def _moved(error: Exception) -> str:
+    """Return the line for an import path of 0.1, with today's path; empty for another error."""
+    name = (error.name or "").partition(".")[0] if isinstance(error, ModuleNotFoundError) else ""
+    if name not in FORMER_FOLDERS:
+        return ""
+    events = "; mission.events is stopgo.mission.run.events" if name == "mission" else ""
+    return f"imports {name}, a package of stopgo 0.1; import stopgo.{name} instead{events}"
 
 
 def _is_third_party(frame: FrameType) -> bool:

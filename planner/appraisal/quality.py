@@ -74,5 +74,5 @@ def not_met(selection: Selection) -> Iterator[Finding]:
         yield Finding(
             NOT_MET,
             f"seen {', '.join(limits.values())} can be, of the visible targets, only: "
-            f"{', '.join(short[:MOST_NAMED])}{more}; lower --grid or --d-sec, or ask for less",
+            f"{', '.join(short[:MOST_NAMED])}{more}; lower --grid or --clearance, or ask for less",
         )

@@ -89,7 +89,7 @@ def _smaller_d_sec(candidates: Candidates, index: int) -> str:
     middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(free, tolerance=1e-3))[:1]
     d_sec = math.floor(100 * float(feasibility.to_element(middle)[0]) + 1e-6) / 100
     fits = d_sec >= space.settings.radius and feasibility.to_edge(middle)[0] >= space.settings.edge
-    return f"; --d-sec {d_sec:g} leaves one" if fits and d_sec < space.settings.d_sec else ""
+    return f"; --clearance {d_sec:g} leaves one" if fits and d_sec < space.settings.d_sec else ""
 
 
 def _barriers(candidates: Candidates, index: int, parts: frozenset[int]) -> str:

@@ -121,7 +121,7 @@ def _check_required(space: NavigableSpace, proposals: Proposals, at: IntArray, c
     """Refuse required stops that the robot cannot reach."""
     for x, y in proposals.xy[proposals.must & (at != chosen)]:
         raise InputError(
-            f"use = {x:g},{y:g}: not reachable from the planned part of the floor; choose another position"
+            f"--require-stop {x:g},{y:g}: not reachable from the planned part; choose another position"
         )
 
 
@@ -140,12 +140,12 @@ def _part_of_start(space: NavigableSpace, reach: Reach, parts: set[int]) -> int:
     found = int(reach.part_at(np.array([[x, y]]) - local_origin(space.floor))[0])
     if found < 0:
         raise InputError(
-            f"start = {x:g},{y:g}: the robot (radius {space.settings.radius:g} m) does not fit there; "
+            f"--start {x:g},{y:g}: the robot (radius {space.settings.radius:g} m) does not fit there; "
             "choose a position clear of walls and floor edges"
         )
     if found not in parts:
         raise NegativeResult(
-            f"start = {x:g},{y:g}: no scan position is reachable from there; choose another start"
+            f"--start {x:g},{y:g}: no scan position is reachable from there; choose another start"
         )
     return found
 
@@ -153,10 +153,16 @@ def _part_of_start(space: NavigableSpace, reach: Reach, parts: set[int]) -> int:
 def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
     """Message on why no candidate is left: most frequent reason first, and the options to change."""
     settings = space.settings
-    keep = f"d_sec {settings.d_sec:g} m" if settings.d_sec >= settings.radius else "the robot's radius"
+    keep, remedy = "the robot's radius", "--robot-radius"
+    if settings.d_sec >= settings.radius:
+        keep, remedy = f"the clearance of {settings.d_sec:g} m", "--clearance"
     causes = [
-        (TOO_CLOSE, f"closer to an element than {keep}", "--d-sec" if "d_sec" in keep else "--robot-radius"),
-        (AT_EDGE, f"closer than {settings.edge:g} m to a floor edge", "--edge"),
+        (
+            TOO_CLOSE,
+            f"closer to an element than {keep}",
+            remedy,
+        ),
+        (AT_EDGE, f"closer than {settings.edge:g} m to a floor edge", "--edge-clearance"),
         (AVOIDED, "in circles to avoid", "--avoid"),
         (UNREACHABLE, f"not reachable by a robot of radius {settings.radius:g} m", "--robot-radius"),
         (OUTSIDE, "outside the rooms", "--grid"),

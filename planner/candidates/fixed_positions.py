@@ -48,7 +48,7 @@ def required_stops(feasibility: StopFeasibility) -> Proposals:
         if reason != KEPT:
             why = DROP_REASONS[reason]
             raise InputError(
-                f"use = {point[0]:g},{point[1]:g}: a stop is not allowed there ({why}); "
+                f"--require-stop {point[0]:g},{point[1]:g}: a stop is not allowed there ({why}); "
                 "choose another position"
             )
     return Proposals.of(points, rooms, must=True)

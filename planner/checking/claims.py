@@ -115,7 +115,7 @@ def _candidates(mission: Mission, space: NavigableSpace) -> Candidates:
     """All candidates in the mission's part of the floor."""
     if space.settings.candidates not in STRATEGIES:
         raise InputError(
-            f"candidates = {space.settings.candidates} come from a plugin, which the check does not run"
+            f"--candidates {space.settings.candidates} come from a plugin, which the check does not run"
         )
     positions = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
     parts = reach_of(space).part_at(positions - local_origin(space.floor))

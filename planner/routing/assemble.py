@@ -169,7 +169,7 @@ def check_legs(route: Route) -> None:
     space = route.selection.visibility.candidates.space
     origin = local_origin(space.floor)
     graph = space.settings.graph
-    source = space.floor.name if graph in GRAPHS else f"graph = {graph}"
+    source = space.floor.name if graph in GRAPHS else f"--graph {graph}"
     exact = walls_of(space)
     walls = Walls(exact.segments, exact.clearance - CLEAR_SLACK)
     tree = shapely.STRtree(walls.shapes())

@@ -11,7 +11,7 @@ import numpy as np
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.geometry import IntArray, frozen, polyline_length
-from stopgo.mission.settings import Settings
+from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.stages import Route, Selection
 from stopgo.mission.stages.division import DividedRoute
 from stopgo.planner.routing import Ends, check_position, tour_bound
@@ -59,7 +59,7 @@ def _fleet(route: Route, settings: Settings) -> DividedRoute:
     selection, robots = route.selection, settings.robots or 1
     if robots > len(selection.chosen):
         raise InputError(
-            f"robots = {robots}: more than the plan's {len(selection.chosen)} stops; "
+            f"--robots {robots}: more than the plan's {len(selection.chosen)} stops; "
             f"give at most --robots {len(selection.chosen)}"
         )
     starts = settings.starts
@@ -159,7 +159,7 @@ def _check_reach(clock: TourTimes, route: Route, key: str, limit_s: float) -> No
         if needed > limit_s - SPARE_S:
             x, y = route.selection.xy[stop]
             raise NegativeResult(
-                f"{key} = {limit_s:g} s: stop {number} of the route, at ({x:.2f}, {y:.2f}), needs "
+                f"{PARAMETERS[key].flag} {limit_s:g} s: stop {number} at ({x:.2f}, {y:.2f}) needs "
                 f"{math.ceil(needed)} s there and back alone; give more time or a closer start"
             )
 

@@ -76,7 +76,7 @@ def _empty_reason(in_sight: Visibility, settings: Settings) -> str:
         if key not in ("views", "wall_height")
     }
     alone = {key: words for key, words in set_limits.items() if not _leaves_some(in_sight, settings, key)}
-    better = {"max_incidence": "raise --max-incidence", "near": "lower --near or --blind-cone"}
+    better = {"max_incidence": "raise --max-incidence", "near": "lower --min-range or --blind-cone"}
     step, away = settings.angular_step or 0.0, max(settings.d_sec, settings.radius)
     square_on = f"{1000 * math.radians(step) * away:.2g} mm at {away:g} m"
     better["density"] = f"raise --density or scan finer than --angular-step {step:g} ({square_on})"

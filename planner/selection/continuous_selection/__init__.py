@@ -63,15 +63,15 @@ def anywhere(selection: Selection) -> Selection:
 def _check(settings: Settings) -> None:
     """Refuse parameters that the visibility of cells does not model."""
     wrong = {
-        f"overlap = {settings.least_overlap:g}": settings.least_overlap > 0,
-        f"views = {settings.views}": settings.least_views > 1,
-        f"fov = {settings.fov:g}": settings.fov < 360,
-        f"visibility = {settings.visibility}": settings.visibility != "exact",
+        f"--overlap {settings.least_overlap:g}": settings.least_overlap > 0,
+        f"--min-views {settings.views}": settings.least_views > 1,
+        f"--fov {settings.fov:g}": settings.fov < 360,
+        f"--visibility {settings.visibility}": settings.visibility != "exact",
         "refine = true": bool(settings.refine),
     }
     for given, is_set in wrong.items():
         if is_set:
-            raise InputError(f"selector = {SELECTOR}: not possible with {given}; remove one of them")
+            raise InputError(f"--selector {SELECTOR}: not possible with {given}; remove one of them")
 
 
 def _best_of(selection: Selection, wide: Visibility) -> Selection:

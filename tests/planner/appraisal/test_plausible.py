@@ -154,7 +154,7 @@ def test_a_room_too_tight_is_told_which_d_sec_would_do() -> None:
     floor = replace(floor, rooms=(*floor.rooms, closet), elements=(*floor.elements, *cell))
     (left_out,) = figures_of(floor).unreached
     assert left_out.room == "closet"
-    assert "--d-sec 0.6 leaves one" in left_out.why
+    assert "--clearance 0.6 leaves one" in left_out.why
     assert figures_of(floor, Settings(d_sec=0.6)).unreached == ()
 
 

@@ -199,7 +199,7 @@ def test_the_scans_of_all_robots_are_one_network_told_by_mission_and_stop() -> N
 
 
 def test_a_stop_too_far_for_a_shift_is_named() -> None:
-    with pytest.raises(NegativeResult, match=r"shift = 66 s: stop \d+ of the route, at \(\d"):
+    with pytest.raises(NegativeResult, match=r"--shift 66 s: stop \d+ at \(\d"):
         settled("hall", shift=66.0)
 
 
@@ -225,7 +225,7 @@ def test_what_cannot_be_shared_out_is_refused(changes: dict[str, Any], told: str
 
 
 def test_more_robots_than_stops_are_refused() -> None:
-    with pytest.raises(InputError, match=r"robots = 50: more than the plan's \d+ stops"):
+    with pytest.raises(InputError, match=r"--robots 50: more than the plan's \d+ stops"):
         settled("hall", robots=50)
 
 

@@ -164,7 +164,7 @@ def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
 @pytest.mark.parametrize(
     ("limits", "told"),
     [
-        ({"near": 40.0}, r"from 40 m on; lower --near or --blind-cone, or lower --grid"),
+        ({"near": 40.0}, r"from 40 m on; lower --min-range or --blind-cone, or lower --grid"),
         (
             {"density": 0.1, "angular_step": 0.036},
             r"at most 0.1 mm apart; raise --density or scan finer",

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.transform import SiteOrigin
