@@ -28,7 +28,9 @@ from stopgo.bridge.commands.bridge_options import (
     TakeOver,
     Timeout,
 )
+from stopgo.bridge.conform.requirements import NotTried, count_outcomes
 from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
+from stopgo.mission.console.table import table
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -107,7 +109,6 @@ def _announce(bench: RobotBench, *, drive: bool) -> None:
 
 
 def _present_pose(bench: RobotBench) -> Pose:
-    from stopgo.bridge.conform.requirements import NotTried
 
     try:
         return bench.pose()
@@ -151,8 +152,6 @@ def conform_station(
 
 def report(peer: str, kind: str, verdicts: Iterable[ConformVerdict], *, as_json: bool) -> None:
     """Print every verdict, and exit with the code that follows from them."""
-    from stopgo.bridge.conform.requirements import count_outcomes
-    from stopgo.mission.console.table import table
 
     verdicts = list(verdicts)
     counts = count_outcomes(verdicts)

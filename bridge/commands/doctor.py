@@ -42,7 +42,10 @@ from stopgo.bridge.commands.connection import (
 from stopgo.bridge.commands.order_commands import state_line
 from stopgo.bridge.console import print_json, print_line
 from stopgo.bridge.link.capabilities import told_of_capabilities
+from stopgo.bridge.link.link import endpoints_in
+from stopgo.bridge.mavlink.vehicle_link.url import read_url
 from stopgo.bridge.profile import effective, profile_files, read_profile
+from stopgo.mission import __version__
 from stopgo.mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
@@ -154,14 +157,11 @@ def _vehicle(
 def _endpoint_only(named: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
     """Check the preset endpoint or URL, without a robot's name."""
     if named["mavlink"] is not None:
-        from stopgo.bridge.mavlink.vehicle_link.url import read_url
-
         yield Check(
             "port", True, f"{read_url(named['mavlink'])} is a MAVLink URL; the vehicle was not queried"
         )
     elif named["connect"] != DEFAULT_ENDPOINT:
         from stopgo.bridge.link.keys import now_utc, read_keys
-        from stopgo.bridge.link.link import endpoints_in
         from stopgo.bridge.link.zenoh_link import Guard, check_endpoint
 
         held = None if named["keys"] is None else read_keys(named["keys"], now=now_utc())
@@ -193,7 +193,6 @@ def _checked(name: str, look: Callable[[], Iterator[Check]]) -> list[Check]:
 
 
 def _system() -> Check:
-    from stopgo.mission import __version__
 
     where = f"{platform.system()} {platform.machine()}, {sys.prefix}"
     return Check("stopgo", True, f"{__version__}, Python {platform.python_version()}, {where}")
@@ -248,7 +247,6 @@ def _keys(folder: Path) -> Iterator[Check]:
 
 
 def _ports(endpoints: str) -> Iterator[Check]:
-    from stopgo.bridge.link.link import endpoints_in
 
     for endpoint in endpoints_in(endpoints):
         yield from _port(endpoint)

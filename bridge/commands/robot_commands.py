@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -190,7 +191,6 @@ def read_transform(option: str, text: str) -> Transform:
 
 def read_pose(option: str, text: str) -> Pose:
     """Read a pose from X,Y,HEADING in metres and degrees."""
-    import math
 
     from stopgo.mission.run.events import Pose
 

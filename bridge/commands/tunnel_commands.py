@@ -25,6 +25,8 @@ from stopgo.bridge.commands.bridge_options import (
 )
 from stopgo.bridge.commands.connection import given_options, refuse_options
 from stopgo.bridge.console import say
+from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
+from stopgo.bridge.mavlink.vehicle_link.url import check_guarded, read_url
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -111,7 +113,6 @@ def _robot_end(
 ) -> AbstractContextManager[Tunnel]:
     from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
     from stopgo.bridge.mavlink.tunnel.tunnel import open_tunnel
-    from stopgo.bridge.mavlink.vehicle_link.url import read_url
 
     messages = MessageFilter()
     return open_tunnel(
@@ -194,8 +195,6 @@ class RefusalListener:
 
 def _transport(mavlink: str, insecure: bool) -> Transport:
     """Open the MAVLink side; beyond this machine it needs --insecure, because nothing is signed here."""
-    from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
-    from stopgo.bridge.mavlink.vehicle_link.url import check_guarded, read_url
 
     url = read_url(mavlink)
     check_guarded(url, signed=False, insecure=insecure)

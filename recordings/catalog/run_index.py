@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.console.table import duration, table
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
@@ -198,7 +199,6 @@ def _plan(item: RecordingReview, mission: Mission) -> IndexedPlan:
 
 
 def _run(comparison: Comparison) -> IndexedRun:
-    from stopgo.mission.comparing.run_verdict import judge
 
     log, acquired = comparison.log, comparison.acquired
     return IndexedRun(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import lzma
+import re
 import sqlite3
 import struct
 import sys
@@ -70,7 +71,6 @@ def _is_part(path: Path) -> bool:
 
 def _natural(name: str) -> list[tuple[int, str]]:
     """Sort key by which bag_2 comes before bag_10."""
-    import re
 
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.document import Mission
@@ -115,7 +116,6 @@ def _own_events(log: FieldLog, mission: Mission, offset_ns: int) -> tuple[AnyEve
         )
     if not own:
         return ()
-    from msgspec.structs import replace as changed
 
     return tuple(
         changed(event, robot_ns=event.robot_ns + offset_ns) for event in own if event.run_id == own[-1].run_id

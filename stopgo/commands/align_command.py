@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stopgo.mission.console.table import table
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_checked
 from stopgo.mission.settings.parameter import numbers
 
 if TYPE_CHECKING:
@@ -113,7 +115,6 @@ def _with_transform(mission: Path, out: Path, fit: RigidFit) -> str:
     from msgspec.structs import replace
 
     from stopgo.mission.document import sealed
-    from stopgo.mission.files.atomic import write_checked
     from stopgo.mission.files.mission_json import encode, next_revision, read
 
     document = read(mission)
@@ -145,7 +146,6 @@ def _report(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> 
 
 
 def _text(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> str:
-    from stopgo.mission.console.table import table
 
     header = ("x m", "y m", "map x m", "map y m", "residual mm")
     rows = [

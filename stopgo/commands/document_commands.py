@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from stopgo.commands.align_command import align
+from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.files.atomic import must_not_replace, write_checked
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.settings import PARAMETERS
 
 if TYPE_CHECKING:
     from stopgo.mission.document import Mission
@@ -81,8 +87,6 @@ def check(
     if as_json:
         typer.echo(json_text(_verdict(mission, document, found)))
     elif found.problems:
-        from stopgo.mission.console.table import printable_lines
-
         typer.echo(printable_lines("\n".join(map(str, found.problems))))
     else:
         typer.echo(f"{mission}: valid; {identity(document)}, {len(document.stops)} stops")
@@ -143,7 +147,6 @@ def _is_library(error: ModuleNotFoundError) -> bool:
 
 
 def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
-    import hashlib
 
     from stopgo.mission.document.problems import Problem
 
@@ -216,7 +219,6 @@ def export(
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
-    from stopgo.mission.files.atomic import must_not_replace
     from stopgo.mission.files.exports import check_uses, format_named
     from stopgo.mission.files.exports.placing import moved, placed
     from stopgo.mission.files.mission_json import read
@@ -237,7 +239,6 @@ def export(
 
 def _write_export(out: Path, mission: Mission, name: str, supplements: Supplements) -> dict[str, Any]:
     """Write the file; return the report on it."""
-    from stopgo.mission.files.atomic import write_checked
     from stopgo.mission.files.exports import exported, form_of
 
     data = exported(mission, name, supplements)
@@ -257,8 +258,6 @@ def _check_problems(path: Path, mission: Mission) -> None:
 def _supplements(
     mission: Mission, floor: Path | None, coverage: Path | None, writing: dict[str, str | None]
 ) -> Supplements:
-    from dataclasses import replace
-    from datetime import UTC, datetime
 
     from stopgo.mission.files.exports.format import written_as
     from stopgo.mission.files.exports.stretches import read_stretches
@@ -274,7 +273,6 @@ def _supplements(
 def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     """Return the drawing the mission was planned on, in the unit it was planned in."""
     from stopgo.mission.files.exports.format import FloorDrawing
-    from stopgo.mission.files.plan_toml import read_settings
     from stopgo.planner.floors import options_of
     from stopgo.planner.floors.drawing import open_drawing
     from stopgo.planner.floors.dxf import metres_in
@@ -293,7 +291,6 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
 
 
 def _print_notes(notes: Iterable[str]) -> None:
-    from stopgo.mission.console.table import printable
 
     for note in notes:
         typer.echo(f"stopgo: {printable(note)}", err=True)
@@ -334,11 +331,8 @@ def import_command(
     from msgspec.structs import replace
 
     from stopgo.mission.document import sealed
-    from stopgo.mission.files.atomic import write_checked
     from stopgo.mission.files.imports import read_mission
     from stopgo.mission.files.mission_json import encode, next_revision, read
-    from stopgo.mission.files.plan_toml import read_settings
-    from stopgo.mission.settings import PARAMETERS
 
     given = {"origin": origin, "start": start}
     settings = read_settings(parameters, {key: PARAMETERS[key].given(text) for key, text in given.items()})

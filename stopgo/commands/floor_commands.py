@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import must_not_replace, write_atomic
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.settings import FLOOR_PARAMETERS
+from stopgo.planner.commands.options import values_of, with_options
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
@@ -19,8 +25,6 @@ if TYPE_CHECKING:
 
 def add_commands(app: typer.Typer) -> None:
     """Add `convert` and `floors` to the app."""
-    from stopgo.mission.settings import FLOOR_PARAMETERS
-    from stopgo.planner.commands.options import with_options
 
     floors = with_options(floors_command, (*FLOOR_PARAMETERS, "layers"))
     convert = with_options(convert_command, (*FLOOR_PARAMETERS, "layers"))
@@ -42,10 +46,6 @@ def floors_command(
 
     Exit code 1: the file gives no floor as it is; the last line states the reason and the remedy.
     """
-    from stopgo.mission.console.table import printable_lines
-    from stopgo.mission.files.atomic import must_not_replace, write_atomic
-    from stopgo.mission.files.plan_toml import read_settings
-    from stopgo.planner.commands.options import values_of
     from stopgo.planner.floors import options_of, survey_floor
     from stopgo.planner.floors.layer_map import layer_map
 
@@ -72,10 +72,7 @@ def convert_command(
     **given: Any,
 ) -> int:
     """Write a floor as a layered DXF in metres; it gives the same stops, and can be edited first."""
-    from stopgo.mission.files.atomic import must_not_replace, write_atomic
     from stopgo.mission.files.layered_dxf import layered_dxf
-    from stopgo.mission.files.plan_toml import read_settings
-    from stopgo.planner.commands.options import values_of
     from stopgo.planner.floors import options_of, read_floor
 
     if out.suffix.lower() != ".dxf":
@@ -107,9 +104,7 @@ def _lost_in_drawing(floor: FloorPlan) -> Iterator[str]:
 
 def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
     """Draw the floor that the options choose; else every floor of the file that can be planned."""
-    from dataclasses import replace
 
-    from stopgo.mission.files.atomic import write_atomic
     from stopgo.mission.files.floor_svg import floor_svg
     from stopgo.planner.floors import read_floor
     from stopgo.planner.floors.survey_picture import survey_svg

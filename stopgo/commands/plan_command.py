@@ -11,7 +11,11 @@ import typer
 
 from stopgo.commands.plan_files import PrintOptions, plan_files
 from stopgo.commands.result_files import JsonOption, result_folder
+from stopgo.mission.console.notice import notice
+from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.files.plan_toml import read_settings, settings_json, settings_toml
+from stopgo.planner.commands.options import values_of, with_options
 
 if TYPE_CHECKING:
     from stopgo.mission.settings import Settings
@@ -47,7 +51,6 @@ PrintConfigOption = Annotated[bool, typer.Option(help="Print plan.toml with thes
 
 def add_commands(app: typer.Typer) -> None:
     """Add `plan` to the app."""
-    from stopgo.planner.commands.options import with_options
 
     app.command(name="plan", epilog=EXAMPLE)(with_options(plan_command))
 
@@ -71,9 +74,6 @@ def plan_command(
     Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
     also where floor is left out or the plan is doubtful.
     """
-    from stopgo.mission.console.notice import notice
-    from stopgo.mission.files.plan_toml import read_settings
-    from stopgo.planner.commands.options import values_of
 
     settings = read_settings(parameters, values_of(given), notify=notice)
     if print_config:
@@ -93,7 +93,6 @@ def plan_command(
 
 
 def _print_config(settings: Settings, *, as_json: bool) -> None:
-    from stopgo.mission.files.plan_toml import settings_json, settings_toml
 
     typer.echo(json.dumps(settings_json(settings)) if as_json else settings_toml(settings))
 
@@ -123,8 +122,6 @@ def _exit_code(reports: list[PlanReport], *, strict: bool) -> int:
 
 def _print_reports(reports: list[PlanReport], *, as_json: bool) -> None:
     if not as_json:
-        from stopgo.mission.console.table import printable_lines
-
         typer.echo(printable_lines("\n".join(report.as_text() for report in reports)))
         return
     result = reports[0].as_json()

@@ -15,6 +15,8 @@ import typer
 
 from stopgo.commands.result_files import is_missing, report_missing_rerun, result_folder
 from stopgo.mission.errors import StopgoError
+from stopgo.mission.files.atomic import must_be_writable, replacing
+from stopgo.planner import plan
 
 if TYPE_CHECKING:
     from stopgo.mission.document import Mission
@@ -44,8 +46,6 @@ def plan_files(
     print_options: PrintOptions | None = None,
 ) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first."""
-    from stopgo.mission.files.atomic import must_be_writable
-    from stopgo.planner import plan
     from stopgo.planner.commands.outputs import names
     from stopgo.planner.floors import options_of, read_floor
 
@@ -97,7 +97,6 @@ WRITTEN = ("recording", "sheets", "coverage", "picture", "mission")
 
 def _write_part(plan: Plan, number: int, folder: Path, options: PrintOptions, watch: Stopwatch) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
-    from stopgo.mission.files.atomic import replacing
     from stopgo.planner.commands.outputs import names, set_aside_file
     from stopgo.planner.commands.plan_report import PlanReport
 

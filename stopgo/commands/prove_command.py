@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.commands.result_files import JsonOption, report_missing_rerun, result_folder
+from stopgo.mission.console.table import printable
+from stopgo.mission.files.atomic import must_be_writable, replacing
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
@@ -81,7 +83,6 @@ def prove_command(
     Exit code 1: the plan promises more than the simulated scans show; with --strict also if these are not
     all connected.
     """
-    from stopgo.mission.files.atomic import must_be_writable
     from stopgo.planner.scan_simulation.verification_files import verification_files
 
     files = verification_files(mission.parent if out is None else result_folder(out), mission)
@@ -100,7 +101,6 @@ def _simulated(
     mission: Path, floor: Path, coverage: Path | None, assumed: dict[str, Any]
 ) -> tuple[PlanProof, FloorPlan]:
     """Simulate the mission's scans; returns the proof and the floor, and prints progress and warnings."""
-    from stopgo.mission.console.table import printable
     from stopgo.planner.scan_simulation.verification_files import verify_file
 
     warnings: list[str] = []
@@ -119,7 +119,6 @@ def _show_progress(line: str) -> None:
 
 def _write_proof(proof: PlanProof, floor: FloorPlan, files: dict[str, Path]) -> dict[str, Path]:
     """Write a proof and return the files written; they appear together, proof.json last."""
-    from stopgo.mission.files.atomic import replacing
     from stopgo.mission.files.mission_text import json_text
     from stopgo.mission.proof.proof_text import proof_json
 
@@ -138,7 +137,6 @@ def _write_proof(proof: PlanProof, floor: FloorPlan, files: dict[str, Path]) -> 
 
 
 def _print_proof(proof: PlanProof, written: dict[str, Path], *, as_json: bool) -> None:
-    from stopgo.mission.console.table import printable
     from stopgo.mission.proof.proof_text import proof_json, proof_text
 
     if as_json:

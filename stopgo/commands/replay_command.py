@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stopgo.commands.replay_on_floor import follow_up_of, on_floor, write_follow_up
+from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError
-from stopgo.mission.files.atomic import must_be_writable, must_not_replace
+from stopgo.mission.files.atomic import must_be_writable, must_not_replace, write_atomic
 
 if TYPE_CHECKING:
     from stopgo.mission.document import Mission
@@ -141,7 +143,6 @@ class _ReplayFiles:
         """Return the replays with what was visible on the floor, and write the follow-up mission."""
         if self.floor is None:
             return replays
-        from stopgo.commands.replay_on_floor import follow_up_of, on_floor, write_follow_up
         from stopgo.planner.pipeline.follow_up_mission import planned_floor
 
         planned = planned_floor(self.floor, replays[0].mission)
@@ -152,7 +153,6 @@ class _ReplayFiles:
 
     def write(self, replays: list[Replay], plans: Review | None) -> None:
         """Write recording, table and report."""
-        from stopgo.mission.files.atomic import write_atomic
         from stopgo.recordings.replay.replay_text import as_csv
 
         if self.out is not None:
@@ -242,7 +242,6 @@ def _replays(logs: list[FieldLog], mission: Mission, placing: Placing, plans: Re
 
 
 def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:
-    from stopgo.mission.console.table import printable_lines
     from stopgo.recordings.logs import listing
 
     if as_json:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError
-from stopgo.mission.files.atomic import must_not_replace
+from stopgo.mission.files.atomic import must_not_replace, write_atomic
 
 if TYPE_CHECKING:
     from stopgo.recordings.page.reviewed import RecordingReview, Review
@@ -64,7 +65,6 @@ def review(
 def _write_files(found: Review, html: Path | None, out: Path | None, png: Path | None) -> None:
     """Write the report, the merged recording and the pictures, each if the user gave its path."""
     if html is not None:
-        from stopgo.mission.files.atomic import write_atomic
         from stopgo.recordings.page import report_html
         from stopgo.recordings.page.from_recordings import subject_of
 
@@ -92,7 +92,6 @@ def _of_one_mission(found: Review, folder: Path) -> tuple[RecordingReview, ...]:
 
 def _print_review(found: Review, *, as_json: bool) -> None:
     """Print the review on stdout, and files that cannot be read on stderr."""
-    from stopgo.mission.console.table import printable, printable_lines
 
     if as_json:
         items = [item.as_json() for item in found.recordings]

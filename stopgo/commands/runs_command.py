@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError
 
 
@@ -33,7 +35,6 @@ def runs(
         return
     if port is not None:
         raise InputError(f"--port {port}: needs --web; add --web or leave out --port")
-    from stopgo.mission.console.table import printable, printable_lines
     from stopgo.recordings.catalog.run_index import index_json, index_of, index_text
 
     index = index_of(folder, say=lambda line: typer.echo(printable(line), err=True))
@@ -45,9 +46,7 @@ def runs(
 
 def _serve_runs(folder: Path, port: int | None) -> None:
     """Serve the pages until Ctrl-C."""
-    import threading
 
-    from stopgo.mission.console.table import printable
     from stopgo.recordings.catalog.run_site import serving
 
     with serving(folder, port=port) as address:

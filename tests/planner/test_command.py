@@ -451,7 +451,7 @@ def test_a_plan_toml_that_is_not_there_is_2(run: Callable[..., Run], floor: Path
 def test_no_candidate_left_is_1(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
     line = refused(run, 1, tmp_path / "out", floor, "--clearance", 3)
     assert "no candidate" in line
-    assert "d_sec" in line
+    assert "clearance" in line
 
 
 def test_no_target_is_1(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from msgspec.structs import replace
 from stopgo.mission.errors import InputError, MissingExtra
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.planner.floors.ifc.model import Model, unpacked
+from stopgo.planner.floors.ifc.model import packed as pack
 from stopgo.planner.floors.reader import FloorFile
 
 FORM = 5
@@ -185,7 +186,6 @@ def _why(out: Path, code: int, path: Path) -> str:
 def _with_crashed(packed: bytes, bad: Sequence[str]) -> bytes:
     if not bad:
         return packed
-    from stopgo.planner.floors.ifc.model import packed as pack
 
     model = unpacked(packed)
     named = [f"{model.products[item].ifc_class} {item} '{model.products[item].name}'" for item in bad]

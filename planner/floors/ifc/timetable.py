@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -43,7 +44,6 @@ def read_timetable(path: Path, columns: Mapping[str, str]) -> Timetable:
     InputError
         Naming the file, the line and the column that cannot be used.
     """
-    import hashlib
 
     try:
         data = path.read_bytes()

@@ -1,0 +1,78 @@
+"""Imports inside functions: each spares a command the load of a library, or has a reason."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from functools import cache
+
+import pytest
+
+from tests.test_house import MODULES, tree_of
+
+REASONS = {
+    "stopgo": "`import stopgo` loads nothing but itself",
+    "stopgo.command_line": "`stopgo --version` and a refused argument load no table",
+    "stopgo.commands.demo_command": "only the demo starts a robot and unpacks the sample",
+    "stopgo.bridge.robot.journal_file": "Windows has no fcntl; everything else of the bridge runs there",
+    "stopgo.mission": "the version is looked up when it is asked for",
+    "stopgo.mission.plan": "a plan is drawn where a notebook shows it",
+    "stopgo.planner.candidates.triangulation": "scipy.spatial takes 0.4 s, and few plans triangulate",
+    "stopgo.planner.pipeline": "`import stopgo.planner` loads no stage",
+    "stopgo.recordings.clouds": "one format's reader is loaded, by the file's suffix",
+    "stopgo.recordings.logs": "one format's reader is loaded, by the log's name or first bytes",
+    "stopgo.recordings.viewing.importer": "Rerun asks of every file; most are not ours",
+}
+"""Modules that import lazily although no library is spared."""
+
+
+@cache
+def _imports(name: str) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """Names that a module imports when it is loaded, and those of each import inside a function."""
+    loaded: list[str] = []
+    lazy: list[tuple[str, ...]] = []
+
+    def walk(node: ast.AST, *, inside: bool) -> None:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.Import | ast.ImportFrom):
+                names = tuple(_names(child))
+                lazy.append(names) if inside else loaded.extend(names)
+            elif not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test)):
+                function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+                walk(child, inside=inside or function)
+
+    walk(tree_of(name), inside=False)
+    return tuple(loaded), tuple(lazy)
+
+
+def _names(node: ast.Import | ast.ImportFrom) -> Iterator[str]:
+    for alias in node.names:
+        whole = alias.name if isinstance(node, ast.Import) else f"{node.module}.{alias.name}"
+        yield whole if isinstance(node, ast.Import) or whole in MODULES else str(node.module)
+
+
+@cache
+def _libraries(name: str) -> frozenset[str]:
+    """Third-party packages that are loaded with a name: its own, or those of our modules below it."""
+    package = name.partition(".")[0]
+    if package != "stopgo":
+        return frozenset() if package in sys.stdlib_module_names else frozenset({package})
+    found: set[str] = set()
+    open_names, seen = [name], set[str]()
+    while open_names:
+        parts = open_names.pop().split(".")
+        for module in (".".join(parts[:end]) for end in range(1, len(parts) + 1)):
+            if module in MODULES and module not in seen:
+                seen.add(module)
+                for imported in _imports(module)[0]:
+                    ours = imported.partition(".")[0] == "stopgo"
+                    open_names.append(imported) if ours else found.update(_libraries(imported))
+    return frozenset(found)
+
+
+@pytest.mark.parametrize("name", [name for name in MODULES if _imports(name)[1]])
+def test_an_import_inside_a_function_spares_a_library_or_has_a_reason(name: str) -> None:
+    own = _libraries(name)
+    idle = [names for names in _imports(name)[1] if not frozenset().union(*map(_libraries, names)) - own]
+    assert bool(idle) == (name in REASONS), f"{name}: import {idle} where the module begins, or say why not"
