@@ -11,7 +11,7 @@ import shapely
 
 import stopgo.planner.visibility.sight.sight
 from stopgo.planner.geometry.shapes import GRID
-from tests.planner.sight.test_sight import World
+from tests.planner.visibility.sight.test_sight import World
 
 RANGES = (2.5, 5.0, 10.0, 30.0, 60.0, 100.0)
 BEYOND = 1.0

@@ -24,10 +24,10 @@ from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.replay.standstills import find_standstills
 from tests.planner.test_command import drawn
+from tests.recordings.clouds.test_clouds import ply
 from tests.recordings.replay.driving import driven, logged
 from tests.recordings.replay.test_as_driven import PLAN
 from tests.recordings.replay.test_replaying import log_of
-from tests.recordings.test_clouds import ply
 
 HEAP = (2.6, 0.9, 3.0, 1.3)
 MOUNT = ("laser", 0.2, 0.1, 0.5)
