@@ -146,8 +146,13 @@ def test_a_variant_that_is_not_there_is_named(stage: str, name: str) -> None:
 @pytest.mark.parametrize(
     "old", ["mission.events", "planner.routing.ways", "recordings.logs", "bridge.robot.base"]
 )
-def test_an_import_path_of_the_first_release_is_named_with_todays(module: Write, old: str) -> None:
+def test_an_import_path_of_the_first_release_is_named_with_todays(
+    module: Write, old: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     module("older", f"from {old} import Anything\ndef f(space): return space")
+    checkout = {"", str(ROOT)}  # where the folders are found by their old names
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in checkout])
+    monkeypatch.chdir(tmp_path)
     folder = old.partition(".")[0]
     with pytest.raises(InputError) as caught:
         plan(FLOOR, Settings(candidates="older:f"))
@@ -360,7 +365,7 @@ def test_a_kind_of_log_is_brought_and_checked(module: Write, monkeypatch: pytest
     assert len(read_log(Path("a.tape")).poses[0].ns) == 2
     wrong = {
         "back": "the times of odometer are not in order",
-        "nan": "the places of odometer has 1 numbers that are not finite",
+        "nan": "the positions of odometer has 1 numbers that are not finite",
         "fails": r"RuntimeError: out of tape \(tapes.py, line 12\)",
         "sun": "its clock is 'sun'; known: wall, since boot, simulated",
     }

@@ -116,7 +116,8 @@ def _robot_end(
 
     messages = MessageFilter()
     return open_tunnel(
-        link, transport, tells=own.mavlink("down"), hears=own.mavlink("up"), bulk=True, sees=messages.sees,
+        link, transport, publishes=own.mavlink("down"), receives=own.mavlink("up"),
+        bulk=True, sees=messages.sees,
         passes=(lambda message: True) if raw_orders else messages.lets_through,
         refused=RefusalSender().text_of, knocks=read_url(mavlink).kind == "udpout",
     )  # fmt: skip
@@ -146,7 +147,7 @@ def tunnel_station(
     transport = _transport(mavlink, insecure)
     end = f"the tunnel's endpoint at {robot}"
     with connecting(connect, Guard(held, insecure)) as link, open_tunnel(
-        link, transport, tells=own.mavlink("up") if sends else None, hears=own.mavlink("down"),
+        link, transport, publishes=own.mavlink("up") if sends else None, receives=own.mavlink("down"),
         wrote=RefusalListener(robot).take,
     ) as tunnel, greeting(
         link, own.mavlink("hello"), own.mavlink("alive"),

@@ -196,7 +196,7 @@ def test_check_tells_of_settings_that_are_none_and_of_another_robot(
     write(change(mission, origin=origin), made)
     (problem,) = problems(made, floor, capsys)
     assert problem["path"] == "$.origin.parameters"
-    assert "d_sec = -1" in problem["message"]
+    assert "--clearance -1" in problem["message"]
     write(change(mission, robot=change(mission.robot, radius=0.3)), made)
     (problem,) = problems(made, floor, capsys)
     assert problem == {

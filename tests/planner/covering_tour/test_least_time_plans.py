@@ -93,7 +93,7 @@ def test_settings_are_printed_with_it(capsys: pytest.CaptureFixture[str]) -> Non
 @pytest.mark.parametrize("value", ["length", "", "TIME"])
 def test_another_word_is_refused(value: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", str(SAMPLE), "--minimise", value]) == 2
-    assert f"minimise = {value}: known: stops, time" in capsys.readouterr().err
+    assert f"--minimise {value}: known: stops, time" in capsys.readouterr().err
     with pytest.raises(InputError, match="known: stops, time"):
         read_settings(None, {"minimise": value})
 

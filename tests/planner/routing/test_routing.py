@@ -239,7 +239,7 @@ def test_a_stop_where_the_robot_starts_needs_no_driving() -> None:
     ids=["in a wall", "at a wall", "off", "far off"],
 )
 def test_a_start_where_the_robot_does_not_fit_is_refused(place: tuple[float, float]) -> None:
-    with pytest.raises(StopgoError, match=r"start = .*does not fit"):
+    with pytest.raises(StopgoError, match=r"--start .*does not fit"):
         planned(two_rooms(0.8), Settings(start=(*place, 0.0)))
 
 

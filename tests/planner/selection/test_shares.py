@@ -191,9 +191,9 @@ def test_the_papers_rule_offers_nothing_beside_the_pattern() -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ({"coverage_rule": "paper", "room_coverage": 0.7}, "room_coverage = 0.7"),
-        ({"coverage_rule": "paper", "refine": True}, "refine = true"),
-        ({"fov": 120.0, "refine": True}, "fov = 120"),
+        ({"coverage_rule": "paper", "room_coverage": 0.7}, "--room-coverage 0.7"),
+        ({"coverage_rule": "paper", "refine": True}, "--refine: does"),
+        ({"fov": 120.0, "refine": True}, "--fov 120"),
         ({"kind_coverage": 1.2}, "between 0 and 1"),
     ],
 )
