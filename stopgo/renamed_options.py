@@ -1,26 +1,68 @@
-"""Options that had another name in 0.1: the old names are accepted until 0.3, each with one line."""
+"""Options that had another name in 0.1, or no effect: accepted until 0.3, each with one line."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class NewName:
+    """Today's name of an option."""
+
+    option: str
+    unit: str = ""
+    """Unit of the old option's values, where today's values have another by default."""
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """An option that never had an effect on its command."""
+
+    takes_value: bool
+
 
 _OF_PLANS = {
-    "--use": "--require-stop",
-    "--d-sec": "--clearance",
-    "--edge": "--edge-clearance",
-    "--door-access": "--min-door-width",
-    "--near": "--min-range",
-    "--views": "--min-views",
-    "--battery": "--battery-life",
+    "--use": NewName("--require-stop"),
+    "--d-sec": NewName("--clearance"),
+    "--edge": NewName("--edge-clearance"),
+    "--door-access": NewName("--min-door-width"),
+    "--near": NewName("--min-range"),
+    "--views": NewName("--min-views"),
+    "--battery": NewName("--battery-life"),
 }
-_OF_FLOORS = {"--scan-height": "--cut-height"}
+_OF_FLOORS = {"--scan-height": NewName("--cut-height")}
+_OF_VEHICLES = {"--any-origin": NewName("--skip-origin-check")}
+_OF_ITEMS = {"--settle": NewName("--settle-item")}
+_OF_COVERAGE = {"--coverage": NewName("--coverage-file")}
+_WITHOUT_LEASE = {"--take-over": Dropped(takes_value=False), "--stop": Dropped(takes_value=True)}
+_WITHOUT_STOP = {"--stop": Dropped(takes_value=True)}
 
-RENAMED: Mapping[str, Mapping[str, str]] = {
+RENAMED: Mapping[str, Mapping[str, NewName | Dropped]] = {
     "plan": {**_OF_PLANS, **_OF_FLOORS},
     "floors": _OF_FLOORS,
     "convert": _OF_FLOORS,
+    "check": _OF_COVERAGE,
+    "export": {**_OF_COVERAGE, **_OF_ITEMS},
+    "prove": {
+        **_OF_COVERAGE,
+        "--step": NewName("--angular-step"),
+        "--height": NewName("--scanner-height"),
+    },
+    "push": {**_OF_VEHICLES, **_OF_ITEMS},
+    "doctor": _OF_VEHICLES,
+    "start": _OF_VEHICLES,
+    "pause": _WITHOUT_LEASE,
+    "abort": _WITHOUT_LEASE,
+    "resume": {**_OF_VEHICLES, **_WITHOUT_STOP},
+    "home": _WITHOUT_STOP,
+    "skip": _OF_VEHICLES,
+    "retry": _OF_VEHICLES,
+    "robot": {"--endurance": NewName("--battery-life", unit="h")},
+    "simulate": {"--profile": NewName("--autopilot")},
+    "tunnel": {"--raw-orders": NewName("--allow-commands")},
 }
-"""New names by old ones, by command."""
+"""Old options by command."""
 
 
 def with_new_names(arguments: list[str]) -> tuple[list[str], list[str]]:
@@ -30,11 +72,20 @@ def with_new_names(arguments: list[str]) -> tuple[list[str], list[str]]:
     """
     renamed = next((RENAMED[word] for word in arguments[:1] if word in RENAMED), {})
     end = arguments.index("--") if "--" in arguments else len(arguments)
-    words, lines = [], []
-    for argument in arguments[:end]:
+    words: list[str] = []
+    lines: list[str] = []
+    rest = iter(arguments[:end])
+    for argument in rest:
         option, sign, value = argument.partition("=")
         new = renamed.get(option)
-        if new is not None:
-            lines.append(f"{option} is now called {new}; the old name ends with 0.3")
-        words.append(argument if new is None else f"{new}{sign}{value}")
+        if new is None:
+            words.append(argument)
+        elif isinstance(new, Dropped):
+            lines.append(f"{option} has no effect on {arguments[0]}; it ends with 0.3")
+            if new.takes_value and not sign:
+                next(rest, None)
+        else:
+            lines.append(f"{option} is now called {new.option}; the old name ends with 0.3")
+            given = value if sign or not new.unit else next(rest, None)
+            words.append(f"{new.option}={given}{new.unit}" if sign or given else new.option)
     return [*words, *arguments[end:]], list(dict.fromkeys(lines))

@@ -16,6 +16,7 @@ import stopgo
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.mission.plan import Plan
+from stopgo.renamed_options import with_new_names
 
 ROOT = Path(__file__).parents[1]
 OFFICE = ROOT / "recordings" / "samples" / "office.dxf"
@@ -69,3 +70,34 @@ def test_a_name_that_is_not_text_is_refused(capsys: pytest.CaptureFixture[str]) 
     line = "caf\ufffd.json: is not UTF-8 text; rename the file or folder"
     assert told.err == f"stopgo: {line}\n"
     assert json.loads(told.out) == {"error": {"message": line, "exit_code": 2}}
+
+
+@pytest.mark.parametrize(
+    ("given", "today", "line"),
+    [
+        (
+            ("robot", "--endurance", "2"),
+            ["robot", "--battery-life=2h"],
+            "is now called --battery-life",
+        ),
+        (("robot", "--endurance=0.5"), ["robot", "--battery-life=0.5h"], "--endurance is now called"),
+        (
+            ("plan", "f.dxf", "--views=2"),
+            ["plan", "f.dxf", "--min-views=2"],
+            "now called --min-views",
+        ),
+        (
+            ("pause", "--stop", "s01", "--robot", "r1"),
+            ["pause", "--robot", "r1"],
+            "no effect on pause",
+        ),
+        (("abort", "--take-over", "--json"), ["abort", "--json"], "--take-over has no effect on abort"),
+        (("start", "--take-over"), ["start", "--take-over"], ""),
+        (("plan", "--", "--views"), ["plan", "--", "--views"], ""),
+    ],
+)
+def test_an_old_option_is_taken_with_a_line(given: tuple[str, ...], today: list[str], line: str) -> None:
+    words, lines = with_new_names(list(given))
+    assert words == today
+    assert [text for text in lines if line not in text] == []
+    assert bool(lines) == bool(line)

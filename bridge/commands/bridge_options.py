@@ -98,7 +98,8 @@ FromHere = Annotated[bool, typer.Option("--from-here", help="Start at the neares
 Arm = Annotated[bool, typer.Option("--arm", help="Arm a vehicle that is disarmed.")]
 Disarm = Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle at standstill.")]
 AnyOrigin = Annotated[
-    bool, typer.Option("--any-origin", help="Skip the origin check: the vehicle has satellite positions.")
+    bool,
+    typer.Option("--skip-origin-check", help="Skip the origin check: the vehicle has satellite positions."),
 ]
 Roster = Annotated[
     Path | None,
@@ -139,7 +140,7 @@ ScanWaiting = Annotated[
 Settling = Annotated[
     str | None,
     typer.Option(
-        "--settle", metavar="delay|hold", help="Settle in a delay item, or as the hold of a waypoint."
+        "--settle-item", metavar="delay|hold", help="Settle in a delay item, or as the hold of a waypoint."
     ),
 ]
 SetOrigin = Annotated[
@@ -212,13 +213,12 @@ SpeedUp = Annotated[
     float,
     typer.Option("--speed-up", min=0.01, max=1000, help="Simulation: its time runs faster by this factor."),
 ]
-Endurance = Annotated[
-    float,
+BatteryLife = Annotated[
+    str,
     typer.Option(
-        "--endurance",
-        metavar="HOURS",
-        min=0,
-        help="sim: runtime per battery charge; 0: the battery does not run down.",
+        "--battery-life",
+        metavar="DURATION",
+        help="sim: runtime per charge, such as 90min or 6h; 0: the battery does not run down.",
     ),
 ]
 AutopilotId = Annotated[
@@ -239,7 +239,7 @@ SimulatedUrl = Annotated[
 SimulatedAutopilot = Annotated[
     str,
     typer.Option(
-        "--profile", metavar="strict|ardupilot|px4", help="Autopilot whose protocol behaviour it has."
+        "--autopilot", metavar="strict|ardupilot|px4", help="Autopilot whose protocol behaviour it has."
     ),
 ]
 SimulatedState = Annotated[
@@ -280,7 +280,7 @@ JoinedRobot = Annotated[
 ]
 RawOrders = Annotated[
     bool,
-    typer.Option("--raw-orders", help="Allow all MAVLink messages, not only telemetry and stop commands."),
+    typer.Option("--allow-commands", help="Allow all MAVLink messages, not only telemetry and stopping."),
 ]
 
 # Conformance

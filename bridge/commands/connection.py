@@ -79,7 +79,7 @@ class Connection:
     def for_driving(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Connection:
         """Return this connection for a command that drives, with what the command may do to a vehicle."""
         if self.mavlink is None:
-            refuse_options(self.given, "--robot", "--arm", "--disarm", "--any-origin")
+            refuse_options(self.given, "--robot", "--arm", "--disarm", "--skip-origin-check")
             return self
         consenting = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
         return replace(self, mavlink=consenting)

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from stopgo.mission.frames.transform import Transform
 
 ONLY_VEHICLES = (
-    "--autopilot", "--trigger", "--scan-wait", "--settle", "--set-origin", "--any-origin", "--while-running",
+    "--autopilot", "--trigger", "--scan-wait", "--settle-item", "--set-origin", "--skip-origin-check",
+    "--while-running",
 )  # fmt: skip
 """Options of `push` that only concern a vehicle."""
 

@@ -97,6 +97,15 @@ ABOUT: dict[Verb, str] = {
     "home": "End the run and drive back along the legs that were driven.",
 }
 """Help of each command."""
+NO_EFFECT: dict[Verb, tuple[str, ...]] = {
+    "pause": ("stop", "take_over", "arm", "any_origin", "disarm"),
+    "resume": ("stop", "disarm"),
+    "skip": ("disarm",),
+    "retry": ("disarm",),
+    "abort": ("stop", "take_over", "arm", "any_origin"),
+    "home": ("stop", "arm", "any_origin", "disarm"),
+}
+"""Options that have no effect on each command, and that it does not take."""
 
 
 def order_of(verb: Verb) -> Callable[..., None]:
@@ -118,8 +127,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
         report_answer(answer, station.keys.robot, json_)
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
-    without = () if verb in ("resume", "retry", "skip") else ("arm", "any_origin")
-    return with_connection(without=without if verb == "abort" else (*without, "disarm"))(command)
+    return with_connection(without=NO_EFFECT[verb])(command)
 
 
 def status(

@@ -13,8 +13,8 @@ from stopgo.bridge.commands.bridge_options import (
     DEFAULT_ENDPOINT,
     ArmInRun,
     AutopilotId,
+    BatteryLife,
     ControllerKind,
-    Endurance,
     FaultsOfRobot,
     Insecure,
     JournalFolder,
@@ -34,6 +34,7 @@ from stopgo.bridge.commands.bridge_options import (
 from stopgo.bridge.commands.connection import GivenOptions, given_options, refuse_options
 from stopgo.bridge.console import say
 from stopgo.mission.errors import InputError
+from stopgo.mission.settings.parameter import seconds
 
 if TYPE_CHECKING:
     from stopgo.bridge.mavlink.driving.mavlink_scanner import ScanTrigger
@@ -46,7 +47,8 @@ if TYPE_CHECKING:
 
 MAVLINK = "mavlink:"
 """Before the URL of an autopilot that is the controller."""
-ONLY_SIMULATED = ("--at", "--map", "--fault", "--speed-up", "--endurance")
+LONGEST_BATTERY_LIFE_S = 1e6
+ONLY_SIMULATED = ("--at", "--map", "--fault", "--speed-up", "--battery-life")
 ONLY_DRIVEN = ("--arm", "--trigger", "--vehicle", "--signing-key")
 """Options of `--controller sim`, and of `--controller mavlink:URL`; with the other one they are refused."""
 
@@ -68,7 +70,7 @@ def robot(
     map_: SiteToMap = None,
     fault: FaultsOfRobot = None,
     speed_up: SpeedUp = 1.0,
-    endurance: Endurance = 6.0,
+    battery_life: BatteryLife = "6h",
     vehicle: AutopilotId = None,
     arm: ArmInRun = False,
     trigger: ScannerTrigger = "camera",
@@ -83,7 +85,7 @@ def robot(
     from stopgo.bridge.robot.program import RobotOptions
 
     given = given_options(context)
-    simulated = SimulatedOptions(at, read_map(map_), 3600 * endurance, read_faults(fault))
+    simulated = SimulatedOptions(at, read_map(map_), read_battery_life(battery_life), read_faults(fault))
     driven = AutopilotOptions(arm, trigger, signing_key, vehicle, insecure)
     body = body_of(controller, state, given, simulated, driven)
     run(RobotOptions(
@@ -174,6 +176,17 @@ def read_trigger(text: str) -> ScanTrigger:
     if known is None:
         raise InputError(f"--trigger {text}: one of {', '.join(TRIGGERS)}")
     return known
+
+
+def read_battery_life(text: str) -> float:
+    """Seconds of a battery's runtime, from `90min`, `6h` or a number of seconds."""
+    try:
+        found = seconds(text)
+    except ValueError:
+        found = math.nan
+    if not 0 <= found <= LONGEST_BATTERY_LIFE_S:
+        raise InputError(f"--battery-life {text}: write a duration, such as 90min or 6h")
+    return found
 
 
 def read_map(text: str | None) -> Transform | None:

@@ -26,7 +26,7 @@ def simulate_commands() -> typer.Typer:
     """Return `stopgo simulate` with its subcommands."""
     commands = typer.Typer(
         help="Simulate a MAVLink vehicle (a robot of stopgo simulates itself, see stopgo robot)."
-        "\n\nExample: stopgo simulate vehicle --profile ardupilot --origin 47.4,8.5,400",
+        "\n\nExample: stopgo simulate vehicle --autopilot ardupilot --origin 47.4,8.5,400",
     )
     commands.command("vehicle")(simulate_vehicle)
     return commands
@@ -49,7 +49,7 @@ def simulate_vehicle(
 ) -> None:
     """Simulate a rover with an autopilot that speaks MAVLink, until SIGTERM.
 
-    Example: stopgo simulate vehicle --mavlink udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
+    Example: stopgo simulate vehicle --mavlink udpin:127.0.0.1:14550 --autopilot ardupilot --origin 47,8,400
     """
     from stopgo.bridge.mavlink.simulated.vehicle_process import VehicleOptions, run_vehicle
 

@@ -42,7 +42,7 @@ MOST_KINDS = 100
 """Kinds of messages that are reported; more kinds come from damaged or hostile data."""
 REFUSED = "tunnel refused "
 """Prefix of the STATUSTEXT that reports a refusal."""
-ONLY_STOPS = "blocked, only telemetry and stop commands are allowed; use --raw-orders to allow all"
+ONLY_STOPS = "blocked, only telemetry and stop commands are allowed; use --allow-commands to allow all"
 SAY_EVERY_S = 1.0
 """Shortest time between two reports of the same kind; a ground program may repeat its request."""
 
@@ -73,7 +73,7 @@ def tunnel_robot(
 ) -> None:
     """Run the tunnel's endpoint at the robot, until SIGTERM.
 
-    Without --raw-orders stations receive the vehicle's telemetry and can stop it, and nothing else. The
+    Without --allow-commands stations receive the vehicle's telemetry and can stop it, and nothing else. The
     commander's lease does not count here.
 
     Example: stopgo tunnel robot --name r1 --mavlink serial:/dev/ttyAMA1:57600 --connect tcp/127.0.0.1:7447

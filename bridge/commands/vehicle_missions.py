@@ -165,7 +165,7 @@ def _translated(mission: Mission, autopilot: str, items: ItemOptions) -> ItemLis
         autopilot,
         trigger=_choice("--trigger", items.trigger, get_args(Trigger)),
         scan_wait=_choice("--scan-wait", items.scan_wait, get_args(ScanWait)),
-        settle=_choice("--settle", items.settle, get_args(Settle)),
+        settle=_choice("--settle-item", items.settle, get_args(Settle)),
     )
 
 

@@ -66,7 +66,7 @@ def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, 
         return
     least = count - sum(one.role == "settle" for one in placed)
     enough = "which is enough" if least <= most else "which is not enough"
-    with_hold = f"--settle hold makes it {least}, {enough}; or " if least < count else ""
+    with_hold = f"--settle-item hold makes it {least}, {enough}; or " if least < count else ""
     raise NegativeResult(
         f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
         f"{with_hold}plan fewer stops at once"

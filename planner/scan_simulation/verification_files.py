@@ -64,7 +64,7 @@ def verify_file(
         simulation = replace(simulation, ceiling_known=False)
     if simulation.height_m >= simulation.ceiling_m:
         raise InputError(
-            f"--height {simulation.height_m:g}: not below the ceiling at "
+            f"--scanner-height {simulation.height_m:g}: not below the ceiling at "
             f"{simulation.ceiling_m:g} m; lower the scanner or give --ceiling"
         )
     return verify(mission, planned.space, simulation, _coverage(path, coverage, mission, warn), say), planned

@@ -61,7 +61,8 @@ def check(
     mission: MissionFile,
     floor: Floor = None,
     coverage: Annotated[
-        Path | None, typer.Option(help="With --floor: the coverage.json that was written with it.")
+        Path | None,
+        typer.Option("--coverage-file", help="With --floor: the coverage.json that was written with it."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -70,7 +71,7 @@ def check(
     It checks schema, digest, numbers, and that the legs join. With --floor it also checks that the mission
     was planned on that floor, that stops and legs keep every clearance, and that the stops see the targets
     that the mission claims. All of it is computed again, each line of sight against every wall. With
-    --coverage it checks the claims of that file.
+    --coverage-file it checks the claims of that file.
 
     Exit code 0: valid; 1: readable but invalid, of another floor, without clearance, or with more coverage
     claimed than its stops have; 2: not readable.
@@ -113,7 +114,7 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
     problems = problems_of(mission)
     if floor is None:
         if coverage is not None:
-            raise InputError(f"--coverage {coverage}: needs the floor; give it with --floor")
+            raise InputError(f"--coverage-file {coverage}: needs the floor; give it with --floor")
         return _Checked(problems)
     claims = None if coverage is None else read_coverage(coverage, mission)
     other = _other_floor(mission, floor)
@@ -203,7 +204,9 @@ def export(
     out: Annotated[Path, typer.Option("-o", "--out", help="The file; its suffix names the format.")],
     to: FormatOption = None,
     floor: Annotated[Path | None, typer.Option(help="The floor's .dxf, to draw over.")] = None,
-    coverage: Annotated[Path | None, typer.Option(help="coverage.json, to draw what is seen.")] = None,
+    coverage: Annotated[
+        Path | None, typer.Option("--coverage-file", help="coverage.json, to draw covered targets.")
+    ] = None,
     autopilot: AutopilotOption = None,
     trigger: TriggerOption = None,
     scan_wait: ScanWaitOption = None,
@@ -217,7 +220,7 @@ def export(
     .plan (QGroundControl), .waypoints (QGC WPL 110), .dxf, .csv, .geojson, .nav2.yaml, .mcap (nav_msgs/Path),
     .vda5050.json (3.0), .vda5050-2.1.json; docs/how-to/exports.md lists the programs that open each.
 
-    Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
+    Example: stopgo export plan/mission.json --floor floor.dxf --coverage-file plan/coverage.json -o site.dxf
     """
     from stopgo.mission.files.exports import check_uses, format_named
     from stopgo.mission.files.exports.placing import moved, placed

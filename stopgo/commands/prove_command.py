@@ -25,19 +25,30 @@ ProofFolderOption = Annotated[
     Path | None, typer.Option("-o", "--out", help="Folder for the results; else the mission's folder.")
 ]
 CoverageOption = Annotated[
-    Path | None, typer.Option(help="The mission's coverage.json; else the one in the mission's folder.")
+    Path | None,
+    typer.Option(
+        "--coverage-file", help="The mission's coverage.json; else the one in the mission's folder."
+    ),
 ]
 StepOption = Annotated[
     float | None,
     typer.Option(
-        min=0.005, max=2.0, help="Between neighbouring rays, degrees.", show_default="the scanner's, else 0.1"
+        "--angular-step",
+        min=0.005,
+        max=2.0,
+        help="Angle between neighbouring rays, degrees.",
+        show_default="the scanner's, else 0.1",
     ),
 ]
 NoiseOption = Annotated[float, typer.Option(min=0.0, max=100.0, help="Of a distance, mm rms.")]
 HeightOption = Annotated[
     float | None,
     typer.Option(
-        min=0.1, max=10.0, help="Scanner above the floor, m.", show_default="the scanner's, else 1.3"
+        "--scanner-height",
+        min=0.1,
+        max=10.0,
+        help="Height of the scanner above the floor, m.",
+        show_default="the scanner's, else 1.3",
     ),
 ]
 CeilingOption = Annotated[

@@ -77,7 +77,7 @@ class Supervisor:
         """A robot that got ready; one that dies while it boots is started again."""
         while True:
             fault = ["--fault", self.faults.pop()] if self.faults else []
-            extra = ["--endurance", "0", *self.extra, *fault]
+            extra = ["--battery-life", "0", *self.extra, *fault]
             try:
                 return start_robot(
                     "r1", self.state, listen=self.endpoint, speed_up=self.speed_up, extra=extra

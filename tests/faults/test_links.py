@@ -26,7 +26,7 @@ from tests.ports import free_port
 def line(folder: Path, *, speed_up: float = 50.0, **proxied: float) -> Iterator[Proxy]:
     """A robot behind a proxy, with a battery for the longest mission."""
     port = free_port()
-    extra = ("--endurance", "0")
+    extra = ("--battery-life", "0")
     robot = start_robot("r1", folder, listen=f"tcp/127.0.0.1:{port}", speed_up=speed_up, extra=extra)
     try:
         with Proxy(port, **proxied) as proxy:

@@ -22,7 +22,7 @@ READERS = {
     "check --floor": ("check", "mission.json", "--floor", "FILE"),
     "export": ("export", "FILE", "-o", "out.csv"),
     "export --floor": ("export", "mission.json", "--floor", "FILE", "-o", "out.dxf"),
-    "export --coverage": ("export", "mission.json", "--coverage", "FILE", "-o", "out.dxf"),
+    "export --coverage": ("export", "mission.json", "--coverage-file", "FILE", "-o", "out.dxf"),
     "import": ("import", "FILE", "-o", "out.json"),
     "import --from": ("import", "FILE", "--from", "plan", "-o", "out.json"),
     "import --parameters": ("import", "stops.csv", "-p", "FILE", "-o", "out.json"),

@@ -130,7 +130,7 @@ class VehicleOrders:
                 " (stopgo push --set-origin)",
             )
         wrong = apart(listed.sent.origin, origin)
-        satellites = "; or add --any-origin, if it finds its position by satellites"
+        satellites = "; or add --skip-origin-check, if it finds its position by satellites"
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 
     def _decided(self, order: Order) -> Decision | Refused:

@@ -23,5 +23,5 @@ def profile_named(name: str) -> Autopilot:
         If there is none of that name.
     """
     if name not in PROFILES:
-        raise InputError(f"--profile {name}: one of {', '.join(PROFILES)}")
+        raise InputError(f"--autopilot {name}: one of {', '.join(PROFILES)}")
     return PROFILES[name]

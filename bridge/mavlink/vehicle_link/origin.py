@@ -26,7 +26,7 @@ def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Vehic
     if held is None:
         tried = "and takes none (does its navigation run?)" if set_it else "or reports none: add --set-origin"
         raise NegativeResult(
-            f"{peer} has no origin, {tried}, or --any-origin if it finds its position by satellites; "
+            f"{peer} has no origin, {tried}, or --skip-origin-check if it finds its position by satellites; "
             "nothing was sent"
         )
     away = origin_distance(site, held.place)
@@ -34,7 +34,7 @@ def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Vehic
         raise NegativeResult(
             f"{peer}: its origin {_degrees(held)} is {away} from the mission's {_degrees(wanted)}, "
             "and so would every stop be; an origin is taken once per boot: restart it and push with "
-            "--set-origin, or --any-origin if it finds its position by satellites; nothing was sent"
+            "--set-origin, or --skip-origin-check if it finds its position by satellites; nothing was sent"
         )
     return held
 

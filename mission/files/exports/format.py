@@ -43,7 +43,7 @@ class Supplements:
 
 
 def written_as(options: Mapping[str, str | None]) -> Supplements:
-    """Supplements by the words given for `--autopilot`, `--trigger`, `--scan-wait` and `--settle`.
+    """Supplements by the words given for `--autopilot`, `--trigger`, `--scan-wait` and `--settle-item`.
 
     Raises
     ------

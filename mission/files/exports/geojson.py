@@ -22,7 +22,7 @@ Feature = dict[str, Any]
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
-    """One feature a line: a Point per stop, a LineString per leg, and what --coverage adds."""
+    """One feature a line: a Point per stop, a LineString per leg, and what --coverage-file adds."""
     origin = mission.georeference
     assert origin is not None  # the format is georeferenced
     features = [*_stops(mission, origin), *_legs(mission, origin), *_coverage(supplements, origin)]

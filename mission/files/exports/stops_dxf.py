@@ -88,7 +88,7 @@ def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
             f"the floor's drawing had {faults} faults that had to be mended to write it; compare the two"
         )
     if supplements.coverage is None:
-        found.append("no --coverage: layers SCAN_COVERAGE and SCAN_NOT_SEEN stay empty")
+        found.append("no --coverage-file: layers SCAN_COVERAGE and SCAN_NOT_SEEN stay empty")
     return tuple(found)
 
 

@@ -139,7 +139,7 @@ def test_another_origin_is_refused(run: Run) -> None:
     with vehicle(origin=SiteOrigin(lat=51.5001, lon=7.5, alt=100.0, heading_deg=0.0)) as url:
         code, _, said = run("push", "MISSION", "--mavlink", str(url), "--set-origin")
         assert (code, "11.13 m from the mission's" in said, "nothing was sent" in said) == (1, True, True)
-        assert run("push", "MISSION", "--mavlink", str(url), "--any-origin")[0] == 0
+        assert run("push", "MISSION", "--mavlink", str(url), "--skip-origin-check")[0] == 0
 
 
 def test_a_vehicle_that_follows_its_mission_is_let_be_in_each_commands_words(run: Run) -> None:
@@ -254,7 +254,14 @@ class Stalls(Scripted):
 def test_ctrl_c_cancels_and_tells_what_is_on_the_vehicle(tmp_path: Path, mission: Mission) -> None:
     write(sealed(mission), tmp_path / "mission.json")
     with Stalls(held(stops(3))) as stalling:
-        command = [sys.executable, "-m", "stopgo", "push", str(tmp_path / "mission.json"), "--any-origin"]
+        command = [
+            sys.executable,
+            "-m",
+            "stopgo",
+            "push",
+            str(tmp_path / "mission.json"),
+            "--skip-origin-check",
+        ]
         command += ["--mavlink", str(stalling.url), "--vehicle", "1", "--state", str(tmp_path / "state")]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
         with stalling.wire.waiting("MISSION_ITEM_INT") as waiting:

@@ -35,7 +35,8 @@ class Vehicle:
         self.mission = folder / "mission.json"
         write(real_tour(), self.mission)
         self.process = subprocess.Popen(
-            [*STOPGO, "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", "ardupilot",
+            [*STOPGO, "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}",
+             "--autopilot", "ardupilot",
              "--origin", "51.5,7.5,100", "--at", "0,0,0", "--speed-up", "10"],
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip

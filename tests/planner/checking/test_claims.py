@@ -152,7 +152,7 @@ def check(mission: Path, *options: str) -> int:
 
 def test_check_tells_the_coverage_it_counted(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     coverage = json.loads(made.with_name("coverage.json").read_text())["total"]
-    assert check(made, "--coverage", str(made.with_name("coverage.json"))) == 0
+    assert check(made, "--coverage-file", str(made.with_name("coverage.json"))) == 0
     last = capsys.readouterr().out.splitlines()[-1]
     share = 100 * coverage["seen"] / coverage["visible"]
     assert last == (
@@ -168,7 +168,7 @@ def test_check_finds_a_coverage_that_is_not_so(made: Path, capsys: pytest.Captur
     coverage = json.loads(path.read_text())
     coverage["total"]["seen"] += 1
     path.write_text(json.dumps(coverage))
-    assert check(made, "--coverage", str(path)) == 1
+    assert check(made, "--coverage-file", str(path)) == 1
     seen = coverage["total"]["seen"]
     expected = f"coverage $.total.seen: is {seen}, but all stops see {seen - 1}, counted line by line"
     assert expected in capsys.readouterr().out
@@ -189,7 +189,7 @@ def test_check_finds_that_two_stops_at_one_place_see_less(
 
 
 def test_coverage_is_checked_on_a_floor_only(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", str(made), "--coverage", "coverage.json"]) == 2
+    assert main(["check", str(made), "--coverage-file", "coverage.json"]) == 2
     assert "give it with --floor" in capsys.readouterr().err
 
 

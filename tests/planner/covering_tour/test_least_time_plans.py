@@ -62,7 +62,7 @@ def test_a_plan_for_the_least_time_passes_its_check(
     written: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mission, coverage = str(written / "mission.json"), str(written / "coverage.json")
-    assert main(["check", mission, "--floor", str(SAMPLE), "--coverage", coverage]) == 0
+    assert main(["check", mission, "--floor", str(SAMPLE), "--coverage-file", coverage]) == 0
     assert json.loads((written / "mission.json").read_text())["origin"]["parameters"]["minimise"] == "time"
 
 

@@ -13,7 +13,7 @@ from stopgo.recordings.rrd.read import check
 from tests.called import stopgo
 from tests.disk import small_disk
 
-COARSE = ("--step", "1")
+COARSE = ("--angular-step", "1")
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,8 @@ def test_a_missing_library_is_told_with_its_extra(
 
 
 @pytest.mark.parametrize(
-    ("option", "value"), [("--step", "0.0001"), ("--height", "3"), ("--coverage", "none.json")]
+    ("option", "value"),
+    [("--angular-step", "0.0001"), ("--scanner-height", "3"), ("--coverage-file", "none.json")],
 )
 def test_what_cannot_be_is_one_line(planned: Path, option: str, value: str) -> None:
     told = prove(planned, option, value)

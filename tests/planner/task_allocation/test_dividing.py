@@ -262,7 +262,7 @@ def test_a_command_writes_a_mission_for_each_robot(
     for name in ("mission", "mission-2"):
         path = tmp_path / f"{name}.json"
         coverage = path.with_name(path.name.replace("mission", "coverage"))
-        assert main(["check", str(path), "--floor", floor, "--coverage", str(coverage)]) == 0
+        assert main(["check", str(path), "--floor", floor, "--coverage-file", str(coverage)]) == 0
     assert main(["export", str(tmp_path / "mission-2.json"), "-o", str(tmp_path / "stops.csv")]) == 0
 
 

@@ -151,7 +151,7 @@ def test_a_vehicle_with_satellites_may_count_from_anywhere(tmp_path: Path) -> No
     site = Site(tmp_path, "ardupilot", at=Pose(x=0.0, y=11.131884, heading=0.0))
     site.origin = SiteOrigin(lat=51.4999, lon=7.5, alt=100.0, heading_deg=0.0)
     with site.up():
-        assert "--any-origin" in refused(site, "start")
+        assert "--skip-origin-check" in refused(site, "start")
         with site.reached(any_origin=True) as station:
             assert station.command("start").outcome == "ok"
             assert station.command("abort").outcome == "ok"

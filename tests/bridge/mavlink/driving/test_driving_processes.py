@@ -43,7 +43,8 @@ def vehicle(tmp_path: Path, profile: str) -> Iterator[tuple[Url, Operator]]:
     """A vehicle in a process of its own, on hold at the mission's start."""
     port = free_port()
     process = start(
-        "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", profile, "--at", "0,0,0",
+        "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--autopilot", profile,
+        "--at", "0,0,0",
         *QUICK[profile],
         "--origin", "47.4,8.5,400,30", "--state", str(tmp_path / "vehicle"),
         called="the vehicle",

@@ -100,7 +100,7 @@ def process(*options: str) -> Iterator[subprocess.Popen[str]]:
 @pytest.mark.parametrize("profile", list(PROFILES))
 def test_a_vehicle_that_is_killed_and_started_again_keeps_its_items(tmp_path: Path, profile: str) -> None:
     port = free_port()
-    options = ("--mavlink", str(here(port)), "--profile", profile, "--state", str(tmp_path / "v"))
+    options = ("--mavlink", str(here(port)), "--autopilot", profile, "--state", str(tmp_path / "v"))
     ardupilot = profile == "ardupilot"
     with wire(there(port)) as station:
         with process(*options) as running:
@@ -133,7 +133,7 @@ def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -
     [
         (["--mavlink", "udp:1"], "not a MAVLink URL"),
         (["--mavlink", "udpin:0.0.0.0:14550"], "--insecure"),
-        (["--mavlink", "udpin:127.0.0.1:14550", "--profile", "copter"], "--profile copter"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--autopilot", "copter"], "--autopilot copter"),
         (["--mavlink", "udpin:127.0.0.1:14550", "--origin", "1,2"], "LAT,LON,ALT"),
         (["--mavlink", "udpin:127.0.0.1:14550", "--origin", "90,2,3"], "LAT,LON,ALT"),
         (["--mavlink", "udpin:127.0.0.1:14550", "--fault", "slip@1"], "KIND@N"),

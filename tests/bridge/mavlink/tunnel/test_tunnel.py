@@ -205,7 +205,7 @@ def test_mavsdk_uploads_and_downloads_through_the_tunnel(tmp_path: Path) -> None
     from mavsdk.plugins.mission_raw.mission_raw import MissionRaw
 
     items = tour("ardupilot")
-    with tunnelled(tmp_path, "--raw-orders", program="udpout") as (port, _), station(port) as system:
+    with tunnelled(tmp_path, "--allow-commands", program="udpout") as (port, _), station(port) as system:
         missions = MissionRaw(system)
         missions.upload_mission(raw(items))
         read = [item_of(item) for item in missions.download_mission()]
@@ -244,7 +244,7 @@ def test_the_station_is_told_once_for_each_kind_of_message_that_is_refused(
         "MISSION_COUNT",
         "COMPONENT_ARM_DISARM (COMMAND_LONG)",
     ]
-    assert all("r1" in line and "--raw-orders" in line for line in said)
+    assert all("r1" in line and "--allow-commands" in line for line in said)
 
 
 def test_a_tunnels_refusal_is_named_where_the_vehicle_would_seem_silent() -> None:
@@ -291,7 +291,16 @@ def test_viewers_hear_the_vehicle_and_cannot_speak_to_it(tmp_path: Path) -> None
     heard: queue.Queue[str] = queue.Queue()
     with ExitStack() as opened:
         vehicle, _ = opened.enter_context(rover(tmp_path, "ardupilot"))
-        own = ("robot", "--name", "r1", "--mavlink", str(vehicle.url), "--listen", endpoint, "--raw-orders")
+        own = (
+            "robot",
+            "--name",
+            "r1",
+            "--mavlink",
+            str(vehicle.url),
+            "--listen",
+            endpoint,
+            "--allow-commands",
+        )
         opened.enter_context(process(*own, "--keys", str(site / "r1")))
 
         def link_of(name: str) -> Any:

@@ -178,6 +178,6 @@ def test_the_notes_say_what_the_layers_do_without(tmp_path: Path) -> None:
     notes = FORMATS["dxf"].notes
     assert [note.partition(":")[0] for note in notes(square_tour(), Supplements())] == [
         "no --floor",
-        "no --coverage",
+        "no --coverage-file",
     ]
     assert notes(square_tour(), Supplements(floor=floor(), coverage=COVERAGE)) == ()

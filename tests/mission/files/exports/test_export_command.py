@@ -94,7 +94,7 @@ REFUSED = {
     "floor missing": (["-o", "x.dxf", "--floor", "no.dxf"], "no.dxf: cannot be read"),
     "floor no dxf": (["-o", "x.dxf", "--floor", "README.md"], "only over a .dxf"),
     "floor of another mission": (["-o", "x.dxf", "--floor", str(SAMPLE)], "is not the floor of this mission"),
-    "coverage missing": (["-o", "x.dxf", "--coverage", "no.json"], "no.json: cannot be read"),
+    "coverage missing": (["-o", "x.dxf", "--coverage-file", "no.json"], "no.json: cannot be read"),
     "folder missing": (["-o", "no/x.csv"], "does not exist"),
 }
 
@@ -121,7 +121,7 @@ def test_the_mission_itself_is_never_overwritten(path: str, capsys: Captured) ->
 def test_neither_floor_nor_coverage_is_overwritten(
     name: str, path: str, tmp_path: Path, capsys: Captured
 ) -> None:
-    given = {"room.dxf": "--floor", "coverage.json": "--coverage"}[name]
+    given = {"room.dxf": "--floor", "coverage.json": "--coverage-file"}[name]
     (tmp_path / name).write_bytes(b"kept")
     (tmp_path / "link").symlink_to(tmp_path / name)
     arguments = [path, "--to", "dxf", given, str(tmp_path / name)]
@@ -142,7 +142,7 @@ def test_a_senseless_mission_is_no(path: str, tmp_path: Path, capsys: Captured) 
 
 def test_layers_over_the_sample_office(office: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "site.dxf"
-    drawn = ["--floor", str(SAMPLE), "--coverage", str(office / "coverage.json")]
+    drawn = ["--floor", str(SAMPLE), "--coverage-file", str(office / "coverage.json")]
     code, _, err = exit_of([str(office / "mission.json"), *drawn, "-o", str(out)], capsys)
     assert (code, err) == (0, "")
     drawing = ezdxf.readfile(out)
