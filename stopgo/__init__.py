@@ -5,8 +5,8 @@
     plan = stopgo.plan("floor.dxf", range=8.0)
     stopgo.write_mission(plan.mission, "mission.json")
 
-Lengths are metres, angles radians counter-clockwise from +x, times seconds. Every noun is frozen; arrays
-are read-only. Paths may be `str` or `Path`.
+Lengths are metres, angles radians counter-clockwise from +x, times seconds. Every result is frozen;
+arrays are read-only. Paths may be `str` or `Path`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _HERE = Path(__file__).parent
 
 
 def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
-    """The parameters of a plan: defaults, then a plan.toml, then `changes` by name.
+    """Return the parameters of a plan: defaults, then a plan.toml, then `changes` by name.
 
     Raises
     ------
@@ -47,21 +47,21 @@ def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
 
 
 def read_floor(path: str | Path, *, layers: Mapping[str, str] | None = None, **options: Any) -> FloorPlan:
-    """The floor in a file, in metres.
+    """Read the floor in a file, in metres.
 
-    `layers` says what layers of other names stand for, such as `{"A-WALL": "walls", "DIM": "ignore"}`;
+    `layers` gives the kinds of layers with other names, such as `{"A-WALL": "walls", "DIM": "ignore"}`;
     `options` are the others of stopgo.planner.floors.FloorOptions, such as `d_dis` for how curves are cut.
 
     Raises
     ------
     InputError
-        Naming the file, what is wrong with it, and the way out.
+        Naming the file, the problem, and the remedy.
     """
     from stopgo.planner.floors import FloorOptions
     from stopgo.planner.floors import read_floor as read
 
-    told = {name.upper(): role for name, role in (layers or {}).items()}
-    return read(Path(path), FloorOptions(layers=told, **options))
+    kinds = {name.upper(): role for name, role in (layers or {}).items()}
+    return read(Path(path), FloorOptions(layers=kinds, **options))
 
 
 def plan(
@@ -72,7 +72,7 @@ def plan(
     observe: Callable[[Any], None] = lambda noun: None,
     **changes: Any,
 ) -> Plan:
-    """Where the scanner must stand on a floor, and by which route a robot visits those stops.
+    """Plan the scan stops of a floor, and the route by which a robot visits them.
 
     Parameters
     ----------
@@ -83,14 +83,14 @@ def plan(
     all_parts
         Also plan parts of the floor that are not connected with the first.
     observe
-        Is handed every noun as soon as it is made, for watching.
+        Called with the result of each stage as soon as it is there.
 
     Raises
     ------
     NegativeResult
-        No target, no candidate, nothing in sight, or the coverage asked for cannot be reached.
+        No target, no candidate, no visible target, or the required coverage cannot be reached.
     InputError
-        A file, parameter or place that does not fit.
+        A file, parameter or position that does not fit.
     """
     from stopgo.planner import plan as planned
     from stopgo.planner.floors import options_of
@@ -105,7 +105,7 @@ def plan(
 
 
 def read_mission(path: str | Path) -> Mission:
-    """A mission.json, read strictly: an unknown key, a wrong type or a wrong digest is an InputError."""
+    """Read a mission.json strictly: an unknown key, a wrong type or a wrong digest is an InputError."""
     from stopgo.mission.files.mission_json import read
 
     return read(Path(path))
@@ -119,7 +119,7 @@ def write_mission(mission: Mission, path: str | Path) -> None:
 
 
 def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, ...]:
-    """What of a mission makes no sense; and with a floor's file, what does not fit that floor."""
+    """Return the problems of a mission; with a floor's file, also those of the mission on that floor."""
     from stopgo.mission.document.problems import problems_of
 
     problems = problems_of(mission)
@@ -131,14 +131,14 @@ def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, .
 
 
 def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None:
-    """Write a mission in a format that others open, by the file's suffix or by name; it is read back first.
+    """Write a mission in another program's format, by the file's suffix or by name; it is read back first.
 
     Raises
     ------
     InputError
         No such format, or it needs a georeference that the mission has not.
     NegativeResult
-        The format cannot hold what the mission depends on.
+        The format cannot hold a property that the mission depends on.
     """
     from stopgo.mission.files.atomic import write_atomic
     from stopgo.mission.files.exports import exported, format_named
@@ -148,7 +148,7 @@ def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None
 
 
 def connect(endpoint: str, *, robot: str, **options: Any) -> AbstractContextManager[Station]:
-    """A robot that has been reached at `endpoint`, such as `tcp/127.0.0.1:7447`, as a context manager.
+    """Connect to a robot at `endpoint`, such as `tcp/127.0.0.1:7447`; returns a context manager.
 
     Options are those of `stopgo.bridge.station.station.connect`: site, commander, timeout_s, keys, insecure.
 
@@ -163,20 +163,20 @@ def connect(endpoint: str, *, robot: str, **options: Any) -> AbstractContextMana
 
 
 def push(mission: Mission, station: Station) -> None:
-    """Send a mission to a robot and see it stored there; what an interrupted push has sent is kept.
+    """Send a mission to a robot and verify that it is stored; an interrupted push continues where it ended.
 
     Raises
     ------
     NegativeResult
         The robot rejects it, with its reason.
     OutcomeUnknown
-        No answer came: it may or may not be stored.
+        No answer came: the mission may or may not be stored.
     """
     station.push(mission)
 
 
 def follow(station: Station) -> Iterator[Followed]:
-    """States, poses and events of the robot's run as they come, until the run is over."""
+    """Return states, poses and events of the robot's run as they come, until the run is over."""
     return station.reports()
 
 
@@ -188,21 +188,21 @@ def replay(
     to_map: tuple[float, float, float] | None = None,
     time_offset_s: float = 0.0,
 ) -> Replay:
-    """A robot's own log laid beside the mission that it was to drive.
+    """Compare a robot's own log with the mission that it was to drive.
 
     Parameters
     ----------
     align
-        `first`: the log begins at the mission's start; `stops`: it is laid by where it halts.
+        `first`: the log begins at the mission's start; `stops`: it is fitted by its standstills.
     to_map
         x, y, heading (m, radians) of the site in the log's frame.
 
     Raises
     ------
     InputError
-        When it cannot be read, nothing tells how its frame lies, or it is of another mission.
+        When it cannot be read, has no transform to the mission frame, or is of another mission.
     NegativeResult
-        When its halts fit the stops in no way, or in several.
+        When its standstills fit the stops by no placing, or by several.
     """
     from stopgo.mission.frames.transform import Transform
     from stopgo.recordings.logs import read_log
@@ -232,7 +232,7 @@ def rerun_importer() -> int:
 
 
 def _too_old() -> str:
-    """Whether this Python is one that stopgo does not run on; empty if it does."""
+    """The line for a Python that is too old; empty if it is not."""
     if sys.version_info >= (3, 11):  # noqa: UP036  a copied folder is not held to requires-python
         return ""
     return f"needs Python 3.11 or newer; this is {sys.version.split()[0]} ({sys.executable})"

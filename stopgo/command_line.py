@@ -49,9 +49,9 @@ def main(arguments: list[str] | None = None) -> int:
     Without `arguments` it is the process's own command, and the process must end with that code.
     """
     if arguments is not None:
-        return _heeding(arguments, whole_process=False)
+        return _with_signals(arguments, whole_process=False)
     have_output()
-    code = _heeding(sys.argv[1:], whole_process=True)
+    code = _with_signals(sys.argv[1:], whole_process=True)
     try:
         sys.stdout.flush()
         sys.stderr.flush()
@@ -60,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
     return code
 
 
-def _heeding(arguments: list[str], *, whole_process: bool) -> int:
+def _with_signals(arguments: list[str], *, whole_process: bool) -> int:
     try:
         with Signals(whole_process=whole_process) as signals, answering(arguments) as answer:
             try:
@@ -72,12 +72,12 @@ def _heeding(arguments: list[str], *, whole_process: bool) -> int:
                 notice(message)
                 answer.fail(message, code)
                 return code
-    except KeyboardInterrupt:  # a second one, while the first was told of
+    except KeyboardInterrupt:  # a second one, while the first is reported
         return INTERRUPTED
 
 
 def build_app() -> typer.Typer:
-    """The `stopgo` command with every folder's verbs."""
+    """The `stopgo` command with all its subcommands."""
     from importlib import import_module
 
     import typer
@@ -107,14 +107,14 @@ def build_app() -> typer.Typer:
 
 @cache
 def front_door(verb: str = "") -> Any:
-    """The same, ready to run; made once, however many commands a process runs.
+    """The app, ready to run; made once, however many commands a process runs.
 
-    Where `verb` is one of its words it has no other: to make them all takes longer than most of them do.
+    With a known `verb` it has that subcommand alone: to make all takes longer than most of them run.
     """
     from typer.main import get_command, get_command_name
 
     app = build_app()
-    commands = [made for made in app.registered_commands if _word_of(made, get_command_name) == verb]
+    commands = [made for made in app.registered_commands if _name_of(made, get_command_name) == verb]
     groups = [made for made in app.registered_groups if made.name == verb]
     if not commands and not groups:
         return front_door() if verb else get_command(app)
@@ -122,14 +122,14 @@ def front_door(verb: str = "") -> Any:
     return get_command(app)
 
 
-def _word_of(made: CommandInfo, get_command_name: Callable[[str], str]) -> str:
-    """The word that a person types for a command."""
+def _name_of(made: CommandInfo, get_command_name: Callable[[str], str]) -> str:
+    """The name that a person types for a command."""
     assert made.callback is not None
     return made.name or get_command_name(made.callback.__name__)
 
 
 def _run(arguments: list[str]) -> int:
-    """The command's own exit code, if it does not raise."""
+    """Run one command and return its exit code, if it does not raise."""
     _must_be_text(arguments)
     arguments, renamed = with_new_names(arguments)
     for line in renamed:
@@ -143,7 +143,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _must_be_text(arguments: list[str]) -> None:
-    """Refuse a name of bytes that are not UTF-8 before anything is written: no answer could tell it."""
+    """Refuse a name of bytes that are not UTF-8 before anything is written: no message could show it."""
     from stopgo.mission.console.table import printable
 
     for argument in arguments:
@@ -152,7 +152,7 @@ def _must_be_text(arguments: list[str]) -> None:
 
 
 def _ended_by(error: BaseException, signals: Signals) -> tuple[str, int]:
-    """A line for the user, and the exit code, of a command that has raised; raises what nobody foresaw."""
+    """The line for the user and the exit code of a command that raised; raises unexpected errors again."""
     if isinstance(error, StopgoError):
         return str(error), error.exit_code
     if isinstance(error, KeyboardInterrupt) or signals.first is not None:
@@ -163,18 +163,18 @@ def _ended_by(error: BaseException, signals: Signals) -> tuple[str, int]:
         return _missing(error)
     if isinstance(error, OSError):  # such as a full disk under the output
         return f"{error.filename or 'output'}: {error.strerror}", StopgoError.exit_code
-    return _left_by(error)
+    return _raised_by_typer(error)
 
 
 def _stopped(signals: Signals) -> tuple[str, int]:
-    """Of a command that a signal has ended; only Ctrl-C has somebody to be told."""
+    """Line and exit code of a command that a signal ended; only Ctrl-C gets a line."""
     if signals.first not in (None, signal.SIGINT):
         return "", signals.exit_code
     return "stopped by Ctrl-C", INTERRUPTED
 
 
-def _left_by(error: BaseException) -> tuple[str, int]:
-    """Of what the library of commands has raised."""
+def _raised_by_typer(error: BaseException) -> tuple[str, int]:
+    """Line and exit code of an error of typer, the library of commands."""
     from typer import Abort, Exit
     from typer.exceptions import TyperException
 
@@ -188,7 +188,7 @@ def _left_by(error: BaseException) -> tuple[str, int]:
 
 
 def _misused(error: TyperException) -> str:
-    """What is wrong with how a command was written; after `stopgo keys`, which verbs there are."""
+    """The usage error in words; after a group such as `stopgo keys`, with its subcommands."""
     context = getattr(error, "ctx", None)
     verbs = () if context is None or context.parent is None else getattr(context.command, "commands", ())
     known = f" {context.command_path} has: {', '.join(verbs)}" if context and verbs else ""

@@ -1,4 +1,4 @@
-"""The kinds of elements of a floor, and what each means to the laser and to the robot."""
+"""The kinds of elements of a floor, and their roles for the laser and the robot."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Kind:
-    """What an element of a layer means to the laser and to the robot."""
+    """Role of an element for the laser and the robot."""
 
     name: str
     occludes: bool
@@ -27,4 +27,4 @@ KINDS: dict[str, Kind] = {
         Kind("other", occludes=False, obstacle=True, target=False),
     )
 }
-"""Every element kind with its defaults; `other` is a closed shape on a layer nobody named."""
+"""Every element kind with its defaults; `other` is a closed shape on an unknown layer."""

@@ -24,7 +24,7 @@ def entries_in(given: str) -> tuple[str, ...]:
     path = Path(given)
     if "=" in given and not path.exists():
         return tuple(entry.strip() for entry in given.split(","))
-    document = read_toml(path, way_out=f"write one with: stopgo floors FLOOR.dxf --write-map {path.name}")
+    document = read_toml(path, remedy=f"write one with: stopgo floors FLOOR.dxf --write-map {path.name}")
     for key in document:
         if key != "layers":
             raise InputError(f"{path}: unknown key {key}; known: [layers]")

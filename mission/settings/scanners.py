@@ -1,8 +1,8 @@
 """Laser scanners by name: the nominal figures of common ones, as far as a plan needs them.
 
-One way of scanning each: a scanner with several resolutions has several names. Steps are the spacing at
-10 m, or a full turn over the points in it. None was taken from a maker's dated data sheet: `found_in`
-tells which were met in other publications, and with what; the rest is to be compared with the sheet.
+One resolution each: a scanner with several resolutions has several names. A step is the spacing at 10 m, or a
+full turn divided by its points. No figure is from a maker's dated data sheet: `found_in` names the other
+publications. Compare the rest with the data sheet.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class ScannerFacts:
 
     name: str
     found_in: str
-    """Where figures were met outside a maker's sheet, and which."""
+    """Publications other than a data sheet, with their figures."""
     range: float
     """Metres."""
     near: float
@@ -43,11 +43,11 @@ class ScannerFacts:
     """Seconds without pictures, where known."""
 
     def values(self) -> dict[str, Any]:
-        """What they say, by the names of a plan's parameters."""
-        told = {
+        """The figures by the names of a plan's parameters."""
+        figures = {
             key: getattr(self, key) for key in ("range", "near", "angular_step", "blind_cone", "scan_time")
         }
-        return {key: value for key, value in told.items() if value is not None}
+        return {key: value for key, value in figures.items() if value is not None}
 
 
 def _at_10_m(spacing_mm: float) -> float:
