@@ -255,6 +255,24 @@ def test_a_simulated_robot_loads_nothing_of_autopilots() -> None:
     assert not {"pymavlink", "stopgo.mission.console.plugins"} & set(run(sys.executable, "-c", code).split())
 
 
+KERNELS = {"look", "look_from_cell", "iterated_search"}
+"""Compiled functions: each is one loop, so that it compiles to one."""
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_no_function_is_longer_than_forty_lines(name: str) -> None:
+    functions = [node for node in ast.walk(tree_of(name)) if isinstance(node, ast.FunctionDef)]
+    long = {node.name for node in functions if (node.end_lineno or 0) - node.lineno >= 40}
+    assert long <= KERNELS, f"{name}: {long}"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    texts = [ast.get_docstring(node) or "" for node in ast.walk(tree_of(name)) if isinstance(node, kinds)]
+    assert not [text for text in texts if text.split(" ")[0] in ("What", "Whether", "How")]
+
+
 def test_every_module_says_what_it_is_for() -> None:
     for name in MODULES:
         assert ast.get_docstring(tree_of(name)), f"{name} has no first sentence"
