@@ -44,7 +44,7 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
 def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) -> None:
     visible = max(1, int(visibility.visible.sum()))
     seen = visibility.units_seen * (100.0 / visible)
-    sight = entities.SIGHT
+    sight = entities.CANDIDATE_COVERAGE
     canvas.columns(sight, index, rr.Scalars.columns(scalars=seen))
     canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="seen by the candidate", widths=1))
 
