@@ -46,7 +46,9 @@ class JournalRows:
         Raises
         ------
         DamagedRow
-            If any row is not what was written, or a newer stopgo wrote it.
+            If any row is not what was written.
+        NewerJournal
+            If a newer stopgo wrote it.
         """
         stored = 0 if self._newest is None else self._newest.read()
         with self.transaction():
