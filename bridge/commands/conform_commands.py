@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING
@@ -28,7 +29,7 @@ from stopgo.bridge.commands.bridge_options import (
     TakeOver,
     Timeout,
 )
-from stopgo.bridge.conform.requirements import NotTried, count_outcomes
+from stopgo.bridge.conform.requirements import NotTried, count_outcomes, untested
 from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
 from stopgo.mission.console.table import table
 from stopgo.mission.errors import InputError
@@ -72,10 +73,11 @@ def conform_robot(
     """Test every requirement on a robot, as a station, and print which it meets and which it does not.
 
     The robot receives small missions around its present position; its own mission is stored again at the
-    end. It does not move without --drive. A robot on a run is not tested.
+    end. It does not move without --drive. A robot on a run is not tested. Whether its memory is durable is
+    tested by a restart: by --restart, or by asking the person at the terminal.
 
     Ends with 0 if nothing failed, 1 if something did, 2 if nothing was tested, and 3 if the robot stopped
-    answering.
+    answering or its durability was not tested.
 
     Example: stopgo conform robot --robot r1 --connect tcp/127.0.0.1:7447
 
@@ -84,8 +86,9 @@ def conform_robot(
     from stopgo.bridge.conform.conform_robot import REQUIREMENTS, ConformOptions, robot_bench, robot_verdicts
 
     options = ConformOptions(
-        connect, robot, site, who, timeout, insecure, keys, other_keys, take_over, restart
-    )
+        connect, robot, site, who, timeout, insecure, keys, other_keys, take_over, restart,
+        asked=partial(ask_for_restart, robot) if sys.stdin.isatty() else None,
+    )  # fmt: skip
     with robot_bench(options) as bench, Bar("conform", REQUIREMENTS_UNIT) as bar:
         _announce(bench, drive=drive)
         verdicts: list[ConformVerdict] = []
@@ -93,6 +96,13 @@ def conform_robot(
             verdicts.append(verdict)
             bar.show(len(verdicts), len(REQUIREMENTS) + 1)
     report(robot, "robot", verdicts, as_json=json_)
+
+
+def ask_for_restart(robot: str) -> None:
+    """Ask the person to cut the robot's power; raises `NotTried` if the answer is no."""
+    say(f"{robot}: cut its power or kill its program, start it again, then press Enter (n: do not test)")
+    if sys.stdin.readline().strip().lower().startswith("n"):
+        raise NotTried("the robot was not restarted")
 
 
 def _announce(bench: RobotBench, *, drive: bool) -> None:
@@ -166,9 +176,14 @@ def report(peer: str, kind: str, verdicts: Iterable[ConformVerdict], *, as_json:
         print_text(table(("protocol.md", "requirement", "outcome", "why"), rows))
         summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
         print_line(f"{peer}: {summary}")
+    not_tested = untested(verdicts)
+    if not_tested:
+        say(f"{peer}: not a pass, durability was not tested: {'; '.join(not_tested)}; add --restart COMMAND")
     if any(one.lost for one in verdicts):
         raise typer.Exit(3)
     if counts["failed"]:
         raise typer.Exit(1)
     if not counts["passed"]:
         raise typer.Exit(2)
+    if not_tested:
+        raise typer.Exit(3)

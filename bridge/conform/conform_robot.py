@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,6 +55,8 @@ class ConformOptions:
     other_keys: Path | None = None
     take_over: bool = False
     restart: str | None = None
+    asked: Callable[[], None] | None = None
+    """Asks a person to restart the robot, where no command does; raises `NotTried` if nobody does."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def robot_bench(options: ConformOptions) -> Iterator[RobotBench]:
         bench = RobotBench(
             station.link, station.keys, commander=station.commander, timeout_s=options.timeout_s,
             take_over=options.take_over, other=other, forger=_forger(station, options, stack),
-            restart=None if options.restart is None else restarting(options.restart),
+            restart=options.asked if options.restart is None else restarting(options.restart),
         )  # fmt: skip
         try:
             yield bench

@@ -56,6 +56,8 @@ class Requirement(Generic[B]):
     """Returns if the requirement is met; raises `Nonconforming` or `NotTried`."""
     drives: bool = False
     """True if the robot moves in the test."""
+    needed: bool = False
+    """True if no peer conforms while this is not tested."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,13 @@ class ConformVerdict:
     reason: str = ""
     lost: bool = False
     """True if the peer did not respond after the test."""
+    needed: bool = False
+    """True if no peer conforms while this is not tested."""
+
+
+def untested(verdicts: Iterable[ConformVerdict]) -> tuple[str, ...]:
+    """Return the needed requirements that were not tested."""
+    return tuple(one.text for one in verdicts if one.needed and one.outcome == "not tried")
 
 
 def tried(
@@ -85,9 +94,9 @@ def tried(
     for requirement in requirements:
         name = (requirement.section, requirement.text)
         if lost:
-            yield ConformVerdict(*name, "not tried", lost)
+            yield ConformVerdict(*name, "not tried", lost, needed=requirement.needed)
         elif requirement.drives and not drive:
-            yield ConformVerdict(*name, "not tried", undrivable)
+            yield ConformVerdict(*name, "not tried", undrivable, needed=requirement.needed)
         else:
             outcome, reason = _outcome(requirement, bench)
             try:
@@ -97,7 +106,7 @@ def tried(
             except PeerNotResponding as error:
                 lost = str(error)
                 outcome, reason = "failed", reason or lost
-            yield ConformVerdict(*name, outcome, reason, lost=bool(lost))
+            yield ConformVerdict(*name, outcome, reason, lost=bool(lost), needed=requirement.needed)
 
 
 def _outcome(requirement: Requirement[B], bench: B) -> tuple[TriedOutcome, str]:

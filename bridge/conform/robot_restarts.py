@@ -14,7 +14,7 @@ BOOT_S = 60.0
 def _restarted(bench: RobotBench) -> Info:
     """Restart the robot, and return its info after that."""
     if bench.restart is None:
-        raise NotTried("needs a command that restarts the robot's program; add --restart COMMAND")
+        raise NotTried("needs a restart of the robot: --restart COMMAND, or a person at a terminal")
     before = bench.info().boot_id
     bench.restart()
 
@@ -57,9 +57,10 @@ def a_run_waits_after_a_restart(bench: RobotBench) -> None:
 
 
 RESTARTS: tuple[Requirement[RobotBench], ...] = (
-    Requirement("Events", "a boot has an id; mission, lease, events outlive it", a_boot_has_an_id_of_its_own),
+    Requirement("Events", "a boot has an id; mission, lease, events outlive it", a_boot_has_an_id_of_its_own,
+                needed=True),
     Requirement("Orders", "answers outlive a restart; orders of the boot before do not",
-                answers_outlive_a_restart),
+                answers_outlive_a_restart, needed=True),
     Requirement("States of a run", "nothing moves by itself after a restart: PAUSED",
                 a_run_waits_after_a_restart, drives=True),
 )  # fmt: skip

@@ -22,7 +22,7 @@ from stopgo.mission.run.events import (
     Started,
     StateReport,
 )
-from stopgo.mission.run.orders import LONGEST_VALID_S, Answer
+from stopgo.mission.run.orders import LONGEST_VALID_S, Answer, Verb
 
 RUN_S = 180.0
 """Longest time of a run of the trial mission."""
@@ -148,6 +148,17 @@ def an_abort_ends_a_run(bench: RobotBench) -> None:
     answer = bench.commands.must_execute("abort", issued_ns=0, boot_id=None, valid_for_s=LONGEST_VALID_S)
     must(answer.state == "ABORTED", f"an abort was answered with state {answer.state}")
     bench.wait_for_state("ABORTED")
+
+
+def a_stop_counts_whatever_it_names(bench: RobotBench) -> None:
+    _started(bench)
+    stops: tuple[tuple[Verb, str], ...] = (("pause", "PAUSED"), ("abort", "ABORTED"))
+    for verb, state in stops:
+        answer = bench.commands.must_execute(
+            verb, run_id="another-run", mission_id="another", revision=10**6, expect_state=("HELD",)
+        )
+        must(answer.message, f"{verb} for another run was answered without a message")
+        bench.wait_for_state(state)
 
 
 def anybody_may_pause(bench: RobotBench) -> None:
@@ -304,6 +315,7 @@ RUNS: tuple[Requirement[RobotBench], ...] = tuple(
         ("Orders", "a start that comes again is carried out once", a_start_is_carried_out_once),
         ("Orders", "RUNNING to ABORTED: orders as in the table", orders_mean_what_the_table_says),
         ("Orders", "an abort that knows nothing ends a run", an_abort_ends_a_run),
+        ("Orders", "a stop counts whatever run, mission or state it names", a_stop_counts_whatever_it_names),
         ("Orders", "anybody may pause; only the commander resumes", anybody_may_pause),
         ("Messages", "110 stops are told in a small state, without gaps", a_long_run_is_told_in_little),
         ("Pushing a mission", "a new revision during a run waits", a_revision_waits_for_the_next_stop),

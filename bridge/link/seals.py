@@ -44,7 +44,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 import msgspec
 
 from stopgo.bridge.link.keys import Certificates, HeldKeys, Holder, Untrusted, now_utc
-from stopgo.bridge.link.link import Answering, Hearing, Request
+from stopgo.bridge.link.link import Answering, Hearing, Request, Unanswered
 from stopgo.bridge.link.protocol import VERSION, decode, encode, place_of, untrusted
 
 if TYPE_CHECKING:
@@ -233,7 +233,10 @@ class KeySeals:
                 reply = encode(untrusted(error))
             own = Seal(certificate=self._held.der, nonce=nonce, boot_id=self._boot_id, at_ns=self._clock_ns())
             about = (_parameters(request.parameters), _hash(request.payload))
-            return reply, self._with_signature(own, reply, "answer", request.key, *about)
+            try:
+                return reply, self._with_signature(own, reply, "answer", request.key, *about)
+            except Untrusted as error:  # parameters with a line break: no signature could be right
+                raise Unanswered(str(error)) from None
 
         return answered
 
@@ -332,9 +335,12 @@ def _read(seal: bytes) -> Seal:
     if not seal:
         raise Untrusted("it is not signed")
     try:
-        return decode(seal, Seal)
+        read = decode(seal, Seal)
     except msgspec.DecodeError:
         raise Untrusted("its signature cannot be read") from None
+    if "\n" in read.nonce or "\n" in read.boot_id:
+        raise Untrusted("its nonce or boot has several lines")
+    return read
 
 
 def _place(key: str) -> tuple[str, str]:

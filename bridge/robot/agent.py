@@ -18,7 +18,7 @@ import msgspec
 from stopgo.bridge.link.capabilities import RECORD
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.keys import Untrusted, now_utc
-from stopgo.bridge.link.link import Link, Request
+from stopgo.bridge.link.link import Link, Request, Unanswered
 from stopgo.bridge.link.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
@@ -41,13 +41,14 @@ from stopgo.bridge.robot.pages import address_of, events_page, part_page
 from stopgo.bridge.robot.published_poses import PublishedPoses
 from stopgo.bridge.robot.recorder import ENTRY_S, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
+from stopgo.bridge.robot.reported_journal import ReportedJournal
 from stopgo.bridge.robot.runner import Runner, state_report
 from stopgo.bridge.robot.station_contact import StationContact
 from stopgo.mission import __version__
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import StateReport
 from stopgo.mission.run.lease import Lease, renewed
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.orders import FREE_VERBS, Order
 
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05
@@ -92,10 +93,14 @@ def _boot_in(answer: bytes) -> Booted | None:
 
 
 def keep_lease(journal: Journal, commander: str, *, now_ns: int) -> None:
-    """Renew the lease if it is the commander's. A full disk is ignored here: commands report it."""
-    if renewed(journal.fact("lease", Lease), commander, now_ns=now_ns) is None:
-        return
-    with suppress(sqlite3.OperationalError), journal.transaction():
+    """Renew the lease if it is the commander's. A disk that fails is ignored here: commands report it."""
+    with suppress(sqlite3.DatabaseError):
+        if renewed(journal.fact("lease", Lease), commander, now_ns=now_ns) is not None:
+            _renew(journal, commander, now_ns=now_ns)
+
+
+def _renew(journal: Journal, commander: str, *, now_ns: int) -> None:
+    with journal.transaction():
         lease = renewed(journal.fact("lease", Lease), commander, now_ns=now_ns)  # or another station's by now
         if lease is not None:
             journal.store_fact("lease", lease)
@@ -128,6 +133,7 @@ class Agent:
         self._keys = keys
         self._link = link
         self._journal = journal
+        self._reported = ReportedJournal(journal)
         self._runner = runner
         self._inbox = inbox
         self._recorder = recorder
@@ -156,7 +162,9 @@ class Agent:
         if self._recorder is not None:
             link.serve(keys.record, self._record)
         link.serve(keys.mission("*", "**" if self._inbox else "part/*"), self._mission)
-        link.serve(keys.command("*"), self._command)
+        for verb in FREE_VERBS:  # each on a key of its own: a stop waits behind no other command
+            link.serve(keys.command(verb), self._command)
+        link.serve(keys.command("*"), self._other_command)
         link.watch_presence(keys.watcher("*"), self._contact.on_presence)
 
     def open(self) -> None:
@@ -191,6 +199,7 @@ class Agent:
         try:
             work()
         except Exception as error:  # noqa: BLE001 (the end of a thread)
+            self._runner.stand_still(error)
             self._error = error
             self._failed.set()
             self._on_failure(error)
@@ -266,7 +275,7 @@ class Agent:
             boot_id=self._runner.boot_id,
             clock_ns=self._command_clock.now_ns(),
             state=self._state(),
-            lease=self._journal.fact("lease", Lease),
+            lease=self._reported.lease,
             chunk_bytes=CHUNK_BYTES,
             document_bytes=MAX_DOCUMENT_BYTES,
             profiles=None if self._inbox is None else self._inbox.profiles,
@@ -274,6 +283,12 @@ class Agent:
             capabilities=() if self._recorder is None else (RECORD,),
         )
         return encode(info)
+
+    def _other_command(self, request: Request) -> bytes:
+        """Answer all commands but those that have keys of their own."""
+        if request.key in map(self._keys.command, FREE_VERBS):
+            raise Unanswered
+        return self._command(request)
 
     def _command(self, request: Request) -> bytes:
         self._contact.on_request(request)
@@ -286,7 +301,10 @@ class Agent:
 
     def _log(self, request: Request) -> bytes:
         self._contact.on_request(request)
-        return encode(events_page(self._journal, request))
+        try:
+            return encode(events_page(self._journal, request))
+        except sqlite3.DatabaseError as error:
+            return encode(Malformed(message=f"the journal cannot be read: {error}"))
 
     def _past_poses(self, request: Request) -> bytes:
         self._contact.on_request(request)
@@ -299,13 +317,13 @@ class Agent:
 
     def _publish_news(self) -> None:
         """Publish the state on every change and every second, and each event once, in order."""
-        published = self._journal.newest
+        published = self._reported.newest
         while not self._closing.is_set():
             self._news.wait(STATE_EVERY_S)
             self._news.clear()
             self._runner.on_link_silence(self._contact.silent_s())
             self._look_for_twin()
-            for event in self._journal.events(since=published):
+            for event in self._reported.events(since=published):
                 self._publish_event(encode(event))
                 published = event.number
             state = self._state()
@@ -318,7 +336,7 @@ class Agent:
             self._state_seq += 1
             return state_report(
                 self._runner, robot=self._keys.robot, seq=self._state_seq, ns=self._clock.now_ns(),
-                newest=self._journal.newest,
+                newest=self._reported.newest,
             )  # fmt: skip
 
     def _look_for_twin(self) -> None:

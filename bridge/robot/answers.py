@@ -27,11 +27,11 @@ def answered(journal: Journal, order: Order, run: Run) -> Answer | None:
     return answer_to(order, reused, run)
 
 
-def answer_to(order: Order, refused: Refused | None, run: Run) -> Answer:
-    """Return the answer to a command, with the state of the run after it."""
+def answer_to(order: Order, refused: Refused | None, run: Run, note: str = "") -> Answer:
+    """Return the answer to a command, with the state of the run after it; `note` is told if it was done."""
     return Answer(
         cmd_id=order.cmd_id, verb=order.verb, outcome="refused" if refused else "ok",
-        reason=refused.reason if refused else None, message=refused.message if refused else "",
+        reason=refused.reason if refused else None, message=refused.message if refused else note,
         run_id=run.run_id, state=run.state,
     )  # fmt: skip
 
@@ -43,10 +43,15 @@ def remember_answer(journal: Journal, order: Order, answer: Answer, *, keep: int
         journal.forget_answers(keep=keep)
 
 
-def situation_of(journal: Journal, mission: Mission | None, **observed: Any) -> Situation:
-    """Return all that a decision depends on: what was `observed`, and what the journal has."""
-    has_run = mission is not None and journal.has_run(mission.id, mission.revision)
-    lease, new_run_id = journal.fact("lease", Lease), uuid.uuid4().hex[:12]
+def situation_of(journal: Journal | None, mission: Mission | None, **observed: Any) -> Situation:
+    """Return all that a decision depends on: what was `observed`, and what the journal has.
+
+    Without a journal it is enough for a pause or an abort.
+    """
+    has_run, lease, new_run_id = False, None, uuid.uuid4().hex[:12]
+    if journal is not None:
+        has_run = mission is not None and journal.has_run(mission.id, mission.revision)
+        lease = journal.fact("lease", Lease)
     return Situation(mission=mission, has_run=has_run, lease=lease, new_run_id=new_run_id, **observed)
 
 

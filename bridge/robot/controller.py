@@ -6,6 +6,7 @@ work_control        `WorkControl`: stops the base, interrupts and wakes the work
 current_mission     `CurrentMission`: the mission of the current run.
 run_store           `RunStore`: the current run; writes each change to the journal before it counts;
                     restores the run after a restart; keeps in memory what a full disk does not take.
+storage_watchdog    `StorageWatchdog`: stops the base where the journal does not answer while it drives.
 run_driver          `RunDriver`: drives the legs, settles, scans and verifies, one piece of work at a time.
 command_execution   `CommandExecutor`: decides commands, stores and answers them.
 mission_acceptance  `MissionAcceptance`: accepts or rejects missions that stations push.
@@ -13,18 +14,20 @@ mission_acceptance  `MissionAcceptance`: accepts or rejects missions that statio
 Threads
     The controller's own thread (`serve`) drives and scans. Only it calls `goto` and `scan`.
     The link's threads call `execute`, `take`, `hold` and `on_link_silence`. They change the run and interrupt
-    work that no longer belongs to it. They never drive; they stop the base if the journal cannot be written.
+    work that no longer belongs to it. They never drive; they stop the base before they store a stop.
+    The watchdog's thread (`StorageWatchdog.watch`) takes no lock; it stops the base while one is held long.
     Any thread may call `snapshot`, `position`, `battery`, `run`, `lease` and `close`.
 
 Locks
-    `RunStore.lock` guards the current run, its mission, the pending writes and `RunDriver.silent_s`. It is
+    `RunStore.lock` guards the current run, its mission and the pending writes. It is
     held for a decision and its write, never while the robot drives, settles or scans. Slow checks of a long
     mission run without it. They are repeated if the run has changed meanwhile.
     The journal has a lock of its own, taken after `RunStore.lock` and never before it.
-    `WorkControl` has no lock, only events. So a stop needs to wait for nothing.
+    `WorkControl` has no lock, only events. So a stop needs to wait for nothing (`WorkControl.standing`).
 
 Invariants
-    1. The journal has a change on disk before the robot acts on it and before it reports it to anybody.
+    1. The journal has a change on disk before the robot acts on it and before it reports it to anybody. Only
+       a stop is different: the base is commanded to stand first, and stays until the journal has the stop.
     2. A decision, its lease, its events and its answer are one transaction. So are a mission, its lease and
        the run's change to it.
     3. The result of work is stored only if the work still belongs to the current run (`same_work`).
@@ -49,6 +52,7 @@ from stopgo.bridge.robot.mission_acceptance import MissionAcceptance
 from stopgo.bridge.robot.run_driver import RunDriver
 from stopgo.bridge.robot.run_store import RunStore
 from stopgo.bridge.robot.runner import Position
+from stopgo.bridge.robot.storage_watchdog import StorageWatchdog
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission
 from stopgo.mission.run import states as runs
@@ -78,11 +82,11 @@ class Controller:
         mission_taken: Callable[[Mission], None] = lambda mission: None,
         revisions: RevisionPolicy = "next-stop",
         boot_id: str | None = None,
+        say: Callable[[str], None] = lambda line: None,
     ) -> None:
         command_clock = command_clock or clock
         self.changed: Callable[[], None] = lambda: None
         """Called after every stored change."""
-        self.works: tuple[Callable[[], None], ...] = (self.serve,)
         self._base = base
         self._clock = clock
         self._control = control = WorkControl(base)
@@ -90,8 +94,12 @@ class Controller:
             robot=robot, boot_id=boot_id or new_boot_id(), journal=journal, clock=clock, control=control,
             current=CurrentMission(journal, mission_taken), changed=self._report_change,
         )  # fmt: skip
+        self._watchdog = StorageWatchdog(control, journal.rows.waits, say)
+        self.works: tuple[Callable[[], None], ...] = (self.serve, self._watchdog.watch)
         self._driver = RunDriver(store, control=control, base=base, scanner=scanner, clock=clock)
-        self._commands = CommandExecutor(store, base=base, clock=clock, command_clock=command_clock)
+        self._commands = CommandExecutor(
+            store, control=control, base=base, clock=clock, command_clock=command_clock
+        )
         self._missions = MissionAcceptance(store, base=base, command_clock=command_clock, revisions=revisions)
         control.stop_base()
         store.restore(scanner, command_ns=command_clock.now_ns())
@@ -116,11 +124,17 @@ class Controller:
 
     def execute(self, order: Order) -> Answer:
         """Carry out a command once, however often it comes, and store the answer."""
-        return self._commands.execute(order)
+        with self._control.standing_on_error():
+            return self._commands.execute(order)
 
     def take(self, commit: Commit, mission: Mission) -> Rejected | None:
         """Store a whole mission and make it the one to be run, or to be followed from the next stop on."""
-        return self._missions.take(commit, mission)
+        with self._control.standing_on_error():
+            try:
+                return self._missions.take(commit, mission)
+            except sqlite3.DatabaseError as error:
+                refused = self._store.hold_unstored(error)
+                return Rejected(reason=refused.reason, messages=(refused.message,))
 
     def waits(self, mission: Mission) -> bool:
         """True if the robot will follow the mission from the next stop on."""
@@ -128,21 +142,38 @@ class Controller:
 
     def hold(self, reason: str) -> None:
         """Hold the run, if the robot drives or scans, until a command comes."""
-        with self._store.lock:
-            if self._store.run.state in ("RUNNING", "HOMING"):
-                self._store.apply(runs.held(self._store.run, reason), interrupts=True)
+        if self._store.run.state in ("RUNNING", "HOMING"):
+            self._stop_and_store(lambda: self._hold(reason))
+
+    def _hold(self, reason: str) -> None:
+        if self._store.run.state in ("RUNNING", "HOMING"):
+            self._store.apply(runs.held(self._store.run, reason), interrupts=True)
 
     def on_link_silence(self, silent_s: float) -> None:
         """Do what the mission's policy wants after `silent_s` seconds without data from any station."""
-        with self._store.lock:
+        with self._control.standing_on_error():
             self._driver.silent_s = silent_s
+            if self._driver.stops_for_link(*self._store.glance()):
+                self._stop_and_store(lambda: self._lose_link(silent_s))
             self._store.store_pending()
-            run, mission = self._store.snapshot()
-            if mission is None or not self._driver.link_is_lost(mission) or run.state != "RUNNING":
-                return
-            at_once = mission.policy.link_loss in ("hold", "home")
-            if at_once and run.stop_state in ("WAITING", "NAVIGATING", "SETTLING"):
-                self._store.apply(runs.link_lost(run, mission, silent_s), interrupts=True)
+
+    def _lose_link(self, silent_s: float) -> None:
+        run, mission = self._store.snapshot()
+        if mission is not None and self._driver.stops_for_link(run, mission):
+            self._store.apply(runs.link_lost(run, mission, silent_s), interrupts=True)
+
+    def _stop_and_store(self, change: Callable[[], None]) -> None:
+        """Command the base to stand, then change the run; HELD if the journal does not take the change."""
+        with self._control.standing():
+            try:
+                with self._store.lock:
+                    change()
+            except sqlite3.DatabaseError as error:
+                self._store.hold_unstored(error)
+
+    def stand_still(self, error: BaseException) -> None:
+        """Command the base to stand until the program ends, before anything is written."""
+        self._control.stand_for_good(error)
 
     # The work, in the controller's own thread
 
@@ -152,6 +183,8 @@ class Controller:
         try:
             while not control.closing:
                 control.wake.clear()
+                if control.failure is not None:
+                    raise control.failure
                 if not self._step_if_storable():
                     control.wake.wait()
         finally:
@@ -165,14 +198,13 @@ class Controller:
         """Do the next piece of work; false if there is none, or if its result could not be stored."""
         try:
             return self.step()
-        except sqlite3.OperationalError as error:
+        except sqlite3.DatabaseError as error:
             self._store.hold_unstored(error)
             return False
 
     def close(self) -> None:
         """End the work where the robot is; the next boot continues with the run as it is stored."""
-        with self._store.lock:
-            self._control.close()
+        self._control.close()
 
     # Reports, to any thread
 

@@ -52,7 +52,7 @@ class Inbox:
             return self._step(mission_id, step, request)
         except (msgspec.DecodeError, ValueError) as error:
             return Malformed(message=f"{'/'.join(step)}: {error}")
-        except sqlite3.OperationalError as error:
+        except sqlite3.DatabaseError as error:
             return _no("storage", f"the journal cannot be written: {error}")
 
     def _step(self, mission_id: str, step: list[str], request: Request) -> Reply:
@@ -139,7 +139,7 @@ class Inbox:
         if isinstance(mission, Rejected):
             return mission
         refusal = self._controller.take(commit, mission)
-        with suppress(sqlite3.OperationalError):  # a full disk cannot delete: the next commit will
+        with suppress(sqlite3.DatabaseError):  # a full disk cannot delete: the next commit will
             self._journal.missions.drop_unused_chunks()
         return refusal or Accepted(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest,

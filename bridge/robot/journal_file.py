@@ -18,6 +18,7 @@ import msgspec
 
 from stopgo.bridge.robot.hashed_rows import DamagedRow, NewestTransaction
 from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.journal_format import NewerJournal
 from stopgo.bridge.robot.journal_rows import JournalRows
 from stopgo.bridge.robot.reserve import Reserve
 from stopgo.mission.errors import InputError
@@ -105,6 +106,8 @@ def _verified(
         rows.verify()
         journal = Journal(rows)
         _claim(journal, path.parent, robot)
+    except NewerJournal as newer:
+        raise InputError(f"{path}: {newer}") from None
     except (DamagedRow, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: journal corrupted ({_one_line(error)}); move the folder away to begin again,"

@@ -7,10 +7,15 @@ import sqlite3
 import msgspec
 
 from stopgo.bridge.link.protocol import CHUNK_BYTES
-from stopgo.bridge.robot.hashed_rows import HASHED_TABLES, DamagedRow, read_rows, row_hash, write_row
+from stopgo.bridge.robot.hashed_rows import HASHED_TABLES, read_rows, row_hash, write_row
 
 FORMAT = 3
 """Format of the journal: 1 had no hashes, 2 had each mission in one row; a newer one is refused."""
+
+
+class NewerJournal(sqlite3.DatabaseError):
+    """A journal that a newer stopgo wrote; nothing of it is damaged."""
+
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL);
@@ -45,12 +50,14 @@ def bring_up_to_date(connection: sqlite3.Connection) -> None:
 
     Raises
     ------
+    NewerJournal
+        If the journal is a newer program's.
     DamagedRow
-        If the journal is a newer program's, or damaged.
+        If it is damaged.
     """
     (found,) = connection.execute("PRAGMA user_version").fetchone()
     if found > FORMAT:
-        raise DamagedRow(
+        raise NewerJournal(
             f"a newer stopgo wrote it (format {found}; this one reads up to {FORMAT}); update stopgo"
         )
     for table in HASHED_TABLES:

@@ -7,13 +7,14 @@ transaction is on disk.
 
 from __future__ import annotations
 
+import contextlib
 import sqlite3
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from stopgo.bridge.robot.hashed_rows import DamagedRow, NewestTransaction, read_rows, verify_rows, write_row
 from stopgo.bridge.robot.journal_format import bring_up_to_date, make_tables
+from stopgo.bridge.robot.lock_waits import LockWaits, WatchedLock
 from stopgo.bridge.robot.reserve import Reserve
 
 
@@ -29,7 +30,12 @@ class JournalRows:
         self.connection = connection
         self._newest = newest
         self._reserve = reserve
-        self._lock = threading.RLock()
+        self.waits = LockWaits()
+        """Sections of the journal's lock; a controller adds those of its own."""
+        self._lock = WatchedLock(self.waits)
+        self._writing = False
+        self._behind: int | None = None
+        """Number that the second file could not take; the next transaction tries again first."""
         self.commit_hook: Callable[[str], None] = lambda moment: None
         """Called just before ("commit") and after ("committed") every commit, for tests of crashes."""
         make_tables(connection)
@@ -40,7 +46,9 @@ class JournalRows:
         Raises
         ------
         DamagedRow
-            If any row is not what was written, or a newer stopgo wrote it.
+            If any row is not what was written.
+        NewerJournal
+            If a newer stopgo wrote it.
         """
         stored = 0 if self._newest is None else self._newest.read()
         with self.transaction():
@@ -51,27 +59,57 @@ class JournalRows:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Write all rows of the block, or none; they are on disk at its end. A nested one joins the outer."""
+        """Write all rows of the block, or none; they are on disk at its end. A nested one joins the outer.
+
+        Raises
+        ------
+        sqlite3.DatabaseError
+            If nothing of it is stored: the disk is full, or has failed.
+        """
         with self._lock:
-            if self.connection.in_transaction:
+            if self._writing:
                 yield
                 return
-            if self._reserve is not None:
-                self._reserve.release_if_needed()
-            self.connection.execute("BEGIN IMMEDIATE")
+            self._writing = True
             try:
+                with storage_errors():
+                    self._begin()
                 yield
                 number = self._changes() + 1
                 write_row(self.connection, "facts", "changes", number)
-                self.commit_hook("commit")
-                self.connection.execute("COMMIT")
+                with storage_errors():
+                    self.commit_hook("commit")
+                    self.connection.execute("COMMIT")
             except BaseException:
-                if self.connection.in_transaction:
-                    self.connection.execute("ROLLBACK")
+                with contextlib.suppress(sqlite3.DatabaseError):  # then the next transaction begins with it
+                    self._roll_back()
                 raise
+            finally:
+                self._writing = False
             self.commit_hook("committed")
-            if self._newest is not None:
-                self._newest.store(number)
+            self._number(number)
+
+    def _begin(self) -> None:
+        if self._newest is not None and self._behind is not None:
+            self._newest.store(self._behind)
+            self._behind = None
+        if self._reserve is not None:
+            self._reserve.release_if_needed()
+        self._roll_back()
+        self.connection.execute("BEGIN IMMEDIATE")
+
+    def _roll_back(self) -> None:
+        if self.connection.in_transaction:
+            self.connection.execute("ROLLBACK")
+
+    def _number(self, number: int) -> None:
+        """Store the number of a transaction that is on disk; what fails here has undone nothing of it."""
+        if self._newest is None:
+            return
+        try:
+            self._newest.store(number)
+        except OSError:
+            self._behind = number
 
     def _changes(self) -> int:
         """Return the number of the newest transaction."""
@@ -80,7 +118,8 @@ class JournalRows:
 
     def space_shortage(self, size: int) -> str:
         """Return why `size` more bytes would need the reserved disk space; empty if they would not."""
-        return "" if self._reserve is None else self._reserve.shortage(size)
+        with storage_errors():
+            return "" if self._reserve is None else self._reserve.shortage(size)
 
     def select(self, statement: str, *values: object) -> list[tuple]:
         """Return the columns that a statement selects; their rows' hashes are not checked."""
@@ -106,3 +145,12 @@ class JournalRows:
     def delete(self, table: str, condition: str, *values: object) -> None:
         with self.transaction():
             self.connection.execute(f"DELETE FROM {table} WHERE {condition}", values)
+
+
+@contextmanager
+def storage_errors() -> Iterator[None]:
+    """Raise a failure of the disk outside SQLite as SQLite does, so that callers know one kind of error."""
+    try:
+        yield
+    except OSError as error:
+        raise sqlite3.OperationalError(error.strerror or str(error)) from error

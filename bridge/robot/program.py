@@ -138,7 +138,7 @@ def robot_on(
             controller = Controller(
                 robot=options.name, journal=journal, base=body.base, scanner=body.scanner, clock=clock,
                 command_clock=wall, mission_taken=body.take, revisions=options.revisions,
-                boot_id=boot_id,
+                boot_id=boot_id, say=RefusalLog(options.say, key_files.now_utc).tell,
             )  # fmt: skip
             agent = Agent(
                 keys=keys, link=link, journal=journal, runner=controller, clock=clock, command_clock=wall,

@@ -37,15 +37,14 @@ class RunDriver:
         self._scanner = scanner
         self._clock = clock
         self.silent_s = 0.0
-        """Seconds without data from any station; written by the link's thread under the run's lock."""
+        """Seconds without data from any station; written by the link's thread."""
 
     def step(self) -> bool:
         """Do the next piece of work; false if there is none."""
         with self._store.lock:
             run, mission = self._store.snapshot()
-            if self._control.closing or mission is None or not has_work(run):
+            if mission is None or not has_work(run) or not self._control.clear_for_work():
                 return False
-            self._control.interrupt.clear()
         if run.state == "HOMING":
             self._drive_home(run, mission)
         else:
@@ -56,6 +55,13 @@ class RunDriver:
         """True if the link is lost by the mission's policy, and the policy wants something of the robot."""
         policy = mission.policy
         return policy.link_loss != "continue" and self.silent_s >= policy.link_loss_after_s
+
+    def stops_for_link(self, run: Run, mission: Mission | None) -> bool:
+        """True if the link is lost, and the policy stops at once what the robot is doing."""
+        if mission is None or run.state != "RUNNING" or not self.link_is_lost(mission):
+            return False
+        at_once = mission.policy.link_loss in ("hold", "home")
+        return at_once and run.stop_state in ("WAITING", "NAVIGATING", "SETTLING")
 
     def _leave(self, run: Run, mission: Mission) -> None:
         """Set out for the stop, unless the link or the battery forbids it."""
@@ -97,8 +103,12 @@ class RunDriver:
             self._store.advance(run, lambda now: runs.home_leg_driven(now, mission))
 
     def _goto(self, path: tuple[Point, ...], mission: Mission, heading: float | None) -> str:
-        interrupt = self._control.interrupt
-        return self._base.goto(path, heading=heading, limits=mission.robot, interrupt=interrupt)
+        control = self._control
+        control.driving = True
+        try:
+            return self._base.goto(path, heading=heading, limits=mission.robot, interrupt=control.interrupt)
+        finally:
+            control.driving = False
 
     def _hold_blocked(self, run: Run, path_name: str, here: Pose) -> None:
         """Hold the run, for the base could not drive on."""
@@ -135,7 +145,7 @@ class RunDriver:
 
     def _scan(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
-        result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._control.interrupt)
+        result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._control.scan_interrupt)
         self._store.advance(run, lambda now: runs.scan_ended(now, mission, result))
 
     def _verify(self, run: Run, mission: Mission) -> None:

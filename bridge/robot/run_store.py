@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import sqlite3
-import threading
 from collections.abc import Callable, Iterator
 
 import msgspec
@@ -19,6 +18,7 @@ from stopgo.bridge.robot.base import Scanner
 from stopgo.bridge.robot.current_mission import CurrentMission
 from stopgo.bridge.robot.current_task import label, same_work
 from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.lock_waits import WatchedLock
 from stopgo.bridge.robot.pending_writes import PendingWrites
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission
@@ -46,7 +46,7 @@ class RunStore:
         changed: Callable[[], None],
     ) -> None:
         """`changed` is called after every change of the run."""
-        self.lock = threading.RLock()
+        self.lock = WatchedLock(journal.rows.waits)
         self.robot = robot
         self.boot_id = boot_id
         self.journal = journal
@@ -70,6 +70,10 @@ class RunStore:
         """Return the run and its mission at one moment."""
         with self.lock:
             return self._run, self.current.mission
+
+    def glance(self) -> tuple[Run, Mission | None]:
+        """Return run and mission without the lock: good enough to stop the base, not to store anything."""
+        return self._run, self.current.mission
 
     # Reading back after a restart
 
@@ -149,12 +153,15 @@ class RunStore:
 
     # When the disk takes nothing
 
-    def hold_unstored(self, error: sqlite3.OperationalError) -> Refused:
-        """Stop, for the robot must not do what it cannot store; HELD until the journal takes writes again."""
+    def hold_unstored(self, error: sqlite3.DatabaseError) -> Refused:
+        """Stop, for the robot must not do what it cannot store; HELD until somebody decides.
+
+        A robot that is held for this already stays as it is, so that pending writes do not grow.
+        """
         reason = f"the journal cannot be written: {error}"
-        with self.lock:
-            self._control.stop_base()
-            if not self._run.over:
+        with self._control.standing(), self.lock:
+            held_before = self._run.state == "HELD" and self._run.reason == reason
+            if not (self._run.over or held_before):
                 held = runs.held(self._run, reason)
                 self.pending.add(self._events_of(held))
                 self._set_current(held.run, interrupts=True)
@@ -168,7 +175,7 @@ class RunStore:
     def store_pending(self) -> None:
         """Store the pending writes if the disk has space again; until then the run stays as it is."""
         if self.pending:
-            with contextlib.suppress(sqlite3.OperationalError):
+            with contextlib.suppress(sqlite3.DatabaseError), self.lock:
                 self.apply(Change(self._run))
 
     def _events_of(self, change: Change) -> Iterator[AnyEvent]:

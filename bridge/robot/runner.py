@@ -47,6 +47,9 @@ class Runner(Protocol):
     def on_link_silence(self, silent_s: float) -> None:
         """React to `silent_s` seconds without data from any station."""
 
+    def stand_still(self, error: BaseException) -> None:
+        """Command the base to stand until the program ends, because of `error`; nothing is stored before."""
+
     def close(self) -> None:
         """End all works."""
 

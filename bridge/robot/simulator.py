@@ -123,8 +123,9 @@ class SimulatedBase:
         self._wear = wear
         self._chance = random.Random(seed)
         self._world = read_world(keep)
-        self._began_ns = clock.now_ns()
-        self._motion = Motion(self._world.pose)
+        self._deceleration = 1.0
+        self._driven = (Motion(self._world.pose), clock.now_ns())
+        """The present motion and its start: one value, for a stop comes from another thread."""
 
     def pose(self) -> Pose:
         return self._now()[0]
@@ -149,6 +150,7 @@ class SimulatedBase:
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:
         self._drives += 1
+        self._deceleration = limits.acceleration
         path, heading = self._with_errors(path, heading)
         motion = along(
             self.pose(), path, heading,
@@ -156,18 +158,17 @@ class SimulatedBase:
         )  # fmt: skip
         if self._faults.due("blocked", self._drives):
             self._follow(motion, interrupt, fraction=0.5)
-            self._brake(limits.acceleration)
+            self._brake()
             return "blocked"
         if not self._follow(motion, interrupt):
-            self._brake(limits.acceleration)
+            self._brake()
             return "interrupted"
         self._stand(motion.at(motion.duration)[0])
         self._apply_faults()
         return "arrived"
 
     def stop(self) -> None:
-        if self._world.placed:  # a stop does not set the pose
-            self._stand(self.pose())
+        self._driven = self._braking(), self._clock.now_ns()
 
     def unfit(self, mission: Mission) -> str:
         return ""
@@ -212,17 +213,21 @@ class SimulatedBase:
 
     def _follow(self, motion: Motion, interrupt: Event, *, fraction: float = 1.0) -> bool:
         """Carry out the motion, or its first fraction; false if it was interrupted."""
-        self._motion, self._began_ns = motion, self._clock.now_ns()
-        end_ns = self._began_ns + round(motion.duration * fraction * 1e9)
+        began_ns = self._clock.now_ns()
+        self._driven = motion, began_ns
+        end_ns = began_ns + round(motion.duration * fraction * 1e9)
         while (left := (end_ns - self._clock.now_ns()) / 1e9) > 0:
             if self._clock.wait(min(left, SLICE_S), interrupt):
                 return False
             self._remember(self._now()[0], self._wear.battery_per_s * SLICE_S)
         return True
 
-    def _brake(self, deceleration: float) -> None:
+    def _braking(self) -> Motion:
         pose, speed = self._now()
-        braking = Motion(pose, (Brake(pose, speed, deceleration),))
+        return Motion(pose, (Brake(pose, speed, self._deceleration),))
+
+    def _brake(self) -> None:
+        braking = self._braking()
         self._follow(braking, Event())
         self._stand(braking.at(braking.duration)[0])
 
@@ -235,12 +240,12 @@ class SimulatedBase:
             self._shakes_until_ns = self._clock.now_ns() + round(shaking.amount * 1e9)
 
     def _stand(self, pose: Pose) -> None:
-        self._motion, self._began_ns = Motion(pose), self._clock.now_ns()
+        self._driven = Motion(pose), self._clock.now_ns()
         self._remember(pose, 0.0)
 
     def _now(self) -> tuple[Pose, float]:
-        motion, now_ns = self._motion, self._clock.now_ns()
-        pose, speed = motion.at((now_ns - self._began_ns) / 1e9)
+        (motion, began_ns), now_ns = self._driven, self._clock.now_ns()
+        pose, speed = motion.at((now_ns - began_ns) / 1e9)
         if now_ns < self._shakes_until_ns:
             pose = msgspec.structs.replace(pose, x=pose.x + SHAKE_M * math.sin(now_ns / 1e8))
         return pose, speed
@@ -334,5 +339,8 @@ def read_world(keep: Path | None) -> World:
 def write_world(keep: Path, world: World) -> None:
     """Replace the file in one step, so that a crash leaves the old or the new."""
     new = keep.with_suffix(".new")
-    new.write_bytes(msgspec.json.encode(world))
+    with new.open("wb") as file:
+        file.write(msgspec.json.encode(world))
+        file.flush()
+        os.fsync(file.fileno())
     os.replace(new, keep)

@@ -58,20 +58,28 @@ class Decision:
 
     change: Change
     lease: Lease | None
+    note: str = ""
+    """Difference between what a stop named and what it stopped; empty if there is none."""
 
 
 def decide(order: Order, situation: Situation) -> Decision | Refused:
-    """Return the change that a command leads to; late, foreign and impossible commands are refused."""
+    """Return the change that a command leads to; late, foreign and impossible commands are refused.
+
+    A pause or an abort is refused by the table of states alone, whatever run, mission or state it names.
+    """
     late = _too_late(order, situation)
     if late:
         return late
     lease = situation.lease if order.verb in FREE_VERBS else _claim(order, situation)
     if isinstance(lease, Refused):
         return lease
-    change = _misdirected(order, situation) or _verb(order, situation)
+    misdirected = _misdirected(order, situation)
+    if misdirected and order.verb not in FREE_VERBS:
+        return misdirected
+    change, note = _verb(order, situation), misdirected.message if misdirected else ""
     if isinstance(change, Refused):
-        return change
-    return Decision(Change(change.run, (*handed_over(situation.lease, lease), *change.events)), lease)
+        return Refused(change.reason, f"{change.message}; {note}") if note else change
+    return Decision(Change(change.run, (*handed_over(situation.lease, lease), *change.events)), lease, note)
 
 
 def _claim(order: Order, situation: Situation) -> Lease | Refused:

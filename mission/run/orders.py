@@ -46,7 +46,11 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field=
     """Fencing token that the commander knew."""
     take_over: bool = False
     expect_state: tuple[State, ...] | None = None
-    """Refused in any other state, so that a late command does no harm."""
+    """Refused in any other state, so that a late command does no harm.
+
+    `pause` and `abort` are carried out all the same; the answer reports the difference. So are they if
+    `run_id`, `mission_id` or `revision` differ.
+    """
     run_id: ShortText | None = None
     mission_id: ShortText | None = None
     revision: Count | None = None

@@ -95,6 +95,9 @@ class AutoRunner:
     def on_link_silence(self, silent_s: float) -> None:
         """Do nothing: the vehicle goes on without a station, by its own failsafes."""
 
+    def stand_still(self, error: BaseException) -> None:
+        """Do nothing: the vehicle drives by itself, and a station that ends does not stop it."""
+
     def close(self) -> None:
         self._follower.close()
 

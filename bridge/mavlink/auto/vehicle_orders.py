@@ -97,7 +97,7 @@ class VehicleOrders:
                 change = VERBS[order.verb](self, order, listed, decision)
             except Denied as denied:
                 return self._stored(order, denied.refused, None)
-            return self._stored(order, change, decision.lease)
+            return self._stored(order, change, decision.lease, decision.note)
 
     def _refused(self, order: Order, refused: Refused) -> Answer:
         """Answer a refused command; a pause still stops a vehicle that drives, whoever started it."""
@@ -280,7 +280,7 @@ class VehicleOrders:
         ordered = Ordered(verb=order.verb, by=order.commander, mode=mode, until_ns=0)
         return _Ordering(self._book, self._commands, ordered)
 
-    def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None) -> Answer:
+    def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None, note: str = "") -> Answer:
         """Store the answer together with the changes by the command."""
         refused = outcome if isinstance(outcome, Refused) else None
         journal = self._book.journal
@@ -290,7 +290,7 @@ class VehicleOrders:
                 journal.forget_fact("pending")
             if lease is not None:
                 journal.store_fact("lease", lease)
-            answer = answer_to(order, refused, self._book.run)
+            answer = answer_to(order, refused, self._book.run, note)
             remember_answer(journal, order, answer)
         return answer
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
+from io import StringIO
 from pathlib import Path
 
 import pytest
+import typer
 
+from stopgo.bridge.commands.conform_commands import ask_for_restart, report
 from stopgo.bridge.commands.spawn import robot_process
+from stopgo.bridge.conform.requirements import ConformVerdict, NotTried, TriedOutcome
 from stopgo.command_line import main
 from stopgo.mission.files.mission_json import write
 from tests.bridge.guarded import keys_of_site
@@ -23,14 +28,18 @@ def test_a_robot_with_keys_meets_what_can_be_tried_at_rest(tmp_path: Path) -> No
         reach = ("--robot", "r1", "--connect", endpoint, "--keys", str(site / "alice"))
         done = stopgo("conform", "robot", *reach, "--other-keys", str(site / "bob"), "--json")
         told = json.loads(done.stdout)
-        assert done.returncode == 0, [one for one in told["requirements"] if one["outcome"] == "failed"]
+        assert done.returncode == 3, [one for one in told["requirements"] if one["outcome"] == "failed"]
         assert told["counts"]["failed"] == 0
-        assert done.stderr == "r1: will not drive, requirements that need it are not tested; add --drive\n"
+        assert done.stderr.splitlines() == [
+            "r1: will not drive, requirements that need it are not tested; add --drive",
+            "r1: not a pass, durability was not tested: a boot has an id; mission, lease, events outlive it;"
+            " answers outlive a restart; orders of the boot before do not; add --restart COMMAND",
+        ]
         untried = {one["reason"] for one in told["requirements"] if one["outcome"] == "not tried"}
         assert untried == {
             "the robot would drive: --drive",
             "the robot takes any scan profile (Info.profiles is null)",
-            "needs a command that restarts the robot's program; add --restart COMMAND",
+            "needs a restart of the robot: --restart COMMAND, or a person at a terminal",
         }
 
 
@@ -49,3 +58,27 @@ def test_a_robot_on_a_run_is_not_tried(tmp_path: Path, capsys: pytest.CaptureFix
             " (stopgo abort --robot r1)\n"
         )
         assert main(["pause", *reach]) == 0
+
+
+@pytest.mark.parametrize(("typed", "tested"), [("\n", True), ("n\n", False), ("no\n", False)])
+def test_without_a_command_the_person_is_asked_to_restart(
+    typed: str, tested: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", StringIO(typed))
+    with nullcontext() if tested else pytest.raises(NotTried, match="the robot was not restarted"):
+        ask_for_restart("r1")
+    assert "cut its power or kill its program" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("outcome", "code"), [("passed", 0), ("not tried", 3), ("failed", 1)])
+def test_what_is_needed_and_not_tested_is_no_pass(outcome: TriedOutcome, code: int) -> None:
+    verdicts = [
+        ConformVerdict("Keys", "it answers", "passed"),
+        ConformVerdict("Events", "it remembers", outcome, needed=True),
+    ]
+    ended = 0
+    try:
+        report("r1", "robot", verdicts, as_json=False)
+    except typer.Exit as end:
+        ended = end.exit_code
+    assert ended == code

@@ -98,6 +98,7 @@ def test_a_robot_on_a_run_or_in_others_hands_is_left_alone() -> None:
             check_at_rest(bench.info(), "alice", take_over=True)
 
 
+WHATEVER_IT_NAMES = "a stop counts whatever run, mission or state it names"
 RECORD_WHOLE = "every entry and pose once, and the same again"
 
 
@@ -108,6 +109,16 @@ class ForgetsAnswers(Controller):
     def execute(self, order: Order) -> Answer:
         fresh = f"{order.cmd_id}-{self._clock.now_ns()}"
         return changed(super().execute(changed(order, cmd_id=fresh)), cmd_id=order.cmd_id)
+
+
+class AsksStopsForTheRun(Controller):
+    def execute(self, order: Order) -> Answer:
+        if order.verb in FREE_VERBS and order.run_id not in (None, self.run.run_id):
+            return Answer(
+                cmd_id=order.cmd_id, verb=order.verb, outcome="refused", reason="wrong_run",
+                message="", run_id=None, state=self.run.state,
+            )  # fmt: skip
+        return super().execute(order)
 
 
 class IgnoresFences(Controller):
@@ -288,6 +299,7 @@ class WantsPiecesInOrder(Inbox):
         ("agent", TellsAllStops, "110 stops are told in a small state, without gaps", "a state "),
         ("agent", SaysNothingOfItself, "the state is told at least every second", "0 states came"),
         ("inbox", TakesDamage, "a damaged chunk is found at the commit: `digest`", "Rejected malformed"),
+        ("controller", AsksStopsForTheRun, WHATEVER_IT_NAMES, "pause was refused: wrong_run"),
         ("inbox", TakesOldRevisions, "a revision before the stored one: `older_revision`", "with Ready"),
         ("recorder", LosesPosesOfTheRecord, RECORD_WHOLE, "poses are missing from the record"),
         ("recorder", LosesEntriesOfTheRecord, RECORD_WHOLE, "the entries are numbered [1, 3"),

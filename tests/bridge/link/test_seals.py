@@ -250,3 +250,21 @@ def test_a_commit_that_was_held_back_over_a_reboot_is_never_taken(site: Path) ->
     field.answer_as("r1")
     assert b'"expired"' in field.board.answers(kept[0])[0].payload
     assert field.controller.run.revision == 1
+
+
+@pytest.mark.parametrize("seal", [{"nonce": "a\nb"}, {"nonce": "a", "boot_id": "a\nb"}])
+def test_a_seal_with_a_line_break_is_refused_and_the_refusal_is_signed(
+    site: Path, seal: dict[str, str]
+) -> None:
+    field = ready(site)
+    forged = msgspec.json.encode({"signature": "", **seal})
+    question = SealedMessage("question", field.keys.info, b"", forged)
+    (answer,) = field.board.answers(question)
+    assert b"has several lines" in answer.payload
+    assert answer.seal
+
+
+def test_parameters_with_a_line_break_are_not_answered(site: Path) -> None:
+    field = ready(site)
+    question = SealedMessage("question", field.keys.log, b"", b"{}", {"since": "0\n1"})
+    assert field.board.answers(question) == []

@@ -176,8 +176,12 @@ def test_a_journal_of_a_newer_stopgo_is_refused(tmp_path: Path) -> None:
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
     connection.execute(f"PRAGMA user_version = {FORMAT + 1}")
     connection.close()
-    with pytest.raises(InputError, match="a newer stopgo wrote it"), open_journal(tmp_path, "r1"):
+    with pytest.raises(InputError) as refused, open_journal(tmp_path, "r1"):
         pass
+    assert str(refused.value) == (
+        f"{tmp_path / 'journal.sqlite'}: a newer stopgo wrote it (format {FORMAT + 1}; this one reads up to"
+        f" {FORMAT}); update stopgo"
+    )
 
 
 def test_a_state_that_only_a_newer_stopgo_knows_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -154,9 +154,9 @@ def test_a_late_command_is_refused() -> None:
 def test_a_command_for_another_state_or_run_is_refused() -> None:
     field = loaded()
     field.order("start")
-    assert field.order("pause", expect_state=("PAUSED",)).reason == "wrong_state"
-    assert field.order("pause", run_id="elsewhere").reason == "wrong_run"
-    assert field.order("pause", revision=7).reason == "wrong_mission"
+    assert field.order("skip", expect_state=("PAUSED",)).reason == "wrong_state"
+    assert field.order("skip", run_id="elsewhere").reason == "wrong_run"
+    assert field.order("skip", revision=7).reason == "wrong_mission"
     assert field.controller.run.state == "RUNNING"
 
 
