@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.comparing.run_verdict import Judgement, named
+from stopgo.mission.run.events import Settled
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.replay.replayed import Replay
 
@@ -59,9 +60,17 @@ def _sentences(replay: Replay) -> Iterator[str]:
     if replay.extra:
         yield f"{len(replay.extra)} standstills were not at a stop."
     if replay.inferred:
-        yield "Visits are inferred from standstills; the log does not show whether scans were made."
+        yield f"Visits are inferred from standstills; {_scans_text(replay)}."
     if replay.log.lost:
         yield f"The log is damaged; this is the result of the readable part: {replay.log.lost}."
+
+
+def _scans_text(replay: Replay) -> str:
+    asked = {item.stop for item in replay.comparison.asked}
+    triggered = asked & {event.stop for event in replay.run.events if isinstance(event, Settled)}
+    if not triggered:
+        return "the log does not show whether scans were made"
+    return f"the log shows a trigger of the scanner at {len(triggered)} of {len(asked)} stops"
 
 
 WORDS = {
