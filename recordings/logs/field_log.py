@@ -98,7 +98,7 @@ class Remark:
 
 @dataclass(frozen=True)
 class LoggedMission:
-    """MAVLink mission that was uploaded to the vehicle."""
+    """MAVLink mission that the vehicle holds: uploaded to it, or read back from it."""
 
     ns: int
     items: tuple[Item, ...]
@@ -106,6 +106,8 @@ class LoggedMission:
     autopilot: str
     complete: bool = True
     home: SiteOrigin | None = None
+    read_back: bool = False
+    """True if the vehicle sent the list, on request, and did not receive it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -214,6 +214,8 @@ class _Vehicle:
 CHECKED = 5
 UNKNOWN_BEARING = 65_535
 MISSION_TYPE = 0
+WITHOUT_ORIGIN = 3
+"""Rank of metres from an unknown origin, where there are latitudes and longitudes."""
 
 
 @dataclass
@@ -233,6 +235,8 @@ class _VehicleSorter:
     _items: dict[int, Item] = field(default_factory=dict)
     _announced: tuple[int, int] | None = None
     """Time at which an upload was announced, and its number of items."""
+    _read_back: bool = False
+    """True if the vehicle announced it: a station reads the list back."""
 
     def take(self, packet: Packet) -> None:
         self.counts[packet.system, packet.number] += 1
@@ -318,6 +322,7 @@ class _VehicleSorter:
     def _mission_count(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         if getattr(message, "mission_type", MISSION_TYPE) == MISSION_TYPE:
             self._items, self._announced = {}, (packet.ns, message.count)
+            self._read_back = packet.system < STATIONS
 
     def _mission_item_int(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         if getattr(message, "mission_type", MISSION_TYPE) == MISSION_TYPE:
@@ -350,12 +355,19 @@ class _VehicleSorter:
         items = [
             item for sequence, item in sorted(self._items.items()) if not (kind.home_first and sequence == 0)
         ]
-        if not any(upload.items == tuple(items) and upload.ns == ns for upload in self.uploads):
-            home = self._items.get(0) if kind.home_first else None
-            self.uploads.append(
-                LoggedMission(ns, tuple(items), kind.name, complete=complete, home=_site(home))
-            )
+        home = self._items.get(0) if kind.home_first else None
+        upload = LoggedMission(ns, tuple(items), kind.name, complete, _site(home), self._read_back)
+        if not self._known(upload):
+            self.uploads.append(upload)
         self._items, self._announced = {}, None
+
+    def _known(self, upload: LoggedMission) -> bool:
+        """True for a list that was announced twice, and for a read-back of what the vehicle holds already."""
+        twice = any(known.ns == upload.ns and known.items == upload.items for known in self.uploads)
+        if not (upload.read_back and self.uploads):
+            return twice
+        interrupted = not upload.complete
+        return twice or interrupted or self.uploads[-1].items == upload.items
 
     def channels(self) -> tuple[Channel, ...]:
         """Return channels by name; with the system if several have the same."""
@@ -409,6 +421,7 @@ def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
     if vehicle.local:
         ns, xy = _columns(vehicle.local)
         heading = np.pi / 2 - _yaw_at(vehicle, ns)
+        rank = 1 if vehicle.origin is not None or not vehicle.earth else WITHOUT_ORIGIN
         yield poses_of(
             "LOCAL_POSITION_NED",
             "local",
@@ -416,7 +429,7 @@ def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
             xy,
             heading,
             robot=robot,
-            rank=1,
+            rank=rank,
             origin=vehicle.origin,
             rule=rule,
         )

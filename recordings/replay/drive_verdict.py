@@ -13,12 +13,17 @@ from stopgo.recordings.replay.replayed import Replay
 
 
 def drive_verdict(replay: Replay) -> Judgement:
-    """Return yes if the robot was stationary at every stop within its tolerance, as long as its scan takes.
+    """Return yes if the log shows the robot stationary at every stop within tolerance, for its scan's time.
 
-    If the floor is known, all required targets must have been visible as well.
+    If the floor is known, all required targets must have been visible as well. No needs evidence against it;
+    without either the answer is unknown.
     """
-    unseen = replay.sight is not None and not replay.sight.enough
-    answer: Certainty = "no" if missing(replay) or outside(replay) or unseen else "yes"
+    if missing(replay) or outside(replay):
+        answer: Certainty = "no"
+    elif unplaced(replay):
+        answer = "unknown"
+    else:
+        answer = "yes" if replay.sight is None or replay.sight.enough else "no"
     return DriveJudgement(answer, tuple(_sentences(replay)))
 
 
@@ -40,9 +45,14 @@ def outside(replay: Replay) -> list[StopComparison]:
     return [item for item in replay.comparison.asked if item.outside_text]
 
 
+def unplaced(replay: Replay) -> list[StopComparison]:
+    """Return stops that the robot passed or scanned, and no pose in the log shows where it was."""
+    return [item for item in replay.comparison.asked if item.outcome in DONE and item.deviation_m is None]
+
+
 def _sentences(replay: Replay) -> Iterator[str]:
     asked = replay.comparison.asked
-    good = len(asked) - len(missing(replay)) - len(outside(replay))
+    good = len(asked) - len(missing(replay)) - len(outside(replay)) - len(unplaced(replay))
     yield f"{good} of {len(asked)} stops were visited within tolerance."
     for outcome, words in WORDS.items():
         stops = [item.stop for item in asked if item.outcome == outcome]
@@ -51,6 +61,9 @@ def _sentences(replay: Replay) -> Iterator[str]:
     for item in outside(replay):
         far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
         yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
+    if unplaced(replay):
+        names = named([item.stop for item in unplaced(replay)])
+        yield f"Position at {names} cannot be told: no pose in the log; the robot's own log may have it."
     if replay.sight is not None:
         whole = replay.sight.shares.whole
         short = [share for share in replay.sight.shares.short if share is not whole]
@@ -82,5 +95,5 @@ WORDS = {
 HEADLINES: dict[Certainty, str] = {
     "yes": "Driven as planned",
     "no": "Not driven as planned",
-    "unknown": "Not known",
+    "unknown": "Cannot be told",
 }
