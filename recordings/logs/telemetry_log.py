@@ -26,6 +26,7 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.mavlink.autopilots import autopilot_named, autopilot_of
 from stopgo.mission.mavlink.autopilots.kind import ROVERS
 from stopgo.mission.mavlink.items import Command, Item
+from stopgo.recordings.logs.clock_steps import ALONE_NS, STEP_NS
 from stopgo.recordings.logs.field_log import (
     Channel,
     FieldLog,
@@ -139,6 +140,8 @@ class _FrameScan:
         self._path, self._tick = path, reading.tick
         self._decoder = _Decoder()
         self.lost_bytes = self.size = self.tail_bytes = 0
+        self.clock_lines: list[str] = []
+        """Steps of the station's clock, one line each."""
 
     @property
     def lost(self) -> str:
@@ -146,11 +149,36 @@ class _FrameScan:
 
     @property
     def oddities(self) -> tuple[str, ...]:
+        steps = tuple(self.clock_lines)
         if not self.tail_bytes:
-            return ()
-        return (f"the last packet is truncated ({self.tail_bytes} bytes), as when a station is switched off",)
+            return steps
+        text = f"the last packet is truncated ({self.tail_bytes} bytes), as when a station is switched off"
+        return (*steps, text)
 
     def packets(self) -> Iterator[Packet]:
+        """Yield the packets with times that count on where the station's clock was set back.
+
+        A stamp far from those before and after it counts as that before it.
+        """
+        self.clock_lines = []
+        last_ns, offset_ns = 0, 0
+        for number, (packet, following) in enumerate(_with_next(self._stamped_packets()), 1):
+            ns = packet.ns + offset_ns
+            step_ns = ns - last_ns if last_ns else 0
+            if step_ns < -STEP_NS or step_ns > ALONE_NS:
+                if following is not None and abs(following.ns - packet.ns) > STEP_NS:
+                    ns = last_ns  # a wrong stamp
+                elif step_ns < 0:
+                    offset_ns -= step_ns
+                    ns = last_ns
+                    self.clock_lines.append(
+                        f"the station's clock steps back by {-step_ns / 1e9:.1f} s at packet {number}; "
+                        "times count on in the order of writing"
+                    )
+            last_ns = ns
+            yield packet._replace(ns=ns)
+
+    def _stamped_packets(self) -> Iterator[Packet]:
         with self._path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
             self.size, self.lost_bytes = len(data), 0
             at = steps = 0
@@ -171,6 +199,17 @@ class _FrameScan:
                 at, synchronised, steps = end, True, steps + 1
                 if steps % TICK_EVERY == 0:
                     self._tick(at / self.size)
+
+
+def _with_next(packets: Iterator[Packet]) -> Iterator[tuple[Packet, Packet | None]]:
+    """Yield each packet and the one after it."""
+    before = next(packets, None)
+    for packet in packets:
+        if before is not None:
+            yield before, packet
+        before = packet
+    if before is not None:
+        yield before, None
 
 
 def _packet(data: mmap, at: int) -> tuple[Packet | None, int]:
