@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
@@ -53,6 +54,12 @@ GPS_EPOCH_S = 315_964_800
 LEAP_S = 18
 """Seconds by which GPS time is ahead of UTC since 2017."""
 TICK_EVERY = 200_000
+EKF_ORIGIN = 0
+"""Type of the ORGN rows that contain the filter's origin."""
+RULE = "ardupilot"
+LOCAL, GLOBAL, WITHOUT_ORIGIN = 1, 2, 3
+"""Ranks of poses in metres from a known origin, of latitudes and longitudes, and of metres from nowhere."""
+END_NS = np.iinfo(np.int64).max
 
 
 def read_dataflash(path: Path, reading: Reading) -> FieldLog:
@@ -273,16 +280,32 @@ def _filtered(tables: _Tables, name: str) -> Poses | None:
     mine = rows["C"] == rows["C"].min() if "C" in (rows.dtype.names or ()) else np.ones(len(rows), bool)
     xy = np.stack([tables.numbers(name, "PE"), tables.numbers(name, "PN")], axis=-1)[mine]
     heading = np.radians(90.0 - tables.numbers(name, "Yaw")[mine])
-    return poses_of(
-        name, "local", tables.ns(name)[mine], xy, heading, rank=1, origin=_origin(tables), rule="ardupilot"
-    )
+    ns, origins = tables.ns(name)[mine], _origins(tables)
+    origin = origins[0][1] if origins else None
+    for (since_ns, later), (until_ns, _) in pairwise([*origins, (END_NS, origin)]):
+        if origin is not None and later is not None and later != origin:
+            part = (ns >= since_ns) & (ns < until_ns)
+            xy[part] += from_geodetic(origin, Geodetic(lat=later.lat, lon=later.lon), RULE)
+    rank = LOCAL if origin is not None else WITHOUT_ORIGIN
+    return poses_of(name, "local", ns, xy, heading, rank=rank, origin=origin, rule=RULE)
 
 
-def _origin(tables: _Tables) -> SiteOrigin | None:
-    """Return the origin of the filter."""
+def _origins(tables: _Tables) -> list[tuple[int, SiteOrigin]]:
+    """Return the origins of the filter, each with the time since when it applies.
+
+    ORGN rows of another type contain home, which is where the vehicle was switched on.
+    """
     if not tables.has("ORGN", "Lat", "Lng"):
-        return None
-    return _site(*(float(tables.numbers("ORGN", column)[-1]) for column in ("Lat", "Lng")))
+        return []
+    rows = tables.rows("ORGN")
+    assert rows is not None
+    typed = "Type" in (rows.dtype.names or ())
+    found = []
+    for ns, row in zip(tables.ns("ORGN").tolist(), rows, strict=True):
+        origin = _site(float(row["Lat"]), float(row["Lng"]))
+        if origin is not None and (not typed or row["Type"] == EKF_ORIGIN):
+            found.append((ns, origin))
+    return found
 
 
 def _site(lat: float, lon: float, alt: float = 0.0) -> SiteOrigin | None:
@@ -299,7 +322,7 @@ def _placed(tables: _Tables, name: str, *, truth: bool) -> Poses | None:
     degrees = np.stack([tables.numbers(name, "Lat"), tables.numbers(name, "Lng")], axis=-1) / 1e7
     own = tables.has(name, "Yaw")
     bearing = tables.numbers(name, "Yaw") if own else _bearing_at(tables, ns)
-    return fixes_of(name, "ardupilot", ns, degrees, bearing, rank=2, truth=truth)
+    return fixes_of(name, RULE, ns, degrees, bearing, rank=GLOBAL, truth=truth)
 
 
 def _bearing_at(tables: _Tables, ns: IntArray) -> FloatArray:
@@ -316,15 +339,30 @@ def _uploads(tables: _Tables) -> Iterator[LoggedMission]:
         return
     rows, ns = tables.rows("CMD"), tables.ns("CMD")
     assert rows is not None
-    number = rows["CNum"].astype(int)
-    starts = [0, *(np.flatnonzero(np.diff(number) <= 0) + 1).tolist(), len(rows)]
-    for begin, end in pairwise(starts):
-        logged_items = rows[begin:end]
+    for listing in _listings(rows["CNum"].astype(int).tolist())[0]:
+        logged_items = rows[listing]
         items = tuple(_item(row) for row in logged_items if row["CNum"] > 0)
         if items:
             home = _home(logged_items[0]) if logged_items[0]["CNum"] == 0 else None
             whole = len(logged_items) == int(logged_items[0]["CTot"])
-            yield LoggedMission(int(ns[begin]), items, "ardupilot", complete=whole, home=home)
+            yield LoggedMission(int(ns[listing[0]]), items, "ardupilot", complete=whole, home=home)
+
+
+def _listings(numbers: list[int]) -> tuple[list[list[int]], list[int]]:
+    """Return the rows of each listed mission, and the rows of items that the vehicle began.
+
+    A list counts up from item 0. Older autopilots log an item again, alone, when they begin it.
+    """
+    listings: list[list[int]] = []
+    begun: list[int] = []
+    for row, number in enumerate(numbers):
+        if number == 0 or (row == 0 and number == 1):
+            listings.append([row])
+        elif listings and number == numbers[listings[-1][-1]] + 1:
+            listings[-1].append(row)
+        else:
+            begun.append(row)
+    return listings, begun
 
 
 def _item(row: Any) -> Item:
@@ -356,18 +394,23 @@ def _remarks(tables: _Tables) -> Iterator[Remark]:
     for name in ("CAM", "TRIG"):
         for ns in tables.ns(name).tolist() if tables.has(name) else ():
             yield Remark(ns, "trigger", "camera")
-    if tables.has("MISE", "CNum", "CId"):
-        yield from _executed(tables)
+    yield from _executed(tables)
 
 
 def _executed(tables: _Tables) -> Iterator[Remark]:
-    """Yield items when the vehicle began them."""
-    rows = tables.rows("MISE")
-    assert rows is not None
-    for ns, row in zip(tables.ns("MISE").tolist(), rows, strict=True):
-        item = _item(row)
-        kind: RemarkKind = "trigger" if item.command in TRIGGERS else "command"
-        yield Remark(ns, kind, item.name, int(row["CNum"]))
+    """Yield items when the vehicle began them: MISE rows, before ArduPilot 4.6 single CMD rows."""
+    for name in ("MISE", "CMD"):
+        rows = tables.rows(name) if tables.has(name, "CTot", "CNum", "CId") else None
+        if rows is None:
+            continue
+        begun = _listings(rows["CNum"].astype(int).tolist())[1] if name == "CMD" else range(len(rows))
+        ns = tables.ns(name)
+        for k in begun:
+            item = _item(rows[k])
+            kind: RemarkKind = "trigger" if item.command in TRIGGERS else "command"
+            yield Remark(int(ns[k]), kind, item.name, int(rows[k]["CNum"]))
+        if len(begun):
+            return
 
 
 def _battery(tables: _Tables) -> Iterator[tuple[int, float]]:

@@ -19,6 +19,7 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.run.events import AnyEvent
+from stopgo.recordings.logs.clock_steps import mended_times
 
 Stamps = Literal["header", "log"]
 RemarkKind = Literal["mode", "command", "trigger", "reached", "text"]
@@ -98,7 +99,7 @@ class Remark:
 
 @dataclass(frozen=True)
 class LoggedMission:
-    """MAVLink mission that was uploaded to the vehicle."""
+    """MAVLink mission that the vehicle holds: uploaded to it, or read back from it."""
 
     ns: int
     items: tuple[Item, ...]
@@ -106,6 +107,8 @@ class LoggedMission:
     autopilot: str
     complete: bool = True
     home: SiteOrigin | None = None
+    read_back: bool = False
+    """True if the vehicle sent the list, on request, and did not receive it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +175,11 @@ def poses_of(
     """
     times, positions = np.asarray(ns, np.int64), np.asarray(xy, float).reshape(-1, 2)
     finite = np.isfinite(positions).all(axis=1) & (np.abs(positions) < FARTHEST).all(axis=1)
-    oddities = oddities_of(times, positions, finite)
+    mended = mended_times(times[finite], positions[finite])
+    times = times.copy()
+    times[finite] = mended.ns
+    oddities = (*mended.lines, *oddities_of(times, positions, finite))
+    finite[finite] = mended.kept
     order = np.flatnonzero(finite)[np.argsort(times[finite], kind="stable")]
     if not len(order):
         return None

@@ -20,6 +20,8 @@ Numbers = tuple[float, ...]
 TUM_COLUMNS = 8
 WALL_S = 1e9
 """Times from September 2001 on count as seconds since 1970."""
+LATEST_S = 9e9
+"""Limit of times: more nanoseconds have no int64."""
 
 
 def read_table(path: Path, reading: Reading) -> FieldLog:
@@ -47,6 +49,7 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
         for line in file:
             words = line.split("#")[0].replace(",", " ").split()
             row = _numbers(words) if len(words) == TUM_COLUMNS else None
+            row = row if row is not None and abs(row[0]) < LATEST_S else None
             lost += bool(words) and row is None
             rows += [] if row is None else [row]
     if not rows:
@@ -141,6 +144,8 @@ class _Columns:
         """Return the time in ns, then x and y, and the heading in radians (NaN without one)."""
         try:
             ns = self._ns(cells[self.at[self.time]])
+            if abs(ns) > LATEST_S * 1e9:
+                return None
             x, y = (float(cells[self.at[name]]) for name in self.position)
             return ns, (x, y, self._heading(cells))
         except (ValueError, IndexError, OverflowError):
@@ -169,6 +174,7 @@ class _Columns:
 
 
 def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: np.ndarray) -> FieldLog:
+    ns = ns if track is None else track.ns
     last = float(ns.max()) / 1e9
     return FieldLog(
         path=str(path),

@@ -26,6 +26,7 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.mavlink.autopilots import autopilot_named, autopilot_of
 from stopgo.mission.mavlink.autopilots.kind import ROVERS
 from stopgo.mission.mavlink.items import Command, Item
+from stopgo.recordings.logs.clock_steps import ALONE_NS, STEP_NS
 from stopgo.recordings.logs.field_log import (
     Channel,
     FieldLog,
@@ -139,6 +140,8 @@ class _FrameScan:
         self._path, self._tick = path, reading.tick
         self._decoder = _Decoder()
         self.lost_bytes = self.size = self.tail_bytes = 0
+        self.clock_lines: list[str] = []
+        """Steps of the station's clock, one line each."""
 
     @property
     def lost(self) -> str:
@@ -146,11 +149,36 @@ class _FrameScan:
 
     @property
     def oddities(self) -> tuple[str, ...]:
+        steps = tuple(self.clock_lines)
         if not self.tail_bytes:
-            return ()
-        return (f"the last packet is truncated ({self.tail_bytes} bytes), as when a station is switched off",)
+            return steps
+        text = f"the last packet is truncated ({self.tail_bytes} bytes), as when a station is switched off"
+        return (*steps, text)
 
     def packets(self) -> Iterator[Packet]:
+        """Yield the packets with times that count on where the station's clock was set back.
+
+        A stamp far from those before and after it counts as that before it.
+        """
+        self.clock_lines = []
+        last_ns, offset_ns = 0, 0
+        for number, (packet, following) in enumerate(_with_next(self._stamped_packets()), 1):
+            ns = packet.ns + offset_ns
+            step_ns = ns - last_ns if last_ns else 0
+            if step_ns < -STEP_NS or step_ns > ALONE_NS:
+                if following is not None and abs(following.ns - packet.ns) > STEP_NS:
+                    ns = last_ns  # a wrong stamp
+                elif step_ns < 0:
+                    offset_ns -= step_ns
+                    ns = last_ns
+                    self.clock_lines.append(
+                        f"the station's clock steps back by {-step_ns / 1e9:.1f} s at packet {number}; "
+                        "times count on in the order of writing"
+                    )
+            last_ns = ns
+            yield packet._replace(ns=ns)
+
+    def _stamped_packets(self) -> Iterator[Packet]:
         with self._path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
             self.size, self.lost_bytes = len(data), 0
             at = steps = 0
@@ -171,6 +199,17 @@ class _FrameScan:
                 at, synchronised, steps = end, True, steps + 1
                 if steps % TICK_EVERY == 0:
                     self._tick(at / self.size)
+
+
+def _with_next(packets: Iterator[Packet]) -> Iterator[tuple[Packet, Packet | None]]:
+    """Yield each packet and the one after it."""
+    before = next(packets, None)
+    for packet in packets:
+        if before is not None:
+            yield before, packet
+        before = packet
+    if before is not None:
+        yield before, None
 
 
 def _packet(data: mmap, at: int) -> tuple[Packet | None, int]:
@@ -214,6 +253,8 @@ class _Vehicle:
 CHECKED = 5
 UNKNOWN_BEARING = 65_535
 MISSION_TYPE = 0
+WITHOUT_ORIGIN = 3
+"""Rank of metres from an unknown origin, where there are latitudes and longitudes."""
 
 
 @dataclass
@@ -233,6 +274,8 @@ class _VehicleSorter:
     _items: dict[int, Item] = field(default_factory=dict)
     _announced: tuple[int, int] | None = None
     """Time at which an upload was announced, and its number of items."""
+    _read_back: bool = False
+    """True if the vehicle announced it: a station reads the list back."""
 
     def take(self, packet: Packet) -> None:
         self.counts[packet.system, packet.number] += 1
@@ -318,6 +361,7 @@ class _VehicleSorter:
     def _mission_count(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         if getattr(message, "mission_type", MISSION_TYPE) == MISSION_TYPE:
             self._items, self._announced = {}, (packet.ns, message.count)
+            self._read_back = packet.system < STATIONS
 
     def _mission_item_int(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         if getattr(message, "mission_type", MISSION_TYPE) == MISSION_TYPE:
@@ -350,12 +394,19 @@ class _VehicleSorter:
         items = [
             item for sequence, item in sorted(self._items.items()) if not (kind.home_first and sequence == 0)
         ]
-        if not any(upload.items == tuple(items) and upload.ns == ns for upload in self.uploads):
-            home = self._items.get(0) if kind.home_first else None
-            self.uploads.append(
-                LoggedMission(ns, tuple(items), kind.name, complete=complete, home=_site(home))
-            )
+        home = self._items.get(0) if kind.home_first else None
+        upload = LoggedMission(ns, tuple(items), kind.name, complete, _site(home), self._read_back)
+        if not self._known(upload):
+            self.uploads.append(upload)
         self._items, self._announced = {}, None
+
+    def _known(self, upload: LoggedMission) -> bool:
+        """True for a list that was announced twice, and for a read-back of what the vehicle holds already."""
+        twice = any(known.ns == upload.ns and known.items == upload.items for known in self.uploads)
+        if not (upload.read_back and self.uploads):
+            return twice
+        interrupted = not upload.complete
+        return twice or interrupted or self.uploads[-1].items == upload.items
 
     def channels(self) -> tuple[Channel, ...]:
         """Return channels by name; with the system if several have the same."""
@@ -409,6 +460,7 @@ def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
     if vehicle.local:
         ns, xy = _columns(vehicle.local)
         heading = np.pi / 2 - _yaw_at(vehicle, ns)
+        rank = 1 if vehicle.origin is not None or not vehicle.earth else WITHOUT_ORIGIN
         yield poses_of(
             "LOCAL_POSITION_NED",
             "local",
@@ -416,7 +468,7 @@ def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
             xy,
             heading,
             robot=robot,
-            rank=1,
+            rank=rank,
             origin=vehicle.origin,
             rule=rule,
         )

@@ -7,17 +7,23 @@ from collections.abc import Iterator
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.comparing.run_verdict import Judgement, named
+from stopgo.mission.run.events import Settled
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.replay.replayed import Replay
 
 
 def drive_verdict(replay: Replay) -> Judgement:
-    """Return yes if the robot was stationary at every stop within its tolerance, as long as its scan takes.
+    """Return yes if the log shows the robot stationary at every stop within tolerance, for its scan's time.
 
-    If the floor is known, all required targets must have been visible as well.
+    If the floor is known, all required targets must have been visible as well. No needs evidence against it;
+    without either the answer is unknown.
     """
-    unseen = replay.sight is not None and not replay.sight.enough
-    answer: Certainty = "no" if missing(replay) or outside(replay) or unseen else "yes"
+    if missing(replay) or outside(replay):
+        answer: Certainty = "no"
+    elif unplaced(replay):
+        answer = "unknown"
+    else:
+        answer = "yes" if replay.sight is None or replay.sight.enough else "no"
     return DriveJudgement(answer, tuple(_sentences(replay)))
 
 
@@ -39,9 +45,14 @@ def outside(replay: Replay) -> list[StopComparison]:
     return [item for item in replay.comparison.asked if item.outside_text]
 
 
+def unplaced(replay: Replay) -> list[StopComparison]:
+    """Return stops that the robot passed or scanned, and no pose in the log shows where it was."""
+    return [item for item in replay.comparison.asked if item.outcome in DONE and item.deviation_m is None]
+
+
 def _sentences(replay: Replay) -> Iterator[str]:
     asked = replay.comparison.asked
-    good = len(asked) - len(missing(replay)) - len(outside(replay))
+    good = len(asked) - len(missing(replay)) - len(outside(replay)) - len(unplaced(replay))
     yield f"{good} of {len(asked)} stops were visited within tolerance."
     for outcome, words in WORDS.items():
         stops = [item.stop for item in asked if item.outcome == outcome]
@@ -50,6 +61,9 @@ def _sentences(replay: Replay) -> Iterator[str]:
     for item in outside(replay):
         far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
         yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
+    if unplaced(replay):
+        names = named([item.stop for item in unplaced(replay)])
+        yield f"Position at {names} cannot be told: no pose in the log; the robot's own log may have it."
     if replay.sight is not None:
         whole = replay.sight.shares.whole
         short = [share for share in replay.sight.shares.short if share is not whole]
@@ -59,9 +73,17 @@ def _sentences(replay: Replay) -> Iterator[str]:
     if replay.extra:
         yield f"{len(replay.extra)} standstills were not at a stop."
     if replay.inferred:
-        yield "Visits are inferred from standstills; the log does not show whether scans were made."
+        yield f"Visits are inferred from standstills; {_scans_text(replay)}."
     if replay.log.lost:
         yield f"The log is damaged; this is the result of the readable part: {replay.log.lost}."
+
+
+def _scans_text(replay: Replay) -> str:
+    asked = {item.stop for item in replay.comparison.asked}
+    triggered = asked & {event.stop for event in replay.run.events if isinstance(event, Settled)}
+    if not triggered:
+        return "the log does not show whether scans were made"
+    return f"the log shows a trigger of the scanner at {len(triggered)} of {len(asked)} stops"
 
 
 WORDS = {
@@ -73,5 +95,5 @@ WORDS = {
 HEADLINES: dict[Certainty, str] = {
     "yes": "Driven as planned",
     "no": "Not driven as planned",
-    "unknown": "Not known",
+    "unknown": "Cannot be told",
 }

@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import groupby
 from pathlib import Path
+from typing import Any
 
-from stopgo.mission.document import Mission
+from msgspec.structs import replace as changed
+
+from stopgo.mission.document import Mission, Stop
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.captures import NEAR_M
 from stopgo.mission.mavlink.following.followed_run import FollowedRun
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.recognise import recognise
-from stopgo.mission.run.events import AnyEvent, Arrived
+from stopgo.mission.run.events import AnyEvent, Arrived, Pose, Scanned, Unconfirmed
+from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import FieldLog, LoggedMission
 from stopgo.recordings.logs.telemetry_log import FORMAT, messages_of
 from stopgo.recordings.replay.log_placing import PlacedLog
+from stopgo.recordings.replay.matching import long_enough
+from stopgo.recordings.replay.standstills import Standstill
 from stopgo.recordings.replay.uploaded import differences
 
 
-def followed_events(log: FieldLog, mission: Mission, placed_log: PlacedLog) -> tuple[AnyEvent, ...]:
+def followed_events(
+    log: FieldLog, mission: Mission, placed_log: PlacedLog, standstills: Sequence[Standstill]
+) -> tuple[AnyEvent, ...]:
     """Return the events of the vehicle's newest run of the mission; none if it cannot be followed.
 
     That needs our mission as uploaded to the vehicle, and poses placed by latitude and longitude, like its
@@ -33,14 +46,24 @@ def followed_events(log: FieldLog, mission: Mission, placed_log: PlacedLog) -> t
     ):
         return ()
     newest: tuple[AnyEvent, ...] = ()
-    for number, upload in enumerate(log.uploads):
-        listed = _listed(upload, mission)
-        if listed is None:
-            continue
-        until = log.uploads[number + 1].ns if number + 1 < len(log.uploads) else log.end_ns + 1
-        events = _followed(log, listed, upload, until, int(system), placed_log.alignment.time_offset_ns)
+    for upload, listed, until_ns in _held(log, mission):
+        events = _followed(log, listed, upload, until_ns, int(system), placed_log)
         newest = events or newest
-    return newest
+    return tuple(_with_standstills(newest, mission, standstills))
+
+
+def _held(log: FieldLog, mission: Mission) -> Iterator[tuple[LoggedMission, ListedMission, int]]:
+    """Yield each time during which the vehicle held our mission: its first list, and the end.
+
+    A list with the same contents, uploaded or read back, ends nothing.
+    """
+    lists = [(upload, _listed(upload, mission)) for upload in log.uploads]
+    for ours, group in groupby(enumerate(lists), key=lambda item: item[1][1] is not None):
+        held = list(group)
+        upload, listed = held[0][1]
+        after = held[-1][0] + 1
+        if ours and listed is not None:
+            yield upload, listed, log.uploads[after].ns if after < len(lists) else log.end_ns + 1
 
 
 def _listed(upload: LoggedMission, mission: Mission) -> ListedMission | None:
@@ -56,15 +79,25 @@ def _listed(upload: LoggedMission, mission: Mission) -> ListedMission | None:
 
 
 def _followed(
-    log: FieldLog, listed: ListedMission, upload: LoggedMission, until_ns: int, system: int, offset_ns: int
+    log: FieldLog,
+    listed: ListedMission,
+    upload: LoggedMission,
+    until_ns: int,
+    system: int,
+    placed_log: PlacedLog,
 ) -> tuple[AnyEvent, ...]:
-    """Return the events of the newest run between two uploads in which a stop was reached."""
+    """Return the events of the newest run between two uploads in which a stop was reached or left out."""
+    offset_ns = placed_log.alignment.time_offset_ns
     run = FollowedRun(
-        listed, autopilot_named(upload.autopilot), name=f"replay-{log.digest[:12]}", robot=str(system)
+        listed,
+        autopilot_named(upload.autopilot),
+        name=f"replay-{log.digest[:12]}",
+        robot=str(system),
+        pose_at=partial(_pose_at, placed_log.track),
     )
     last_ns = upload.ns
     for received in messages_of(Path(log.path)):
-        if received.system != system or received.ns >= until_ns:
+        if received.system != system or received.ns >= until_ns or _of_another_component(received.message):
             continue
         if received.ns < upload.ns:
             run.take_earlier(received.message, received.ns + offset_ns)
@@ -73,3 +106,54 @@ def _followed(
             run.take(received.message, received.ns + offset_ns)
     run.end(last_ns + offset_ns)
     return tuple(run.events) if any(isinstance(event, Arrived) for event in run.events) else ()
+
+
+def _with_standstills(
+    events: Sequence[AnyEvent], mission: Mission, standstills: Sequence[Standstill]
+) -> Iterator[AnyEvent]:
+    """Give unconfirmed stops without a pose that of the standstill which the poses of the log show there."""
+    stops = {stop.id: stop for stop in mission.stops}
+    after_ns = 0
+    for event in events:
+        if isinstance(event, Unconfirmed) and event.pose is None:
+            yield _at_standstill(event, stops[event.stop], standstills, after_ns)
+        else:
+            yield event
+        if isinstance(event, Arrived | Scanned | Unconfirmed):
+            after_ns = event.robot_ns
+
+
+def _at_standstill(
+    event: Unconfirmed, stop: Stop, standstills: Sequence[Standstill], after_ns: int
+) -> Unconfirmed:
+    """Return the event with the last standstill at the stop since a time, if there is one."""
+    found = [
+        item
+        for item in standstills
+        if after_ns < item.end_ns and item.begin_ns < event.robot_ns
+        if math.dist(item.xy, (stop.x, stop.y)) <= NEAR_M and long_enough(item, stop)
+    ]
+    if not found:
+        return event
+    pose = Pose(x=found[-1].x, y=found[-1].y, heading=found[-1].heading)
+    reason = f"{event.reason}; stationary {found[-1].seconds:.1f} s"
+    return changed(event, pose=pose, reason=reason)
+
+
+def _of_another_component(message: Any) -> bool:
+    """True for a heartbeat of a camera or companion computer: it has no mode of the vehicle."""
+    return str(message.get_type()) == "HEARTBEAT" and message.autopilot == NO_AUTOPILOT
+
+
+def _pose_at(track: Track, ns: int) -> Pose | None:
+    """Return the newest pose of the log, if it is recent."""
+    index = track.last_until(ns)
+    if index is None or ns - int(track.ns[index]) > RECENT_NS:
+        return None
+    x, y = track.xy[index].tolist()
+    return Pose(x=x, y=y, heading=float(track.heading[index]))
+
+
+NO_AUTOPILOT = 8
+"""MAV_AUTOPILOT_INVALID."""
+RECENT_NS = 5 * 10**8

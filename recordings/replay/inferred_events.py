@@ -26,6 +26,7 @@ from stopgo.mission.run.events import (
     Unconfirmed,
 )
 from stopgo.mission.run.run_log import Track
+from stopgo.mission.run.tolerance import is_outside
 from stopgo.recordings.logs.field_log import Remark
 from stopgo.recordings.replay.matching import Match, long_enough
 from stopgo.recordings.replay.standstills import Standstill
@@ -82,20 +83,51 @@ DRIVES = ("AUTO", "MISSION")
 def _stop_events(
     matches: Sequence[Match], mission: Mission, track: Track, remarks: Sequence[Remark]
 ) -> Iterator[InferredEvent]:
-    farthest, left_ns, visited = -1, int(track.ns[0]), set[int]()
+    farthest, left_ns = -1, int(track.ns[0])
+    counted = _counted(matches, mission, remarks)
     for match in matches:
-        if match.stop is None:
+        if match.stop is None or counted.get(match.stop) is not match:
             continue
         for passed in range(farthest + 1, match.stop):
+            if passed in counted:
+                continue
             left_ns = _passing_ns(mission.stops[passed], track, left_ns, match.standstill.begin_ns)
             reason = "no standstill there in the log"
             yield InferredEvent(left_ns, Skipped, {"stop": mission.stops[passed].id, "reason": reason})
         farthest, left_ns = max(farthest, match.stop), match.standstill.end_ns
-        stop = mission.stops[match.stop]
-        enough = long_enough(match.standstill, stop)
-        if enough or match.stop not in visited:  # a short standstill does not replace a long one before
-            yield from _visit(stop, match.standstill, remarks)
-        visited |= {match.stop} if enough else set()
+        yield from _visit(mission.stops[match.stop], match.standstill, remarks)
+
+
+def _counted(matches: Sequence[Match], mission: Mission, remarks: Sequence[Remark]) -> dict[int, Match]:
+    """Return the standstill that counts for each stop: that of its scan, as far as the log shows it.
+
+    A standstill with a trigger comes before those without, one long enough for a scan before a shorter one,
+    one within tolerance before one outside, and the later of equals.
+    """
+    counted: dict[int, Match] = {}
+    ranks: dict[int, tuple[bool, bool, bool]] = {}
+    for match in _without_parking(matches, mission):
+        if match.stop is None:
+            continue
+        stop, standstill = mission.stops[match.stop], match.standstill
+        triggered = any(remark.kind == "trigger" and _during(standstill, remark) for remark in remarks)
+        within = not is_outside(match.away_m, stop.tolerance_m)
+        rank = (triggered, long_enough(standstill, stop), within)
+        if match.stop not in counted or rank >= ranks[match.stop]:
+            counted[match.stop], ranks[match.stop] = match, rank
+    return counted
+
+
+def _without_parking(matches: Sequence[Match], mission: Mission) -> Iterator[Match]:
+    """Yield the matches but those after the last stop that lie nearer to the return's end than to a stop."""
+    last, parking = len(mission.stops) - 1, (mission.return_ or ())[-1:]
+    over = False
+    for match in matches:
+        again = over and match.how in ("again", "back")
+        if again and any(math.dist(match.standstill.xy, end) < match.away_m for end in parking):
+            continue
+        yield match
+        over = over or match.stop == last
 
 
 def _during(standstill: Standstill, remark: Remark) -> bool:

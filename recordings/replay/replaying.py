@@ -45,8 +45,8 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
     """
     placed_log = placed(log, mission, placing)
     offset = placed_log.alignment.time_offset_ns
-    events = _own_events(log, mission, offset) or followed_events(log, mission, placed_log)
     standstills = _standstills(placed_log, mission)
+    events = _own_events(log, mission, offset) or followed_events(log, mission, placed_log, standstills)
     matches = (
         reported_visits(events, mission, standstills)
         if events

@@ -6,6 +6,7 @@ so is a second visit to a stop.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from stopgo.mission.document import Mission, Stop
@@ -26,7 +27,7 @@ from stopgo.mission.mavlink.following.steps import (
 )
 from stopgo.mission.mavlink.telemetry import Message, has_restarted
 from stopgo.mission.run import states as runs
-from stopgo.mission.run.events import AnyEvent, Arrived
+from stopgo.mission.run.events import AnyEvent, Arrived, Pose
 from stopgo.mission.run.states import Change, Run, changed, events_of
 
 
@@ -39,11 +40,22 @@ class FollowedRun:
         The mission and the list that the vehicle holds.
     name
         Id of the first run; later runs append their number.
+    pose_at
+        Returns the vehicle's pose at a time from the log's poses; used where its messages give none.
     """
 
-    def __init__(self, listed: ListedMission, autopilot: Autopilot, *, name: str, robot: str) -> None:
+    def __init__(
+        self,
+        listed: ListedMission,
+        autopilot: Autopilot,
+        *,
+        name: str,
+        robot: str,
+        pose_at: Callable[[int], Pose | None] = lambda ns: None,
+    ) -> None:
         self._listed = replace(listed, mission=as_observed(listed.mission))
         self._observer = Observer(autopilot)
+        self._pose_at = pose_at
         self._name, self._robot = name, robot
         self._run = runs.installed(Run(), listed.mission)
         self._used: Picture = NONE_YET
@@ -91,6 +103,8 @@ class FollowedRun:
     def _observe(self, now_ns: int) -> Observation | None:
         run, listed = self._run, self._listed
         observed = self._observer.observe(run, listed, self._arrived(), after=self._used)
+        if observed is not None and observed.pose is None:
+            observed = replace(observed, pose=self._pose_at(now_ns))
         if observed is None or not has_left(run, listed, observed):
             return observed
         self._left_ns = now_ns if self._left_ns is None else self._left_ns

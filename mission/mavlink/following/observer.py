@@ -30,6 +30,7 @@ from stopgo.mission.run.events import Arrived, Pose
 from stopgo.mission.run.states import Run
 
 CAPTURES_KEPT = 100
+MOVES_KEPT = 1000
 USED_MESSAGES = (
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
     "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
@@ -44,6 +45,17 @@ class TimestampedMessage:
 
     message: Message
     ns: int
+
+
+@dataclass(frozen=True)
+class ItemMove:
+    """Change of the current item."""
+
+    before: int
+    after: int
+    """Sequence numbers."""
+    unheard_ns: int
+    """Time between the last report of the one and the first of the other."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +90,9 @@ class Observer:
         """Sequence number of the current item, and True if all is done."""
         self._work_ns = 0
         """Time since when it is current."""
+        self._heard_ns = 0
+        """Time of the last report of it."""
+        self._moves: deque[ItemMove] = deque(maxlen=MOVES_KEPT)
         self._mode_began_ns = 0
         """Time when the vehicle was first in its present mode."""
         self.fix: Fix | None = None
@@ -191,7 +206,19 @@ class Observer:
             still=fix is not None and fix.still,
             scan=None if report is None else report.capture.result,
             stood=_stood(report, arrived),
+            jumped=run.at < len(listed.stops) and self._jumped(listed, run.at),
         )  # fmt: skip
+
+    def _jumped(self, listed: ListedMission, at: int) -> bool:
+        """Return True if the current item passed a stop's waits in less time than half of them takes."""
+        items, stop = listed.stops[at], listed.mission.stops[at]
+        half_ns = round((stop.settle_s + stop.scan.duration_s) / 2 * 1e9)
+        crossing = (
+            move.unheard_ns < half_ns
+            for move in reversed(self._moves)
+            if listed.place(move.before) <= items.at and items.after <= listed.place(move.after)
+        )
+        return next(crossing, False)
 
     def place(self, listed: ListedMission) -> int:
         """Return the index in the list of the current item; the list's length once all is done."""
@@ -233,7 +260,10 @@ class Observer:
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         work = (message.seq, message.mission_state == MissionState.COMPLETE)
         if self._work != work:
+            if self._work is not None:
+                self._moves.append(ItemMove(self._work[0], message.seq, now_ns - self._heard_ns))
             self._work, self._work_ns = work, now_ns
+        self._heard_ns = now_ns
 
     def _take_origin(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         self._frame = None

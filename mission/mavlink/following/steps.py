@@ -23,6 +23,7 @@ from stopgo.mission.run.tolerance import deviation, is_outside
 
 SOMEBODY = "the vehicle's operator"
 """Commander of commands that were not sent from here."""
+JUMPED = "the vehicle was sent on to a later item"
 LATE_REPORTS = ("NAVIGATING", "SCANNING")
 """States in which a scanner's report is still expected after the stop was left."""
 GRACE_NS = 2 * 10**9
@@ -49,6 +50,8 @@ class Observation:
     """Scanner's report for the current stop."""
     stood: Pose | None = None
     """Pose of the robot at that stop, as the scanner reported it, or as it was observed before."""
+    jumped: bool = False
+    """True if the current item passed that stop's waits without time for them: somebody ordered it."""
     report_overdue: bool = False
     """True if no scanner report, with its pose, is expected any more."""
 
@@ -119,8 +122,7 @@ def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopI
     left = observed.place >= items.after
     pose = observed.stood if left else observed.pose
     if pose is None:
-        reason = "no pose of the vehicle at the stop"
-        return _unconfirmed(run, listed, None, reason) if left and observed.report_overdue else None
+        return _left_unseen(run, listed, observed) if left else None
     stop, wrong = listed.mission.stops[run.at], stop_error_text(pose, run, listed)
     if not wrong:
         return runs.reached(changed(run, leg=run.at), listed.mission, pose, deviation(pose, stop))
@@ -129,6 +131,14 @@ def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopI
     if observed.still or observed.place >= items.scan:
         return runs.failed(run, listed.mission, wrong)
     return None
+
+
+def _left_unseen(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+    """Complete a stop at which no pose was seen: skipped if the vehicle had no time to wait there."""
+    if observed.jumped:
+        return runs.skipped(changed(run, leg=run.at + 1), listed.mission, JUMPED)
+    reason = "no pose of the vehicle at the stop"
+    return _unconfirmed(run, listed, None, reason) if observed.report_overdue else None
 
 
 def _settled(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:

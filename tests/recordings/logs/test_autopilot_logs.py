@@ -175,3 +175,43 @@ def test_missions_that_were_sent_one_after_another_have_their_times(tmp_path: Pa
     assert [(upload.ns - BEGIN_NS, upload.items[0].x) for upload in log.uploads] == [
         (0, LAT + 9), (10**10, LAT + 9), (11 * 10**9, LAT + 18), (12 * 10**9, LAT + 18)
     ]  # fmt: skip
+
+
+def filtered_origin(path: Path) -> tuple[float, float]:
+    track = next(track for track in read_log(path).poses if track.source == "XKF1")
+    assert track.origin is not None
+    return track.origin.lat, track.origin.lon
+
+
+def test_the_filters_origin_is_not_home(tmp_path: Path) -> None:
+    """Home is logged after it, and lies where the vehicle was switched on."""
+    home = ("ORGN", (0, 1, LAT + 819, LON + 10))
+    first, *others = flash_rows()
+    assert filtered_origin(write_dataflash(tmp_path / "a.BIN", [first, home, *others], KINDS)) == (47.0, 8.0)
+    log = read_log(write_dataflash(tmp_path / "b.BIN", [home, *others], KINDS))
+    assert min(log.poses, key=lambda track: track.rank).source == "POS", "metres from an unknown origin"
+
+
+def test_an_origin_that_is_set_again_applies_from_then_on(tmp_path: Path) -> None:
+    rows = flash_rows()
+    moved = [("ORGN", (5_000_000, 0, LAT + 900, LON)), *rows[204:]]
+    log = read_log(write_dataflash(tmp_path / "a.BIN", [*rows[:204], *moved], KINDS))
+    track = next(track for track in log.poses if track.source == "XKF1")
+    assert track.xy[49, 1] == pytest.approx(4.9, abs=1e-6)
+    assert track.xy[50, 1] == pytest.approx(5.0 + 900 * 0.011131884502145034, abs=1e-6)
+
+
+def test_items_that_older_autopilots_log_when_they_begin_them_are_no_upload(tmp_path: Path) -> None:
+    """Before 4.6 the same CMD rows list a mission and tell of each item that is begun."""
+    rows = flash_rows()
+    listed = [
+        ("CMD", (0, 3, number, command, 1.0, 0.0, 0.0, 0.0, LAT, LON, 0.0, 3))
+        for number, command in ((0, 16), (1, 16), (2, 2000))
+    ]
+    begun = [("CMD", (us, 3, *row[1][2:])) for us, row in ((3_000_000, listed[1]), (4_000_000, listed[2]))]
+    log = read_log(write_dataflash(tmp_path / "a.BIN", [*listed, *begun, *rows[3:]], KINDS))
+    (upload,) = log.uploads
+    assert upload.complete and [item.command for item in upload.items] == [16, 2000]
+    assert [(remark.kind, remark.ns) for remark in log.remarks if remark.number is not None] == [
+        ("command", 3 * 10**9), ("trigger", 4 * 10**9)
+    ]  # fmt: skip

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from stopgo.bridge.link.clock import SimulatedClock
@@ -18,7 +21,7 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.run.events import Pose, Scanned, Unconfirmed
+from stopgo.mission.run.events import Pose, Scanned, Skipped
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
@@ -37,6 +40,13 @@ BEFORE_S, AFTER_S, STEP_S = 3.0, 60.0, 0.05
 """Before the order to go, from then on, and between two looks of the vehicle at its clock."""
 
 
+@dataclass(frozen=True)
+class FromVehicle:
+    """A message that is only in the log, as sent by the vehicle."""
+
+    message: Any
+
+
 def mission(**details: Any) -> Mission:
     """For a vehicle that drives as a real one, and so takes its time to stand still."""
     return msgspec.structs.replace(tour(**{"settle_s": 3.0, **details}), georeference=ORIGIN)
@@ -49,9 +59,18 @@ def rover_setting(folder: Path, faults: tuple[str, ...]) -> VehicleSetup:
 
 
 def logged(
-    path: Path, plan: Mission, *, faults: tuple[str, ...] = (), orders: dict[float, Any] | None = None
+    path: Path,
+    plan: Mission,
+    *,
+    faults: tuple[str, ...] = (),
+    orders: dict[float, Any] | None = None,
+    kept: Callable[[int, str], bool] = lambda ns, name: True,
 ) -> Path:
-    """A log of an ArduPilot Rover that is given a mission and drives it; `orders` by seconds from AUTO."""
+    """A log of an ArduPilot Rover that is given a mission and drives it; `orders` by seconds from AUTO.
+
+    `kept` decides which of its messages the station that logs receives, by time and name; an order may be
+    several messages.
+    """
     clock, rows = SimulatedClock(), list[tuple[int, int, Any]]()
     sent = translate(plan, "ardupilot", trigger="auto")
     vehicle = complete_vehicle(
@@ -62,6 +81,9 @@ def logged(
     )
 
     def say(message: Any) -> None:
+        if isinstance(message, FromVehicle):
+            rows.append((clock.now_ns(), ROVER, message.message))
+            return
         rows.append((clock.now_ns(), STATION, message))
         packed = dialect.MAVLink(None, srcSystem=STATION, srcComponent=190)
         vehicle.receive(packed.decode(bytearray(message.pack(packed))))
@@ -82,10 +104,12 @@ def logged(
     past = 0.0
     for at, order in sorted((orders or {}).items()):
         drive(at - past)
-        say(order)
+        for message in order if isinstance(order, tuple) else (order,):
+            say(message)
         past = at
     drive(AFTER_S - past)
-    return write_telemetry_log(path, rows)
+    heard = [row for row in rows if row[1] == STATION or kept(row[0], row[2].get_type())]
+    return write_telemetry_log(path, heard)
 
 
 def command(number: int, *params: float) -> Any:
@@ -148,16 +172,121 @@ def test_a_vehicle_that_was_stopped_and_sent_on_is_followed_through_it(tmp_path:
     ]
 
 
-def test_a_stop_that_the_station_jumped_over_is_no_scan(tmp_path: Path) -> None:
-    """And one to which the vehicle is sent back is."""
-    plan = mission()
+def item_of(plan: Mission, stop: str) -> int:
+    """Sequence number of a stop's waypoint on the vehicle."""
     sent = translate(plan, "ardupilot", trigger="auto")
-    third = next(place for place, one in enumerate(sent.placed) if (one.role, one.stop) == ("stop", "S3")) + 1
-    orders = {0.5: dialect.MAVLink_mission_set_current_message(1, 1, third)}
+    return next(place for place, one in enumerate(sent.placed) if (one.role, one.stop) == ("stop", stop)) + 1
+
+
+def test_a_stop_that_the_station_jumped_over_is_skipped_and_never_visited(tmp_path: Path) -> None:
+    """Whatever the tolerance: nobody waited there."""
+    plan = mission(tolerance_m=0.4)
+    orders = {0.5: dialect.MAVLink_mission_set_current_message(1, 1, item_of(plan, "S3"))}
     laid = replayed(logged(tmp_path / "auto.tlog", plan, orders=orders), plan)
     assert [event.stop for event in laid.run.events if isinstance(event, Scanned)] == ["S3"]
-    missed = [str(event.stop) for event in laid.run.events if isinstance(event, Unconfirmed)]
-    assert missed == ["S1", "S2"]
+    assert [event.stop for event in laid.run.events if isinstance(event, Skipped)] == ["S1", "S2"]
+    assert drive_verdict(laid).answer == "no"
+    assert "1 of 3 stops" in drive_verdict(laid).text
+
+
+def test_the_last_stop_skipped_by_order_is_no_visit(tmp_path: Path) -> None:
+    """With a return behind it: the vehicle is sent on while it is under way to the stop."""
+    plan = msgspec.structs.replace(mission(tolerance_m=0.4), return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0)))
+    sent = translate(plan, "ardupilot", trigger="auto")
+    home = next(place for place, one in enumerate(sent.placed) if one.role == "return") + 1
+    path = logged(tmp_path / "a.tlog", plan)
+    scans = [e.robot_ns for e in replayed(path, plan).run.events if isinstance(e, Scanned)]
+    begin = next(e.robot_ns for e in replayed(path, plan).run.events if type(e).__name__ == "Started")
+    orders = {(scans[1] - begin) / 1e9 + 4.0: dialect.MAVLink_mission_set_current_message(1, 1, home)}
+    laid = replayed(logged(tmp_path / "b.tlog", plan, orders=orders), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned", "scanned", "skipped"]
+    assert drive_verdict(laid).exit_code == 1
+
+
+def test_a_read_back_of_the_same_list_ends_no_run(tmp_path: Path) -> None:
+    """A station that restarts asks for the vehicle's list, and the vehicle drives on."""
+    plan = mission(tolerance_m=0.4)
+    path = logged(tmp_path / "a.tlog", plan, orders={12.0: read_back(plan), 25.0: read_back(plan)[:3]})
+    laid = replayed(path, plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
+    assert len(laid.log.uploads) == 1
+    assert drive_verdict(laid).exit_code == 0
+
+
+def read_back(plan: Mission) -> tuple[FromVehicle, ...]:
+    """The vehicle's answers to a station that reads its list."""
+    items = upload_of(translate(plan, "ardupilot", trigger="auto"))
+    answers = [
+        dialect.MAVLink_mission_item_int_message(
+            255, 190, number, item.frame, item.command, 0, 1, *item.params, item.x, item.y, item.z
+        )
+        for number, item in enumerate(items)
+    ]
+    count = dialect.MAVLink_mission_count_message(255, 190, len(items))
+    return tuple(FromVehicle(message) for message in (count, *answers))
+
+
+def test_the_same_mission_uploaded_again_in_mid_run_is_one_run(tmp_path: Path) -> None:
+    """A station sends it again, and sends the vehicle on from where it was."""
+    plan = mission(tolerance_m=0.4)
+    items = upload_of(translate(plan, "ardupilot", trigger="auto"))
+    again = tuple(
+        dialect.MAVLink_mission_item_int_message(
+            1, 1, number, item.frame, item.command, 0, 1, *item.params, item.x, item.y, item.z
+        )
+        for number, item in enumerate(items)
+    )
+    whole = logged(tmp_path / "a.tlog", plan)
+    first = next(e for e in replayed(whole, plan).run.events if isinstance(e, Scanned))
+    begin = next(e.robot_ns for e in replayed(whole, plan).run.events if type(e).__name__ == "Started")
+    at = (first.robot_ns - begin) / 1e9 + 1.5
+    orders = {
+        at: in_mode(HOLD_MODE),
+        at + 1.0: (dialect.MAVLink_mission_count_message(1, 1, len(items)), *again),
+        at + 2.0: (
+            dialect.MAVLink_mission_set_current_message(1, 1, item_of(plan, "S2")),
+            in_mode(AUTO_MODE),
+        ),
+    }
+    laid = replayed(logged(tmp_path / "b.tlog", plan, orders=orders), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
+    assert drive_verdict(laid).exit_code == 0
+
+
+@pytest.mark.parametrize("missing", ["ATTITUDE", "GPS_GLOBAL_ORIGIN", "MISSION_CURRENT"])
+def test_stops_whose_position_is_in_the_log_are_placed_by_it(tmp_path: Path, missing: str) -> None:
+    """Messages of one kind come every 8 s, or never; poses come ten times a second, and no camera's."""
+    plan = mission(tolerance_m=0.4)
+
+    def kept(ns: int, name: str) -> bool:
+        rare = missing == "MISSION_CURRENT" and ns % (8 * 10**9) < 2 * 10**8
+        return name != "CAMERA_IMAGE_CAPTURED" and (name != missing or rare)
+
+    laid = replayed(logged(tmp_path / "a.tlog", plan, kept=kept), plan)
+    assert not laid.inferred
+    assert [item.outcome for item in laid.comparison.stops] == ["unconfirmed"] * 3
+    assert all(0.05 < (item.deviation_m or 0.0) < 0.4 for item in laid.comparison.stops)
+
+
+def test_the_heartbeat_of_a_camera_is_not_the_vehicles(tmp_path: Path) -> None:
+    plan = mission(tolerance_m=0.4)
+    camera = FromVehicle(dialect.MAVLink_heartbeat_message(30, 8, 0, 0, 4, 3))
+    laid = replayed(logged(tmp_path / "a.tlog", plan, orders={3.0 + k: camera for k in range(20)}), plan)
+    assert told(laid.run.events).count("Paused") == 0
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
+
+
+def test_a_passed_stop_that_nothing_places_cannot_be_told(tmp_path: Path) -> None:
+    """The station hears nothing of the vehicle while it is at S2, and next of it on its way to S3."""
+    plan = mission(tolerance_m=0.4)
+    whole = replayed(logged(tmp_path / "a.tlog", plan), plan)
+    scans = {event.stop: event.robot_ns for event in whole.run.events if isinstance(event, Scanned)}
+    deaf = (scans["S1"] + 3 * 10**9, scans["S2"] + 2 * 10**9)
+    path = logged(tmp_path / "b.tlog", plan, kept=lambda ns, name: not deaf[0] < ns < deaf[1])
+    laid = replayed(path, plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned", "unconfirmed", "scanned"]
+    assert (drive_verdict(laid).answer, drive_verdict(laid).exit_code) == ("unknown", 3)
+    assert "S2" in drive_verdict(laid).text
 
 
 def test_a_log_with_another_mission_is_not_followed_as_ours(tmp_path: Path) -> None:

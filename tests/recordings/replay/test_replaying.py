@@ -259,3 +259,44 @@ def test_bad_options_are_refused_in_one_line(
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
+
+
+def parked_near(first_stop: tuple[float, float], *, beside_m: float) -> tuple[Drive, Mission]:
+    """A drive that stops beside its first stop, and parks at the start, nearer to the stop than the scan."""
+    back = ((MISSION.stops[-1].x, MISSION.stops[-1].y), (MISSION.start.x, MISSION.start.y))
+    stops = (changed(MISSION.stops[0], x=first_stop[0], y=first_stop[1]), *MISSION.stops[1:])
+    first = changed(stops[0], approach=((0.0, 0.0), first_stop))
+    second = changed(stops[1], approach=(first_stop, *stops[1].approach[1:]))
+    mission = sealed(changed(MISSION, stops=(first, second, *stops[2:]), return_=back))
+    drive = Drive(0.0, 0.0, 0.0)
+    drive.rows.append((0.0, 0.0, 0.0, 0.0))
+    for k, stop in enumerate(mission.stops):
+        ahead = beside_m if k == 0 else 0.0
+        for point in stop.approach[1:]:
+            drive.go((point[0] + ahead, point[1]), speed=1.0, turn_rate=1.0)
+        drive.turn(stop.heading, turn_rate=1.0)
+        drive.stay(14.0, k)
+    drive.go(back[-1], speed=1.0, turn_rate=1.0)
+    drive.stay(30.0)
+    return drive, mission
+
+
+def test_the_halt_for_parking_is_not_the_scan_at_a_stop_near_it() -> None:
+    drive, mission = parked_near((0.1, 0.0), beside_m=0.2)
+    found = replay(log_of(logged(drive)), mission, Placing(to_map=Transform(x=0.0, y=0.0, heading=0.0)))
+    first = found.comparison.stops[0]
+    assert first.deviation_m == pytest.approx(0.2, abs=0.01)
+    assert (first.arrived_s or 0.0) < 10.0
+
+
+def test_the_halt_with_the_scan_counts_and_not_one_after_it() -> None:
+    drive = driven(MISSION, Odd(repeated=frozenset({4}), beside_m=0.01))
+    first, _ = (halt for halt in drive.halts if halt.stop == 4)
+    track = logged(drive)
+    trigger = Remark(
+        int(track.ns[0] + (first.begin_s + 3.0) * 1e9), "trigger", "IMAGE_START_CAPTURE (2000)", 9
+    )
+    found = replay(log_of(track, remarks=(trigger,)), MISSION, FIRST)
+    stop = found.comparison.stops[4]
+    assert stop.arrived_s == pytest.approx(first.begin_s, abs=0.3)
+    assert "IMAGE_START_CAPTURE" in stop.reason

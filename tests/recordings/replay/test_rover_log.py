@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from stopgo.recordings.logs import read_log
+from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
@@ -85,10 +86,13 @@ def test_true_errors_are_those_of_the_simulators_own_position(
 
 
 def test_offsets_are_those_of_the_vehicles_own_filter(found: Replay, messages: dict[str, list[Any]]) -> None:
+    home = messages["CMD"][-16]
+    (origin,) = [row for row in messages["ORGN"] if row.Type == 0]
+    east, north = metres(origin.Lat, origin.Lng, home)
     for k, stop in enumerate(found.mission.stops):
         halt = found.matches[k].standstill
         inside = [
-            (m.PE, m.PN)
+            (m.PE + east, m.PN + north)
             for m in messages["XKF1"]
             if m.C == 0 and halt.begin_ns <= m.TimeUS * 1000 <= halt.end_ns
         ]
@@ -96,3 +100,13 @@ def test_offsets_are_those_of_the_vehicles_own_filter(found: Replay, messages: d
         assert found.comparison.stops[k].deviation_m == pytest.approx(
             math.dist((x, y), (stop.x, stop.y)), abs=1e-3
         )
+
+
+def test_the_filter_is_right_about_where_it_stood(found: Replay) -> None:
+    """A simulated receiver errs by little: what it says and the truth differ by far less than the offsets."""
+    for k, item in enumerate(found.comparison.stops):
+        assert item.deviation_m == pytest.approx(found.true_offset_m(k), abs=0.01)
+
+
+def test_triggers_are_told_in_the_verdict(found: Replay) -> None:
+    assert "trigger of the scanner at 5 of 5 stops" in drive_verdict(found).text

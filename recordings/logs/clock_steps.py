@@ -1,0 +1,80 @@
+"""Times of a log whose clock was set while it was written: the order of writing decides.
+
+A stamp that alone lies far from both neighbours is wrong, and its pose is left out. From a step back on, the
+times count on from the last one before it. A step forward may be a gap, unless the robot drove through it
+without moving farther than from one pose to the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+
+STEP_NS = 10**9
+"""Least step; poses that are out of order by less are only sorted."""
+MOST_STEPS = 20
+"""Limit of steps; with more, the log is out of order, and no clock was set."""
+ALONE_NS, ALONE_USUAL = 60 * 10**9, 1000
+"""Least distance of a wrong stamp from its neighbours, also as a multiple of the usual interval."""
+DRIVES_M_S = 0.1
+LEAST_POSES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class MendedTimes:
+    """Times in the order of writing (n,)."""
+
+    ns: IntArray
+    kept: BoolArray
+    """False for poses whose stamp is wrong (n,)."""
+    lines: tuple[str, ...]
+    """Steps and wrong stamps, one line each."""
+
+
+def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
+    """Return the times of poses (n, 2) without the steps of their clock."""
+    if len(ns) < LEAST_POSES:
+        return MendedTimes(ns, np.ones(len(ns), bool), ())
+    usual = max(1, int(np.median(np.abs(np.diff(ns)))))
+    kept = ~_alone(ns, max(ALONE_NS, ALONE_USUAL * usual))
+    wrong = int((~kept).sum())
+    lines = [f"{wrong} of {len(ns)} poses have a time far from that of their neighbours; left out"]
+    times, places = ns[kept].copy(), xy[kept]
+    step = np.diff(times)
+    back = np.flatnonzero(step < -STEP_NS)
+    if len(back) > MOST_STEPS:
+        return MendedTimes(ns, kept, tuple(lines[: bool(wrong)]))
+    steps = sorted([*back.tolist(), *_forward_steps(step, places, usual).tolist()])
+    lines += [
+        f"the clock steps {'back' if step[k] < 0 else 'forward'} by {abs(step[k]) / 1e9:.1f} s "
+        f"after pose {k + 1} of {len(times)}; times count on in the order of writing"
+        for k in steps
+    ]
+    for k in steps:
+        times[k + 1 :] += usual - step[k]
+    mended = ns.copy()
+    mended[kept] = times
+    return MendedTimes(mended, kept, tuple(lines[0 if wrong else 1 :]))
+
+
+def _alone(ns: IntArray, far_ns: int) -> BoolArray:
+    """True for stamps far from both neighbours, which are near each other; at an end, from the next two."""
+    before = np.concatenate([ns[2:3], ns[:-1]])
+    after = np.concatenate([ns[1:], ns[-3:-2]])
+    alone = (np.abs(ns - before) > far_ns) & (np.abs(ns - after) > far_ns) & (np.abs(after - before) < far_ns)
+    return np.asarray(alone, bool)
+
+
+def _forward_steps(step: IntArray, xy: FloatArray, usual: int) -> IntArray:
+    """Return the steps forward through which the robot drove on as from one pose to the next."""
+    moved = np.hypot(*np.diff(xy, axis=0).T)
+    inner = np.flatnonzero(step > max(STEP_NS, 10 * usual))
+    inner = inner[(inner > 0) & (inner < len(step) - 1)]
+    speeds = moved / np.maximum(step, 1)
+    speed = np.minimum(speeds[inner - 1], speeds[inner + 1])
+    expected = speed * usual
+    drives = speed * 1e9 > DRIVES_M_S
+    return np.asarray(inner[drives & (np.abs(moved[inner] - expected) < expected / 2)])
