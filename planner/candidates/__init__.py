@@ -126,10 +126,15 @@ def _check_required(space: NavigableSpace, proposals: Proposals, at: IntArray, c
 
 
 def _chosen_part(space: NavigableSpace, proposals: Proposals, reach: Reach, at: IntArray) -> int:
-    """Number of the start's part, else of the largest with candidates in rooms; unnamed floor comes last."""
+    """Number of the start's part, else of the largest with candidates in rooms; unnamed floor comes last.
+
+    A robot's map names no rooms, and only some pieces of it show passages: there the largest counts.
+    """
     parts = set(at[at >= 0].tolist())
     if space.settings.start is not None:
         return _part_of_start(space, reach, parts)
+    if space.floor.on_robots_map:
+        return min(parts)
     in_room = np.array([space.rooms[k].room is not None for k in proposals.room])
     return min(set(at[(at >= 0) & in_room].tolist()) or parts)
 

@@ -17,13 +17,14 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import bounds
-from stopgo.planner.floors.drawing import METRES, open_drawing
+from stopgo.planner.floors.drawing import open_drawing
 from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
 from stopgo.planner.floors.linework import Derived, as_room_name, completed, derived
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
+from stopgo.planner.floors.units.unit_lengths import METRES
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:

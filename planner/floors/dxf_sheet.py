@@ -11,18 +11,15 @@ from ezdxf.document import Drawing
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
-from stopgo.mission.geometry import FloatArray
-from stopgo.planner.floors.drawing import given_unit, metres_per_unit
 from stopgo.planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
 from stopgo.planner.floors.drawn_shapes import Shape, shapes_of
 from stopgo.planner.floors.layers import Layers, is_layered, missing_in
-from stopgo.planner.floors.linework.swings import radii_in
 from stopgo.planner.floors.reader import FloorOptions
-from stopgo.planner.floors.strokes import Stroke, Word, sketch, strokes_of
+from stopgo.planner.floors.strokes import Stroke, Word, strokes_of
+from stopgo.planner.floors.units import unit_of
 
 _MARGIN = 1.0
 """A stroke this near to a drawing, in metres, belongs to it."""
-_HOUSE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +60,7 @@ def sheet_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> DxfShe
         shapes, odd = shapes_of(drawing, source=source, layers=layers)
         odd = [*odd, *_by_name(shapes)]
     outlined = "floor" in own
-    scale, odd_units = scale_of(drawing, shapes, options, outlined=outlined, source=source)
+    scale, odd_units = unit_of(drawing, shapes, options.units, outlined=outlined, source=source)
     strokes, words, odd_strokes = strokes_of(shapes, scale=scale, chord=options.d_dis)
     sheet = DxfSheet(
         layers, shapes, scale, strokes, words, [*odd_units, *odd, *odd_strokes], layered, outlined
@@ -81,52 +78,6 @@ def _by_name(shapes: Sequence[Shape]) -> list[Finding]:
         for layer, role, why in sorted(taken)
         if why not in ("its name", "as given", "by the map")
     ]
-
-
-def scale_of(
-    drawing: Drawing, shapes: Sequence[Shape], options: FloorOptions, *, outlined: bool, source: Path
-) -> tuple[float, list[Finding]]:
-    """Metres per drawing unit: as given, else by the header, the floor's size and the doors' widths."""
-    points = _extent(shapes, "floor" if outlined else "walls")
-    if options.units is not None:
-        return given_unit(options.units, points, source=source)
-    widths = _door_widths(shapes, outlined=outlined)
-    return metres_per_unit(drawing, floor=points, doors=widths, leaves=not outlined)
-
-
-def _extent(shapes: Sequence[Shape], role: str) -> FloatArray:
-    drawn = [shape for shape in shapes if not shape.is_text]
-    sketched = sketch(shape for shape in drawn if shape.role == role)
-    if not sketched and role == "walls":
-        sketched = sketch(drawn)
-    return np.vstack(sketched) if sketched else np.empty((0, 2))
-
-
-def _door_widths(shapes: Sequence[Shape], *, outlined: bool) -> list[float]:
-    """Lengths of lines across doors, or of swinging leaves, in drawing units."""
-    if outlined:
-        lines = sketch(
-            shape for shape in shapes if shape.role == "doors" and shape.entity.dxftype() == "LINE"
-        )
-        widths = [float(np.hypot(*(line[-1] - line[0]))) for line in lines]
-        return [width for width in widths if width > 0]
-    for roles in (("doors", "openings"), ("walls", "other")):
-        own = [shape for shape in shapes if shape.role in roles and not (shape.is_text or shape.is_note)]
-        radii = _radii(own)
-        if radii:
-            return radii
-    return []
-
-
-def _radii(shapes: Sequence[Shape]) -> list[float]:
-    """Radii of quarter arcs in drawing units; searched as if the drawing had the size of a house."""
-    sketched = sketch(shapes)
-    size = float(np.ptp(np.vstack(sketched), axis=0).max()) if sketched else 0.0
-    if not size:
-        return []
-    scale = _HOUSE / size
-    strokes, _, _ = strokes_of(shapes, scale=scale, chord=1e9)
-    return [radius / scale for radius in radii_in(stroke.points for stroke in strokes)]
 
 
 def _in_region(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfSheet:

@@ -84,7 +84,7 @@ def strokes_of(
     for shape in shapes:
         try:
             if shape.is_text or shape.is_note:
-                words.append(_word(shape, scale=scale))
+                words.append(word_of(shape, scale=scale))
             else:
                 strokes += _strokes(shape, scale=scale, chord=chord)
                 odd += _width(shape, scale=scale)
@@ -96,7 +96,7 @@ def strokes_of(
 
 
 def _strokes(shape: Shape, *, scale: float, chord: float) -> list[Stroke]:
-    stretch = scale * _stretch(shape.matrix)
+    stretch = scale * stretch_of(shape.matrix)
     outside = shape.role in KINDS
     fineness = Fineness(chord=chord / stretch, sagitta=SAGITTA / stretch, outside=outside)
     strokes = [
@@ -157,8 +157,8 @@ def _flat(points: FloatArray, matrix: Matrix44 | None) -> FloatArray:
     return np.array(moved, dtype=np.float64).reshape(-1, 3)[:, :2]
 
 
-def _stretch(matrix: Matrix44 | None) -> float:
-    """The greatest factor by which a placement lengthens anything in plan."""
+def stretch_of(matrix: Matrix44 | None) -> float:
+    """Return the greatest factor by which a placement lengthens anything in plan."""
     if matrix is None:
         return 1.0
     axes = (Vec3(1, 0, 0), Vec3(0, 1, 0))
@@ -168,7 +168,8 @@ def _stretch(matrix: Matrix44 | None) -> float:
     return stretch
 
 
-def _word(shape: Shape, *, scale: float) -> Word:
+def word_of(shape: Shape, *, scale: float) -> Word:
+    """The text of a shape, in metres; without text for a note."""
     if shape.is_note:
         return Word("", shape.layer, shape.role)
     entity = shape.entity

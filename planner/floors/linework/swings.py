@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import FloatArray
 
@@ -17,6 +18,9 @@ _FLAT = np.radians(0.3)
 """A polyline that turns less than this at a point is straight there."""
 _FACET = np.radians(31)
 """A facet of a swing turns by no more than this."""
+_SLACK = 0.12
+"""A leaf begins and ends within this fraction of its width from the hinge and from the arc's end."""
+_ONWARD = np.cos(np.radians(8))
 _EVEN = 0.06
 """Facets of one arc differ in length and turn by no more than this share."""
 
@@ -36,22 +40,91 @@ class Swing:
         return float(np.hypot(*(self.ends[0] - self.hinge)))
 
 
-def swings_of(lines: Iterable[FloatArray]) -> list[Swing]:
-    """Every swing among polylines (n, 2), in their order; an arc drawn twice is one swing."""
+def swings_of(
+    lines: Iterable[FloatArray], *, width: tuple[float, float] = LEAF, drawn_leaf: bool = False
+) -> list[Swing]:
+    """Every swing among polylines (n, 2), in their order; an arc drawn twice is one swing.
+
+    Parameters
+    ----------
+    width
+        Least and greatest radius.
+    drawn_leaf
+        True if only swings count whose leaf is drawn.
+    """
     found: dict[tuple[float, ...], Swing] = {}
-    for line in lines:
-        for swing in _in_line(line):
-            ends = sorted(map(tuple, np.round(swing.ends, 2).tolist()))
-            found.setdefault((*np.round(swing.hinge, 2).tolist(), *ends[0], *ends[1]), swing)
+    for _, swing in swings_with_lines(list(lines), width=width, drawn_leaf=drawn_leaf):
+        ends = sorted(map(tuple, np.round(swing.ends, 2).tolist()))
+        found.setdefault((*np.round(swing.hinge, 2).tolist(), *ends[0], *ends[1]), swing)
     return list(found.values())
 
 
-def radii_in(lines: Iterable[FloatArray]) -> list[float]:
-    """Return the radii of all quarter arcs in any unit, which show the length of the unit."""
-    return [swing.radius for line in lines for swing in _in_line(line, width=(0.0, np.inf))]
+def swings_with_lines(
+    lines: Sequence[FloatArray], *, width: tuple[float, float] = LEAF, drawn_leaf: bool = False
+) -> list[tuple[FloatArray, Swing]]:
+    """Every swing with the polyline that it is part of.
+
+    An arc that lines go on from at both ends, or that another one runs around, is a round wall or a rounded
+    corner, unless a leaf is drawn from its centre to one of its ends.
+    """
+    found = [(line, swing) for line in lines for swing in _in_line(line, width=width)]
+    if not found:
+        return []
+    round_ = _RoundLines(lines, [swing for _, swing in found])
+    return [
+        (line, swing)
+        for line, swing in found
+        if round_.has_leaf(swing) or not (drawn_leaf or round_.goes_on(swing) or round_.is_double(swing))
+    ]
 
 
-def _in_line(line: FloatArray, *, width: tuple[float, float] = LEAF) -> Iterator[Swing]:
+class _RoundLines:
+    """Asks what is drawn at the centre and the ends of arcs."""
+
+    def __init__(self, lines: Sequence[FloatArray], swings: Sequence[Swing]) -> None:
+        pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
+        segments = np.concatenate(pieces)
+        self._ends = np.concatenate([segments, segments[:, ::-1]])
+        """Every segment from each of its ends (n, 2, 2)."""
+        self._tree = cKDTree(self._ends[:, 0])
+        self._hinges = cKDTree(np.array([swing.hinge for swing in swings]))
+        self._swings = swings
+
+    def has_leaf(self, swing: Swing) -> bool:
+        """True if a straight line runs from the hinge to one of the ends."""
+        near = _SLACK * swing.radius
+        from_hinge = self._ends[self._tree.query_ball_point(swing.hinge, near)]
+        return any(bool((np.hypot(*(from_hinge[:, 1] - end).T) <= near).any()) for end in swing.ends)
+
+    def goes_on(self, swing: Swing) -> bool:
+        """True if at both ends a line leaves in the direction of the arc."""
+        return all(self._leaves(swing, k) for k in (0, 1))
+
+    def _leaves(self, swing: Swing, k: int) -> bool:
+        end, other = swing.ends[k], swing.ends[1 - k]
+        arm = (end - swing.hinge) / swing.radius
+        tangent = np.array([-arm[1], arm[0]])
+        tangent = -tangent if tangent @ (other - end) > 0 else tangent
+        steps = self._ends[self._tree.query_ball_point(end, 0.02 * swing.radius)]
+        away = steps[:, 1] - steps[:, 0]
+        length = np.hypot(*away.T)
+        on = (length >= 0.1 * swing.radius) & (away @ tangent >= _ONWARD * length)
+        return bool(on.any())
+
+    def is_double(self, swing: Swing) -> bool:
+        """True if another arc of nearly the same radius has the same centre and directions."""
+        close = self._hinges.query_ball_point(swing.hinge, 0.02 * swing.radius)
+        return any(_runs_around(swing, self._swings[k]) for k in close)
+
+
+def _runs_around(one: Swing, other: Swing) -> bool:
+    if not 0.01 < abs(one.radius - other.radius) / one.radius < 0.6:
+        return False
+    arms = [(swing.ends - swing.hinge) / swing.radius for swing in (one, other)]
+    return any(np.abs(arms[0] - turned).max() < 0.1 for turned in (arms[1], arms[1][::-1]))
+
+
+def _in_line(line: FloatArray, *, width: tuple[float, float]) -> Iterator[Swing]:
     steps = np.diff(line, axis=0)
     lengths = np.hypot(*steps.T)
     steps, lengths = steps[lengths > 0], lengths[lengths > 0]

@@ -10,7 +10,7 @@ import shapely
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.linework.groups import groups_of
-from stopgo.planner.floors.linework.swings import Leaf, Swing, paired, swings_of
+from stopgo.planner.floors.linework.swings import Leaf, Swing, paired, swings_of, swings_with_lines
 from stopgo.planner.floors.linework.walls import SolidWalls, caps_of
 from stopgo.planner.floors.rings import Region
 
@@ -90,7 +90,7 @@ def gaps_of(
 
 def without_doors(lines: Sequence[FloatArray]) -> tuple[list[FloatArray], list[FloatArray]]:
     """The lines of walls without door swings that were drawn among them, and these with their leaves."""
-    swings = [(line, swing) for line in lines for swing in swings_of([line])]
+    swings = swings_with_lines(lines)
     if not swings:
         return list(lines), []
     drawn = {id(line) for line, _ in swings}

@@ -14,7 +14,14 @@ from stopgo.planner.floors.robot_map.grey_picture import GreyPicture
 
 FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 _KNOWN = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
-_MODES = ("trinary", "scale", "raw")
+_WRITTEN_UNKNOWN: dict[str, tuple[int, ...]] = {"trinary": (205,), "scale": (127, 128, 205), "raw": ()}
+"""Grey values that map savers write for unknown cells, by mode.
+
+Thresholds cannot tell them: 205 is a probability of 0.196, which the free_thresh of 0.25 of older maps
+takes for free. Trinary maps have it for nothing else, and no whole percent gives it in scale. A scale map
+saved as PGM loses its transparency, and leaves half grey. Raw values above 100 are unknown in any case.
+"""
+_MODES = tuple(_WRITTEN_UNKNOWN)
 
 
 @dataclass(frozen=True)
@@ -34,12 +41,14 @@ class MapDescription:
     def cells(self, picture: GreyPicture) -> NDArray[np.uint8]:
         """FREE, UNKNOWN or OCCUPIED for each pixel (rows, columns), the first row at the bottom.
 
+        Unknown cells are recognised by the value that map savers write, whatever the thresholds are.
         Values between free and occupied of `scale` and `raw` are unknown: not drivable and not a target.
         """
         grey = picture.grey.astype(np.float64)
-        known = picture.opaque
+        written = [255 - value if self.negate else value for value in _WRITTEN_UNKNOWN[self.mode]]
+        known = picture.opaque & ~np.isin(picture.grey, written)
         if self.mode == "raw":
-            share, known = grey / 100.0, grey <= 100
+            share, known = grey / 100.0, known & (grey <= 100)
         else:
             share = grey / 255.0 if self.negate else 1.0 - grey / 255.0
         cells = np.full(grey.shape, UNKNOWN, dtype=np.uint8)

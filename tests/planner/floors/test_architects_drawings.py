@@ -199,6 +199,26 @@ def test_a_wrong_unit_is_found_by_the_doors(tmp_path: Path, header: int, unit: f
     assert codes(floor).count("units_wrong") + codes(floor).count("units_missing") == 1
 
 
+def test_round_corners_and_quarter_round_walls_are_walls_and_no_doors(tmp_path: Path) -> None:
+    """A hall of 12 by 8 m with a corner of 1.2 m radius and one of 3 m, in double lines."""
+    drawing = new_drawing()
+    model = drawing.modelspace()
+    for out in (0.0, 0.2):
+        for a, b in (
+            ((0 - out, 3), (0 - out, 8 - 1.2)),
+            ((1.2, 8 + out), (12 + out, 8 + out)),
+            ((12 + out, 8 + out), (12 + out, 0 - out)),
+            ((12 + out, 0 - out), (3, 0 - out)),
+        ):
+            model.add_line(a, b, dxfattribs={"layer": "A-WALL"})
+        model.add_arc((1.2, 6.8), 1.2 + out, 90, 180, dxfattribs={"layer": "A-WALL"})
+        model.add_arc((3, 3), 3 + out, 180, 270, dxfattribs={"layer": "A-WALL"})
+    floor = read(drawing, tmp_path)
+    cut = (1 - math.pi / 4) * (1.4**2 + 3.2**2)
+    assert floor.area == pytest.approx(12.4 * 8.4 - cut, abs=0.1)
+    assert not floor.openings
+
+
 def test_a_unit_that_is_told_is_taken_and_an_absurd_one_refused(tmp_path: Path) -> None:
     drawing = new_drawing(0)
     flat(drawing.modelspace(), unit=100)

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 from ezdxf.layouts import Modelspace
 from floor_drawings import Read, codes, rectangle
+from unit_drawings import CODES, EVIDENCE, house, rescaled, verdict
 
+from stopgo.mission.errors import InputError
+from stopgo.planner.floors.linework.swings import swings_of
+from stopgo.planner.floors.units.unit_evidence import area_in, length_in
+
+DATA = Path(__file__).parents[4] / "shared" / "data"
+real = pytest.mark.skipif(not DATA.is_dir(), reason=f"the real inputs are not in {DATA}")
+DECISIVE = ("header", "header and round wall", "dimensions", "areas")
+TELLING = ("doors", "doors and round wall", "bare dimensions", "wrong header and dimensions")
 UNITS = {1: 1 / 0.0254, 2: 1 / 0.3048, 4: 1000.0, 5: 100.0, 6: 1.0, 14: 10.0}
 
 
@@ -20,11 +32,101 @@ def test_every_unit_gives_the_same_floor(read: Read, units: int) -> None:
     assert plan.findings == ()
 
 
-@pytest.mark.parametrize(("size", "name"), [(1.0, "metre"), (1000.0, "millimetre"), (100.0, "centimetre")])
-def test_a_missing_unit_is_read_from_the_floors_size(read: Read, size: float, name: str) -> None:
-    plan = read(nothing, units=0, size=size)
-    assert plan.area == pytest.approx(80) or name == "centimetre"
+def test_a_missing_unit_is_read_from_the_floors_size(read: Read) -> None:
+    """10 by 8 units are no building in any other unit that drawings have."""
+    plan = read(nothing, units=0, size=1.0)
+    assert plan.area == pytest.approx(80)
     assert codes(plan) == ["units_missing"]
+
+
+@pytest.mark.parametrize(
+    ("size", "says"),
+    [
+        (1000.0, r"--units mm \(10 x 8 m, \d+% probable\) or --units cm \(100 x 80 m"),
+        (100.0, r"--units in \(25.4 x 20.3 m, \d+% probable\) or --units cm \(10 x 8 m"),
+    ],
+)
+def test_a_missing_unit_that_the_size_leaves_open_is_asked_for(read: Read, size: float, says: str) -> None:
+    with pytest.raises(InputError, match=f"the unit is not certain .the header names no unit.; give {says}"):
+        read(nothing, units=0, size=size)
+
+
+@pytest.mark.parametrize("size", [1000.0, 100.0, 1 / 0.0254])
+def test_a_missing_unit_is_read_from_doors(read: Read, size: float) -> None:
+    def draw(model: Modelspace) -> None:
+        for k in (0, 2, 4):
+            model.add_line((k * size, 0), ((k + 0.9) * size, 0), dxfattribs={"layer": "DOORS"})
+
+    plan = read(draw, units=0, size=size)
+    assert plan.area == pytest.approx(80)
+    assert "units_missing" in codes(plan)
+
+
+def test_a_header_of_miles_is_a_unit_and_doubted(read: Read) -> None:
+    plan = read(nothing, units=3, size=1.0)
+    assert plan.area == pytest.approx(80)
+    assert codes(plan) == ["units_wrong"]
+    assert "the header says mile, which makes the floor 1.609e+04 m across" in plan.findings[0].message
+
+
+def test_a_header_of_millimetres_that_makes_a_house_4_cm_wide_is_doubted(read: Read) -> None:
+    with pytest.raises(InputError, match=r"the header says millimetre.; give --units m \(40 x 32 m"):
+        read(nothing, units=4, size=4.0)
+
+
+@pytest.mark.parametrize("kind", EVIDENCE)
+def test_no_unit_is_believed_that_is_wrong(tmp_path: Path, kind: str) -> None:
+    """Six units; evidence that decides is believed, and only where too little is drawn the user is asked."""
+    drawn = [verdict(house(seed, code, kind), code, tmp_path / "a.dxf") for seed in (1, 2) for code in CODES]
+    assert "wrong" not in drawn
+    asked = drawn.count("asked")
+    assert asked <= (0 if kind in DECISIVE else 3 if kind in TELLING else len(drawn))
+
+
+@real
+@pytest.mark.parametrize("kind", ["header", "bare", "no doors"])
+@pytest.mark.parametrize("name", ["duplex-l1", "fzk-haus-eg"])
+def test_no_unit_of_a_real_floor_is_believed_that_is_wrong(tmp_path: Path, name: str, kind: str) -> None:
+    path = DATA / f"layered/{name}.dxf"
+    drawn = [verdict(rescaled(path, code, kind), code, tmp_path / "a.dxf") for code in CODES]
+    assert "wrong" not in drawn
+    assert drawn.count("asked") <= {"header": 0, "bare": 1}.get(kind, len(drawn))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("12'-6 1/2\"", (150.5, "in", 0)),
+        ("5' 3\"", (63.0, "in", 0)),
+        ("7'", (7.0, "ft", 0)),
+        ("450 cm", (450.0, "cm", 0)),
+        ("4,50", (4.5, None, 2)),
+        ("2700mm", (2700.0, "mm", 0)),
+        ("R 30", None),
+        ("", None),
+    ],
+)
+def test_a_dimensions_text_is_a_number_and_its_unit(text: str, says: tuple | None) -> None:
+    assert length_in(text) == says
+
+
+def test_areas_written_in_rooms_are_read_in_square_metres_and_feet() -> None:
+    assert area_in("Kitchen 30,5 m²") == 30.5
+    assert area_in("100 sq ft") == pytest.approx(9.29, abs=0.01)
+    assert area_in("Room 12") is None
+    assert area_in("12 mm") is None
+
+
+def test_a_door_swing_has_a_leaf_or_ends_at_jambs_and_a_round_corner_has_neither() -> None:
+    arc = np.array([(np.cos(t), np.sin(t)) for t in np.linspace(0, np.pi / 2, 13)])
+    on = [np.array([(1.0, -3.0), (1.0, 0.0)]), np.array([(0.0, 1.0), (-3.0, 1.0)])]
+    leaf = np.array([(0.0, 0.0), (1.0, 0.0)])
+    assert len(swings_of([arc])) == 1
+    assert swings_of([arc, *on]) == []
+    assert len(swings_of([arc, *on, leaf])) == 1
+    assert swings_of([np.vstack((on[0][:1], arc, on[1][1:]))]) == []
+    assert swings_of([arc, arc * 1.2]) == []
+    assert swings_of([arc], drawn_leaf=True) == []
 
 
 def test_doors_tell_centimetres_from_millimetres(read: Read) -> None:

@@ -140,6 +140,73 @@ def test_the_unknown_is_no_floor_and_a_lone_unknown_cell_is_noise(tmp_path: Path
     assert read_floor(map_in(tmp_path, cells)).area == pytest.approx(9.6 * 5.4 - 1.0)
 
 
+THRESHOLDS = ("free_thresh: 0.196", "free_thresh: 0.25", "free_thresh: 0.45\noccupied_thresh: 0.46")
+"""Nav2 since June 2025, Nav2 before, and a person's own."""
+
+
+def saved(cells: Grid, mode: str) -> tuple[Grid, Grid | None]:
+    """The picture of a map as map_saver writes it, and its transparency if the mode has one."""
+    if mode == "raw":
+        return np.select([cells == FREE, cells == WALL], [0, 100], 255).astype(np.uint8), None
+    if mode == "scale":
+        grey = np.select([cells == FREE, cells == WALL], [255, 0], 127).astype(np.uint8)
+        return grey, np.where(cells == UNKNOWN, 0, 255).astype(np.uint8)
+    return cells, None
+
+
+def with_alpha(grey: Grid, alpha: Grid) -> bytes:
+    """A PNG of grey and transparency, its rows unfiltered."""
+    plain = png(np.stack([grey, alpha], axis=2).reshape(len(grey), -1))
+    header = struct.pack(">IIBBBBB", grey.shape[1], grey.shape[0], 8, 4, 0, 0, 0)
+    chunk = struct.pack(">I", len(header)) + b"IHDR" + header
+    return plain[:8] + chunk + struct.pack(">I", zlib.crc32(b"IHDR" + header)) + plain[33:]
+
+
+@pytest.mark.parametrize("thresholds", THRESHOLDS)
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+def test_unknown_cells_are_known_by_their_value_whatever_the_thresholds(
+    tmp_path: Path, mode: str, thresholds: str
+) -> None:
+    cells = two_rooms()
+    grey, alpha = saved(cells, mode)
+    more = f"mode: {mode}\noccupied_thresh: 0.65\n{thresholds}"
+    images = [pgm(grey)] if alpha is None else [pgm(grey), with_alpha(grey, alpha)]
+    for image in images:
+        path = map_in(tmp_path, grey, image=image, more=more)
+        assert read_floor(path).area == pytest.approx(9.6 * 5.4)
+        share = np.count_nonzero(cells == UNKNOWN) / cells.size
+        assert survey_floor(path).ignored[0] == f"13008 unknown cells ({share:.0%}) are not floor"
+
+
+def test_a_negated_map_has_its_unknown_negated(tmp_path: Path) -> None:
+    swapped = (255 - two_rooms().astype(int)).astype(np.uint8)
+    path = map_in(tmp_path, swapped, more="free_thresh: 0.25")
+    path.write_text(path.read_text().replace("negate: 0", "negate: 1"))
+    assert read_floor(path).area == pytest.approx(9.6 * 5.4)
+
+
+def two_pieces() -> Grid:
+    """The two rooms with their passage, and apart from them a hall of 11 by 6 m without any."""
+    hall = np.full((140, 260), UNKNOWN, dtype=np.uint8)
+    hall[6:-6, 16:-16] = WALL
+    hall[10:-10, 20:-20] = FREE
+    rooms = two_rooms()
+    wide = np.full((len(hall) + len(rooms), 260), UNKNOWN, dtype=np.uint8)
+    wide[: len(rooms), : rooms.shape[1]] = rooms
+    wide[len(rooms) :] = hall
+    return wide
+
+
+def test_the_largest_piece_of_a_map_is_planned_or_that_of_the_start(tmp_path: Path) -> None:
+    floor = read_floor(map_in(tmp_path, two_pieces()))
+    assert floor.rooms
+    largest = plan(floor, Settings()).first
+    assert largest.figures.reached_m2 == pytest.approx(11 * 6, rel=0.15)
+    assert all(stop.y < 3.0 + 7.0 for stop in largest.mission.stops)
+    started = plan(floor, Settings(start=(1.0, 12.5, 0.0))).first
+    assert started.figures.reached_m2 == pytest.approx(9.2 * 5, rel=0.15)
+
+
 def test_a_few_occupied_cells_are_an_obstacle_and_no_wall(tmp_path: Path) -> None:
     cells = two_rooms().copy()
     cells[70, 150] = cells[90, 60] = WALL

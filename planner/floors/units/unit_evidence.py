@@ -1,0 +1,288 @@
+"""Evidence of the length of a drawing's unit: measures of drawn objects in drawing units.
+
+Door leaves, thickness of walls, heights of texts, texts of dimensions, and areas written in rooms.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from ezdxf.document import Drawing
+from ezdxf.entities import DXFEntity
+
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.drawing import BROKEN_INPUT
+from stopgo.planner.floors.drawn_shapes import Shape
+from stopgo.planner.floors.linework.swings import swings_of
+from stopgo.planner.floors.strokes import sketch, stretch_of, strokes_of, word_of
+
+_HOUSE = 30.0
+"""Curves are cut as if the drawing had this size in metres."""
+_MOST = 3000
+"""Walls' lines that are compared with one another: the longest."""
+_SLIM = 25.0
+"""Walls' faces are nearer to each other than this fraction of the drawing; lines of rooms are not."""
+_ROOM_ROLES = ("rooms", "walls", "floor", "names", "other")
+_LINEAR = (0, 1, 6)
+"""Types of dimensions that measure a length: linear, aligned, ordinate."""
+
+FOOT = 0.3048
+LENGTHS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": FOOT}
+_SUFFIX = {"MM": "mm", "CM": "cm", "M": "m", "IN": "in", '"': "in", "FT": "ft", "'": "ft"}
+_NUMBER = r"(\d+(?:[.,]\d+)?)"
+_PLAIN = re.compile(rf"^\s*{_NUMBER}\s*(MM|CM|M|IN|FT|\"|')?\s*$", re.IGNORECASE)
+_FEET = re.compile(rf"^\s*(\d+)'\s*-?\s*(?:{_NUMBER}(?:\s+(\d+)/(\d+))?\s*\")?\s*$")
+_AREA = re.compile(
+    rf"{_NUMBER}\s*(m2|m²|m\^2|qm|sqm|sq\.?\s?m|sq\.?\s?ft|sf|ft2|ft²)(?![a-z0-9])", re.IGNORECASE
+)
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dimension: the number it shows, in which unit if it says so, and the length it measures."""
+
+    shown: float
+    unit: str | None
+    decimals: int
+    measured: float
+    """In drawing units."""
+
+
+@dataclass(frozen=True)
+class UnitEvidence:
+    """Measures in drawing units."""
+
+    size: tuple[float, float] = (0.0, 0.0)
+    """Width and height of the floor, or of the walls."""
+    bulk: float = 0.0
+    """The longer side of what nearly all of their points lie in."""
+    leaves: tuple[float, ...] = ()
+    """Widths of door leaves."""
+    across: tuple[float, ...] = ()
+    """Lengths of lines across doors."""
+    thickness: float | None = None
+    """Usual distance between the faces of a wall."""
+    text_height: float | None = None
+    dimensions: tuple[Dimension, ...] = ()
+    areas: tuple[tuple[float, float], ...] = ()
+    """Areas written in rooms in m², and the rooms' areas in square drawing units."""
+
+
+def evidence_in(drawing: Drawing, shapes: Sequence[Shape], *, outlined: bool) -> UnitEvidence:
+    """Measures of all shapes, and of what is written on ignored layers.
+
+    Parameters
+    ----------
+    outlined
+        True if a layer FLOOR shows the floor.
+    """
+    written = [*(shape for shape in shapes if shape.is_text or shape.is_note), *_left_out(drawing, shapes)]
+    extent = extent_of(shapes, "floor" if outlined else "walls")
+    size = np.ptp(extent, axis=0) if len(extent) else np.zeros(2)
+    return UnitEvidence(
+        size=(float(size[0]), float(size[1])),
+        bulk=_bulk(extent),
+        leaves=tuple(_leaves(shapes)),
+        across=tuple(_across(shapes)) if outlined else (),
+        thickness=_thickness(shapes, _bulk(extent)),
+        text_height=_text_height(written),
+        dimensions=tuple(_dimensions(written)),
+        areas=tuple(_areas(shapes, written)),
+    )
+
+
+def _left_out(drawing: Drawing, shapes: Sequence[Shape]) -> Iterator[Shape]:
+    """Texts and dimensions of the model space on layers that show nothing of the floor."""
+    known = {id(shape.entity) for shape in shapes}
+    for entity in drawing.modelspace():
+        shape = Shape(entity, "0", "ignore")
+        if id(entity) not in known and (shape.is_text or shape.is_note):
+            yield shape
+
+
+def _bulk(points: FloatArray) -> float:
+    """A single stray line does not count."""
+    if not len(points):
+        return 0.0
+    low, high = np.percentile(points, [5, 95], axis=0)
+    return float((high - low).max()) or float(np.ptp(points, axis=0).max())
+
+
+def extent_of(shapes: Sequence[Shape], role: str) -> FloatArray:
+    """Points (n, 2) of the shapes of a role; of all where the role is walls and none is known."""
+    drawn = [shape for shape in shapes if not (shape.is_text or shape.is_note)]
+    sketched = sketch(shape for shape in drawn if shape.role == role)
+    if not sketched and role == "walls":
+        sketched = sketch(drawn)
+    return np.vstack(sketched) if sketched else np.empty((0, 2))
+
+
+def _across(shapes: Sequence[Shape]) -> Iterator[float]:
+    lines = sketch(shape for shape in shapes if shape.role == "doors" and shape.entity.dxftype() == "LINE")
+    for line in lines:
+        width = float(np.hypot(*(line[-1] - line[0])))
+        if width > 0:
+            yield width
+
+
+def _leaves(shapes: Sequence[Shape]) -> list[float]:
+    """Radii of swings on layers of doors; elsewhere, of those whose leaf is drawn."""
+    for roles, drawn_leaf in ((("doors", "openings"), False), (("walls", "other"), True)):
+        own = [shape for shape in shapes if shape.role in roles and not (shape.is_text or shape.is_note)]
+        sketched = sketch(own)
+        size = _bulk(np.vstack(sketched)) if sketched else 0.0
+        if not size:
+            continue
+        scale = _HOUSE / size
+        strokes, _, _ = strokes_of(own, scale=scale, chord=1e9)
+        found = swings_of([stroke.points for stroke in strokes], width=(0.0, np.inf), drawn_leaf=drawn_leaf)
+        if found:
+            return [swing.radius / scale for swing in found]
+    return []
+
+
+def _thickness(shapes: Sequence[Shape], size: float) -> float | None:
+    """The median, by length, of distances between walls' lines and the next parallel ones."""
+    lines = sketch(
+        shape for shape in shapes if shape.role == "walls" and not (shape.is_text or shape.is_note)
+    )
+    pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if 1 < len(line) < 200]
+    if not pieces or not size:
+        return None
+    segments = np.concatenate(pieces)
+    lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
+    order = np.argsort(-lengths, kind="stable")[:_MOST]
+    order = order[lengths[order] > size / 200]
+    apart = np.array([_next_parallel(segments[k], segments[order]) for k in order.tolist()])
+    slim = apart < size / _SLIM
+    if np.count_nonzero(slim) < 4 or lengths[order][slim].sum() < 0.5 * lengths[order].sum():
+        return None
+    found, weight = apart[slim], lengths[order][slim]
+    rank = np.argsort(found, kind="stable")
+    return float(found[rank][np.searchsorted(np.cumsum(weight[rank]), weight.sum() / 2)])
+
+
+def _next_parallel(segment: FloatArray, others: FloatArray) -> float:
+    """Distance to the next line that runs beside at least half of a segment; infinite without one."""
+    a, along = segment[0], segment[1] - segment[0]
+    length = float(np.hypot(*along))
+    along = along / length
+    out = np.array([-along[1], along[0]])
+    t, off = (others - a) @ along, (others - a) @ out
+    beside = np.minimum(t.max(axis=1), length) - np.maximum(t.min(axis=1), 0.0) >= length / 2
+    parallel = np.abs(off[:, 0] - off[:, 1]) <= 0.02 * length
+    away = np.abs(off.mean(axis=1))
+    chosen = away[beside & parallel & (away > 1e-4 * length)]
+    return float(chosen.min()) if len(chosen) else np.inf
+
+
+def _text_height(shapes: Sequence[Shape]) -> float | None:
+    heights = [height for shape in shapes if shape.is_text for height in _heights(shape)]
+    return float(np.median(heights)) if heights else None
+
+
+def _heights(shape: Shape) -> Iterator[float]:
+    name = "char_height" if shape.kind == "MTEXT" else "height"
+    try:
+        height = float(shape.entity.dxf.get(name, 0.0)) * stretch_of(shape.matrix)
+    except BROKEN_INPUT:
+        return
+    if np.isfinite(height) and height > 0:
+        yield height
+
+
+def _dimensions(shapes: Iterable[Shape]) -> Iterator[Dimension]:
+    for shape in shapes:
+        if shape.kind != "DIMENSION":
+            continue
+        try:
+            found = _dimension(shape.entity, stretch_of(shape.matrix))
+        except BROKEN_INPUT:
+            continue
+        if found is not None:
+            yield found
+
+
+def _dimension(entity: DXFEntity, stretch: float) -> Dimension | None:
+    if (int(entity.dxf.get("dimtype", 0)) & 7) not in _LINEAR:
+        return None
+    measured = float(entity.get_measurement()) * stretch  # type: ignore[attr-defined]
+    text = str(entity.dxf.get("text", "") or "")
+    if text in ("", "<>"):
+        text = _rendered(entity)
+    found = length_in(text)
+    if found is None or not (np.isfinite(measured) and measured > 0 and found[0] > 0):
+        return None
+    return Dimension(*found, measured)
+
+
+def _rendered(entity: DXFEntity) -> str:
+    """The text of a dimension's own block: what a person reads."""
+    block = entity.get_geometry_block()  # type: ignore[attr-defined]
+    texts = [item for item in block or () if item.dxftype() in ("MTEXT", "TEXT")]
+    if len(texts) != 1:
+        return ""
+    item = texts[0]
+    return str(item.plain_text() if hasattr(item, "plain_text") else item.dxf.text)
+
+
+def length_in(text: str) -> tuple[float, str | None, int] | None:
+    """The number in a dimension's text, its unit if the text names one, and its decimals."""
+    feet = _FEET.match(text)
+    if feet and feet.group(2):
+        whole, inches, over, under = feet.groups()
+        part = int(over) / int(under) if over and int(under) else 0.0
+        return int(whole) * 12 + float(inches.replace(",", ".")) + part, "in", 0
+    plain = _PLAIN.match(text)
+    if plain is None:
+        return None
+    number, suffix = plain.groups()
+    decimals = len(re.split("[.,]", number)[1]) if re.search("[.,]", number) else 0
+    return float(number.replace(",", ".")), _SUFFIX.get((suffix or "").upper()), decimals
+
+
+def area_in(text: str) -> float | None:
+    """The area in m² that a text names, such as `30 m²`; None if it names none."""
+    found = _AREA.search(text)
+    if found is None:
+        return None
+    value = float(found.group(1).replace(",", "."))
+    return value * FOOT**2 if "f" in found.group(2).lower() else value
+
+
+def _areas(shapes: Sequence[Shape], written: Sequence[Shape]) -> Iterator[tuple[float, float]]:
+    """Areas that texts name, each with the area of the smallest closed shape around the text."""
+    labels = [(area, at) for shape in written if shape.is_text for area, at in _labels(shape)]
+    if not labels:
+        return
+    rings = [line for line in _closed(shapes) if len(line) > 3]
+    faces = [face for face in shapely.polygons(rings) if face.is_valid and face.area > 0] if rings else []
+    tree = shapely.STRtree(faces)
+    for area, at in labels:
+        around = tree.query(shapely.Point(at), predicate="within")
+        if len(around):
+            yield area, min(faces[k].area for k in around.tolist())
+
+
+def _labels(shape: Shape) -> Iterator[tuple[float, tuple[float, float]]]:
+    try:
+        word = word_of(shape, scale=1.0)
+    except BROKEN_INPUT:
+        return
+    area = area_in(word.text)
+    if area and word.at:
+        yield area, word.at[0]
+
+
+def _closed(shapes: Sequence[Shape]) -> Iterator[FloatArray]:
+    """Closed outlines that may be rooms."""
+    own = [shape for shape in shapes if shape.role in _ROOM_ROLES]
+    own = [shape for shape in own if shape.kind in ("LWPOLYLINE", "POLYLINE")]
+    for shape in own:
+        if shape.entity.is_closed:  # type: ignore[attr-defined]
+            for line in sketch([shape]):
+                yield np.vstack((line, line[:1]))
