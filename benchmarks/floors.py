@@ -1,14 +1,16 @@
-"""Synthetic office floors of any size, by seed: rooms on both sides of corridors, doors, columns."""
+"""Floors of any size: synthetic offices by seed, and copies of a real floor joined by corridors."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
+from math import ceil, sqrt
 
 import numpy as np
 
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
 from stopgo.mission.floor.floor_source import FloorSource
-from stopgo.mission.geometry import Polygon, frozen
+from stopgo.mission.geometry import FloatArray, Polygon, bounds, frozen
 from stopgo.mission.settings.element_kinds import KINDS
 
 WALL = 0.2
@@ -108,3 +110,51 @@ def _outer(width: float, height: float, elements) -> None:
         _box(width - half, 0, width + half, height),
     ):
         _add_wall(elements, box)
+
+
+def copies(floor: FloorPlan, count: int) -> FloorPlan:
+    """A floor `count` times in a square, joined by corridors west of and below the copies.
+
+    The floor needs a door in its west side, such as layered/office-l1.
+    """
+    low_x, low_y, high_x, high_y = bounds([part.exterior for part in floor.outline])
+    pitch = np.array([high_x - low_x + CORRIDOR, high_y - low_y + CORRIDOR])
+    columns = ceil(sqrt(count))
+    shifts = [pitch * divmod(k, columns)[::-1] for k in range(count)]
+    top = low_y + pitch[1] * divmod(count - 1, columns)[0] + high_y - low_y
+    west = [low_x + pitch[0] * k for k in range(min(columns, count))]
+    corridors = [_box(x - CORRIDOR, low_y, x, top) for x in west]
+    return replace(
+        floor,
+        name=f"{floor.name}, {count} times",
+        outline=(
+            *(moved for shift in shifts for moved in _moved(floor.outline, shift)),
+            *corridors,
+            _box(low_x - CORRIDOR, low_y - CORRIDOR, west[-1], low_y),
+        ),
+        rooms=tuple(
+            replace(room, id=f"{k}-{room.id}", polygons=_moved(room.polygons, shift))
+            for k, shift in enumerate(shifts)
+            for room in floor.rooms
+        ),
+        openings=tuple(
+            replace(opening, id=f"{k}-{opening.id}", line=frozen(opening.line + shift))
+            for k, shift in enumerate(shifts)
+            for opening in floor.openings
+        ),
+        elements=tuple(
+            replace(
+                element,
+                id=f"{k}-{element.id}",
+                solids=_moved(element.solids, shift),
+                lines=tuple(frozen(line + shift) for line in element.lines),
+            )
+            for k, shift in enumerate(shifts)
+            for element in floor.elements
+        ),
+        findings=(),
+    )
+
+
+def _moved(polygons: tuple[Polygon, ...], shift: FloatArray) -> tuple[Polygon, ...]:
+    return tuple(Polygon.of(one.exterior + shift, [hole + shift for hole in one.holes]) for one in polygons)

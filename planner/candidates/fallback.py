@@ -12,18 +12,20 @@ from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 HAIR = 1e-6
 """Clearances are shortened by this to find strips that are allowed but have no width."""
+BEYOND = 1.0
+"""Metres around a room, beyond twice the clearance, in which obstacles and floor edges are considered."""
 
 
 def best_point(feasibility: StopFeasibility, room: int) -> FloatArray | None:
     """The allowed point of a room farthest from elements and floor edges, or None if none is allowed."""
     settings = feasibility.space.settings
+    margin = 2 * max(feasibility.element_clearance, settings.edge) + BEYOND
+    obstacles, outline = feasibility.around(feasibility.rooms[room], margin)
     allowed = feasibility.rooms[room].difference(
-        roughly_widened(feasibility.obstacles, feasibility.element_clearance - HAIR, quad_segs=64)
+        roughly_widened(obstacles, feasibility.element_clearance - HAIR, quad_segs=64)
     )
-    edges = roughly_widened(
-        shapely.boundary(feasibility.outline), max(settings.edge - HAIR, 0.0), quad_segs=64
-    )
-    pieces = polygon_parts(allowed.intersection(feasibility.outline).difference(edges))
+    edges = roughly_widened(shapely.boundary(outline), max(settings.edge - HAIR, 0.0), quad_segs=64)
+    pieces = polygon_parts(allowed.intersection(outline).difference(edges))
     points = [xy for piece in pieces for xy in _middles(piece)]
     if not points:
         return None
@@ -31,10 +33,10 @@ def best_point(feasibility: StopFeasibility, room: int) -> FloatArray | None:
     ok = feasibility.reasons(local + feasibility.origin, np.full(len(local), room)) == KEPT
     if not ok.any():
         return None
-    margin = np.minimum(
+    clear = np.minimum(
         feasibility.to_element(local) - settings.d_sec, feasibility.to_edge(local) - settings.edge
     )
-    order = np.lexsort((local[:, 1], local[:, 0], -np.round(np.where(ok, margin, -np.inf), 9)))
+    order = np.lexsort((local[:, 1], local[:, 0], -np.round(np.where(ok, clear, -np.inf), 9)))
     return local[order[0]] + feasibility.origin
 
 

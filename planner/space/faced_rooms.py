@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.stages import RoomSpace, Targets
-from stopgo.planner.geometry.shapes import to_shape
+from stopgo.planner.geometry.shapes import boundary_lines, to_shape
 from stopgo.planner.space.ground import Ground
 
 AHEAD = (0.02, 0.1, 0.25)
@@ -20,17 +21,16 @@ JAMB_DISTANCE = 0.3
 
 def faced_rooms(targets: Targets, rooms: Sequence[RoomSpace], ground: Ground) -> IntArray:
     """Index of the room in front of each unit (units,); -1 where there is none, as on a facade."""
-    shapes = [to_shape(room.area, ground.origin) for room in rooms]
-    tree = shapely.STRtree(shapes)
+    faced = _Rooms([to_shape(room.area, ground.origin) for room in rooms])
     middle, normal = targets.unit_xy - ground.origin, _normals(targets)
     found = np.full(targets.total, -1, dtype=np.int64)
     for ahead in AHEAD:
         unassigned = np.flatnonzero(found < 0)
-        found[unassigned] = _nearest_room(tree, middle[unassigned] + ahead * normal[unassigned], 0.0)
+        found[unassigned] = faced.nearest(middle[unassigned] + ahead * normal[unassigned], 0.0)
     front = middle + AHEAD[0] * normal
     unassigned = np.flatnonzero(found < 0)
     unassigned = unassigned[shapely.intersects(ground.outline, shapely.points(front[unassigned]))]
-    found[unassigned] = _nearest_room(tree, front[unassigned], JAMB_DISTANCE)
+    found[unassigned] = faced.nearest(front[unassigned], JAMB_DISTANCE)
     return frozen(found, np.int64)
 
 
@@ -41,10 +41,29 @@ def _normals(targets: Targets) -> FloatArray:
     return np.where(targets.occluding[:, None], out, 0.0)[targets.unit_segment]
 
 
-def _nearest_room(tree: shapely.STRtree, points: FloatArray, distance: float) -> IntArray:
-    """The nearest room within a distance of each point, of several the first; -1 where there is none."""
-    found = np.full(len(points), -1, dtype=np.int64)
-    at, room = tree.query_nearest(shapely.points(points), max_distance=max(distance, 1e-9))
+class _Rooms:
+    """Rooms, prepared for many points."""
+
+    def __init__(self, shapes: Sequence[BaseGeometry]) -> None:
+        self._shapes = shapes
+        edges = [boundary_lines(shape) for shape in shapes]
+        self._edge_room = np.repeat(np.arange(len(shapes)), [len(lines) for lines in edges])
+        self._edges = shapely.STRtree(np.concatenate(edges))
+
+    def nearest(self, points: FloatArray, distance: float) -> IntArray:
+        """The nearest room within a distance of each point, of several the first; -1 where there is none."""
+        found = np.full(len(points), -1, dtype=np.int64)
+        room, at = shapely.STRtree(shapely.points(points)).query(self._shapes, predicate="intersects")
+        _first_of_each(found, at, room)
+        outside = np.flatnonzero(found < 0)
+        at, edge = self._edges.query_nearest(
+            shapely.points(points[outside]), max_distance=max(distance, 1e-9)
+        )
+        _first_of_each(found, outside[at], self._edge_room[edge])
+        return found
+
+
+def _first_of_each(found: IntArray, at: IntArray, room: IntArray) -> None:
+    """Write the lowest room number of each point that is in `at`."""
     order = np.lexsort((room, at))[::-1]
     found[at[order]] = room[order]
-    return found

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
+from stopgo.planner.geometry.nested_clips import NestedClips
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape
 
 
@@ -23,6 +25,7 @@ class StopFeasibility:
         self._walls = boundary_lines(self.obstacles)
         self._edges = boundary_lines(self.outline)
         self._wall_tree, self._edge_tree = shapely.STRtree(self._walls), shapely.STRtree(self._edges)
+        self._obstacle_clips, self._outline_clips = NestedClips(self.obstacles), NestedClips(self.outline)
         for shape in (self.outline, self.obstacles, *self.rooms):
             shapely.prepare(shape)
 
@@ -48,6 +51,12 @@ class StopFeasibility:
             [OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, AVOIDED],
             KEPT,
         ).astype(np.int64)
+
+    def around(self, shape: BaseGeometry, margin: float) -> tuple[BaseGeometry, BaseGeometry]:
+        """Obstacles and outline in the box that reaches `margin` metres beyond a shape."""
+        low_x, low_y, high_x, high_y = shape.bounds
+        box = np.array([low_x - margin, low_y - margin, high_x + margin, high_y + margin])
+        return self._obstacle_clips.within(box), self._outline_clips.within(box)
 
     def avoided(self, xy: FloatArray) -> BoolArray:
         """True for each point (n, 2) in a circle where the user allows no stop."""
