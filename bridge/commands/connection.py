@@ -32,6 +32,7 @@ from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.station import Station
+    from stopgo.mission.run.orders import Verb
 
 VEHICLES = ("--vehicle", "--signing-key", "--state")
 """Options that only concern a vehicle."""
@@ -54,6 +55,8 @@ class Mavlink:
     disarm: bool = False
     any_origin: bool = False
     """True if the vehicle has satellite positions; its origin is not checked."""
+    stop: Verb | None = None
+    """The verb of a stop command, which goes before everything else."""
     read_only: bool = False
     compares: bool = False
     """True if the run is compared with its mission."""
@@ -83,6 +86,10 @@ class Connection:
             return self
         consenting = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
         return replace(self, mavlink=consenting)
+
+    def for_stopping(self, verb: Verb) -> Connection:
+        """Return this connection for a command that stops: a vehicle gets HOLD as its first frame."""
+        return self if self.mavlink is None else replace(self, mavlink=replace(self.mavlink, stop=verb))
 
     def for_reading(self, *, compares: bool = False) -> Connection:
         """Return this connection for reading a state, or for following a run that is compared."""
@@ -204,15 +211,20 @@ def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager
     options = Options(
         vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=connection.timeout_s,
         commander=connection.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),
-        looks_only=mavlink.read_only, compares=mavlink.compares,
+        looks_only=mavlink.read_only, stop=mavlink.stop, compares=mavlink.compares,
     )  # fmt: skip
     return connect(url, options)
 
 
 @contextmanager
 def in_time(connection: Connection) -> Iterator[Station]:
-    """Connect to the robot; the time left of the timeout is for one query or command."""
+    """Connect to the robot; the time left of the timeout is for one query or command.
+
+    A vehicle that was commanded to stop stands by then: noting that has the whole timeout again.
+    """
     began = time.monotonic()
     with reached(connection) as station:
+        if connection.mavlink is not None and connection.mavlink.stop is not None:
+            began = time.monotonic()
         station.timeout_s = max(LEAST_S, connection.timeout_s - (time.monotonic() - began))
         yield station

@@ -108,6 +108,13 @@ NO_EFFECT: dict[Verb, tuple[str, ...]] = {
 """Options that have no effect on each command, and that it does not take."""
 
 
+def stops(verb: Verb) -> bool:
+    """Return True for a command that stops a robot in every state."""
+    from stopgo.mission.run.orders import FREE_VERBS
+
+    return verb in FREE_VERBS
+
+
 def order_of(verb: Verb) -> Callable[..., None]:
     """Return the command of the CLI that sends `verb` to a robot."""
 
@@ -122,6 +129,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
         json_: Json = False,
     ) -> None:
         driving = connection.for_driving(arm=arm, disarm=disarm, any_origin=any_origin)
+        driving = driving.for_stopping(verb) if stops(verb) else driving
         with refusals_printed(as_json=json_), in_time(driving) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, station.keys.robot, json_)

@@ -51,7 +51,9 @@ class AutoRunner:
         board: Switchboard,
         *,
         looks_only: bool = False,
+        stands: bool = False,
     ) -> None:
+        """`stands` as for `VehicleOrders`."""
         self.changed: Callable[[], None] = lambda: None
         self._peer = peer
         self._book = book
@@ -59,7 +61,7 @@ class AutoRunner:
         self._looks_only = looks_only
         self._observer = Observer(peer.autopilot)
         self._commands = ConfirmedCommands(peer, self._observer, book.clock)
-        self._orders = VehicleOrders(book, peer, self._observer, self._commands, wall, consent)
+        self._orders = VehicleOrders(book, peer, self._observer, self._commands, wall, consent, stands=stands)
         self._follower = AutoFollower(book, peer, self._observer, self._commands, looks_only=looks_only)
         self.works: tuple[Callable[[], None], ...] = (self._look, self._act)
         self._reported_ns = 0

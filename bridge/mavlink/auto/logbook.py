@@ -25,6 +25,7 @@ from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import shared_journal
 from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.telemetry import BACK_MS
@@ -236,16 +237,18 @@ def _replaced(run: Run, reason: str) -> Change:
 
 
 @contextmanager
-def logbook(url: Url, vehicle: int, state: Path | None = None) -> Iterator[Logbook]:
+def logbook(url: Url, vehicle: int, state: Path | None = None, *, make: bool = True) -> Iterator[Logbook]:
     """The logbook of the vehicle with this system id at `url`; in `state`, if given.
 
     Raises
     ------
     InputError
-        If the folder cannot be used, or belongs to another vehicle.
+        If the folder cannot be used, belongs to another vehicle, or is missing and must not be made.
     """
-    robot = name_of(vehicle)
-    with shared_journal(state or usual_folder(url, vehicle), robot) as journal:
+    robot, folder = name_of(vehicle), state or usual_folder(url, vehicle)
+    if not make and not folder.is_dir():
+        raise InputError(f"--state {folder}: there is no such folder; name the folder of the push")
+    with shared_journal(folder, robot) as journal:
         wall = WallClock()
         yield Logbook(journal, robot, WallClock(origin_ns=max(wall.now_ns(), journal.newest_ns + 1)))
 
@@ -259,3 +262,13 @@ def usual_folder(url: Url, vehicle: int) -> Path:
     """Folder `$XDG_STATE_HOME/stopgo/…`, named by URL and vehicle."""
     home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     return Path(home) / "stopgo" / f"{re.sub(r'[^A-Za-z0-9.-]+', '-', str(url))}-vehicle-{vehicle}"
+
+
+def recorded_vehicles(url: Url, state: Path | None = None) -> tuple[int, ...]:
+    """System ids of the vehicles at `url` that have a usual folder; none for a folder that the user named."""
+    if state is not None:
+        return ()
+    folder = usual_folder(url, 0)
+    stem = folder.name.removesuffix("0")
+    ends = (path.name.removeprefix(stem) for path in folder.parent.glob(f"{stem}*"))
+    return tuple(sorted(int(end) for end in ends if end.isdecimal()))

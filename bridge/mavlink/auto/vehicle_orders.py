@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import msgspec
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
+from stopgo.bridge.mavlink.auto.commanded_standstill import stand
+from stopgo.bridge.mavlink.auto.confirmed_commands import SHOWS_S, ConfirmedCommands, Denied
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
@@ -30,7 +31,7 @@ from stopgo.mission.run import states as runs
 from stopgo.mission.run.decision import Decision, decide, handed_over
 from stopgo.mission.run.events import Pose
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused
+from stopgo.mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused, Verb
 from stopgo.mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
@@ -68,13 +69,17 @@ class VehicleOrders:
         commands: ConfirmedCommands,
         wall: Clock,
         consent: Consent,
+        *,
+        stands: bool = False,
     ) -> None:
+        """`stands`: the vehicle was commanded to stand, and has reported its standstill."""
         self._book = book
         self._peer = peer
         self._observer = observer
         self._commands = commands
         self._wall = wall
         self._consent = consent
+        self._stands = stands
 
     def execute(self, order: Order) -> Answer:
         """Carry out a command once, and store the answer.
@@ -87,9 +92,11 @@ class VehicleOrders:
         before = answered(self._book.journal, order, self._book.run)
         if before is not None:
             return before
+        if order.verb in FREE_VERBS:
+            return self._stop(order)
         decision = self._conflict(order) or self._decided(order)
         if isinstance(decision, Refused):
-            return self._refused(order, decision)
+            return self._stored(order, decision, None)
         listed = self._book.listed
         assert listed is not None  # `_decided` refuses everything without a mission
         with self._ordering(order):
@@ -99,22 +106,29 @@ class VehicleOrders:
                 return self._stored(order, denied.refused, None)
             return self._stored(order, change, decision.lease, decision.note)
 
-    def _refused(self, order: Order, refused: Refused) -> Answer:
-        """Answer a refused command; a pause still stops a vehicle that drives, whoever started it."""
-        drives = self._observer.mode == AUTO and self._observer.armed
-        if order.verb != "pause" or not drives or refused.reason not in ("wrong_state", "no_mission"):
-            return self._stored(order, refused, None)
+    def _stop(self, order: Order) -> Answer:
+        """Have the vehicle stand, whatever the run's state; then change the run, if its state allows that."""
         with self._ordering(order):
             try:
-                self._commands.hold()
+                self._stand()
+                if order.verb == "abort" and self._consent.disarm:
+                    self._commands.arm(False)
             except Denied as denied:
                 return self._stored(order, denied.refused, None)
-            return self._stored(order, Change(self._book.run), None)
+            decision = self._decided(order)
+            if isinstance(decision, Refused):
+                return self._stored(order, Change(self._book.run), None)
+            return self._stored(order, decision.change, decision.lease)
+
+    def _stand(self) -> None:
+        """Command HOLD until the vehicle stands, unless it does so since this command began."""
+        if not self._stands:
+            stand(self._peer, patience_s=SHOWS_S, working=self._commands.working)
 
     def _conflict(self, order: Order) -> Refused | None:
-        """Refuse a second command at a time, except those that stop."""
+        """Refuse a second command at a time."""
         other = self._book.ordered
-        if other is None or order.verb in FREE_VERBS or other.until_ns <= self._book.clock.now_ns():
+        if other is None or other.until_ns <= self._book.clock.now_ns():
             return None
         return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
 
@@ -190,10 +204,6 @@ class VehicleOrders:
         self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
-    def _pause(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
-        self._commands.hold()
-        return runs.paused(self._book.run, f"pause by {order.commander}")
-
     def _skip(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         """Skip the stop: the vehicle still drives the path to it, and passes its waits once it is there."""
         before, after = self._book.run, decision.change.run
@@ -209,12 +219,6 @@ class VehicleOrders:
             self._go(listed, resume_place(after, listed, observed, self._here()), observed)
         elif before.state == "RUNNING" and beyond is not None:
             self._commands.jump(listed.sequence(beyond))
-        return decision.change
-
-    def _abort(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
-        self._commands.hold()
-        if self._consent.disarm:
-            self._commands.arm(False)
         return decision.change
 
     def _home(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
@@ -276,9 +280,7 @@ class VehicleOrders:
     # Storing
 
     def _ordering(self, order: Order) -> _Ordering:
-        mode = HOLD if order.verb in FREE_VERBS else AUTO
-        ordered = Ordered(verb=order.verb, by=order.commander, mode=mode, until_ns=0)
-        return _Ordering(self._book, self._commands, ordered)
+        return _Ordering(self._book, self._commands, ordered_by(order.verb, order.commander))
 
     def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None, note: str = "") -> Answer:
         """Store the answer together with the changes by the command."""
@@ -293,6 +295,11 @@ class VehicleOrders:
             answer = answer_to(order, refused, self._book.run, note)
             remember_answer(journal, order, answer)
         return answer
+
+
+def ordered_by(verb: Verb, commander: str, *, until_ns: int = 0) -> Ordered:
+    """The note of a command that is carried out until then."""
+    return Ordered(verb=verb, by=commander, mode=HOLD if verb in FREE_VERBS else AUTO, until_ns=until_ns)
 
 
 class _Ordering:
@@ -322,11 +329,9 @@ class _Ordering:
 
 VERBS: dict[str, Callable[[VehicleOrders, Order, ListedMission, Decision], Change]] = {
     "start": VehicleOrders._start,
-    "pause": VehicleOrders._pause,
     "resume": VehicleOrders._resume,
     "skip": VehicleOrders._skip,
     "retry": VehicleOrders._retry,
-    "abort": VehicleOrders._abort,
     "home": VehicleOrders._home,
 }
 

@@ -12,17 +12,23 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from stopgo.bridge.console import say
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.mavlink.auto.auto_runner import AutoRunner
+from stopgo.bridge.mavlink.auto.commanded_standstill import stand
+from stopgo.bridge.mavlink.auto.confirmed_commands import Denied
+from stopgo.bridge.mavlink.auto.first_hold import held_first, note_order
 from stopgo.bridge.mavlink.auto.logbook import logbook
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
-from stopgo.bridge.mavlink.vehicle_link.peer import found
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
 from stopgo.bridge.mavlink.vehicle_link.url import Url
-from stopgo.bridge.mavlink.vehicle_link.wire import GROUND_STATION, Who, wire
+from stopgo.bridge.mavlink.vehicle_link.wire import GROUND_STATION, Who, Wire, wire
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.station.station import Station, whoami
+from stopgo.mission.errors import NegativeResult
+from stopgo.mission.run.orders import Verb
 
 COMPONENTS = range(25, 100)
 """Free for users (MAV_COMP_ID_USER1 to 75): by them a vehicle distinguishes processes of one station."""
@@ -40,6 +46,8 @@ class Options:
     consent: Consent = field(default_factory=Consent)
     looks_only: bool = False
     """Store nothing, and send the vehicle no command."""
+    stop: Verb | None = None
+    """The verb of a stop command: the vehicle must stand before anything else is sent or checked."""
     compares: bool = False
     """Compare first the vehicle's list with the one that was sent."""
 
@@ -52,23 +60,63 @@ def connect(url: Url, options: Options) -> Iterator[Station]:
     ------
     RobotUnreachable
         If no vehicle is found, or it does not report its state; only queries were sent.
+    NegativeResult, OutcomeUnknown
+        If `options.stop` is given, and the vehicle refuses HOLD or does not report a standstill.
     InputError
         If several are found and none was named, or the logbook's folder cannot be used.
     """
     me = Who(GROUND_STATION.system, COMPONENTS[os.getpid() % len(COMPONENTS)])
-    board, wall = Switchboard(), WallClock()
-    with (
-        wire(url, me=me, signing_key=options.signing_key) as opened,
-        found(opened, options.vehicle, timeout_s=options.timeout_s) as peer,
-        logbook(url, peer.who.system, options.state) as book,
-    ):
+    with wire(url, me=me, signing_key=options.signing_key) as opened:
+        if options.stop is not None:
+            with _stopped(opened, url, options, options.stop) as peer, _served(url, peer, options) as station:
+                yield station
+            return
+        with (
+            found(opened, options.vehicle, timeout_s=options.timeout_s) as peer,
+            _served(url, peer, options) as station,
+        ):
+            yield station
+
+
+@contextmanager
+def _stopped(opened: Wire, url: Url, options: Options, verb: Verb) -> Iterator[Peer]:
+    """The vehicle once it stands; HOLD goes out before anything else is sent or checked.
+
+    Raises
+    ------
+    NegativeResult
+        If it refuses the mode.
+    OutcomeUnknown
+        If HOLD was sent and a standstill is not confirmed.
+    """
+    by = options.commander or whoami()
+    with held_first(opened, url, vehicle=options.vehicle, state=options.state) as hold:
+        note_order(url, hold.systems, options.state, verb, by)
+        with found(opened, hold.vehicle, timeout_s=options.timeout_s) as peer:
+            try:
+                stand(peer, patience_s=options.timeout_s, report=say)
+            except Denied as denied:
+                raise NegativeResult(f"{peer}: denied: {denied}", reason="denied") from None
+            say(f"{peer}: stands, in mode HOLD, as it reports itself")
+            hold.close()
+            yield peer
+
+
+@contextmanager
+def _served(url: Url, peer: Peer, options: Options) -> Iterator[Station]:
+    """A station on a link in memory to the agent that serves the vehicle."""
+    board, wall, stops = Switchboard(), WallClock(), options.stop is not None
+    with logbook(url, peer.who.system, options.state) as book:
         keys = KeyExpressions(book.robot)
-        runner = AutoRunner(peer, book, wall, options.consent, board, looks_only=options.looks_only)
+        runner = AutoRunner(
+            peer, book, wall, options.consent, board, looks_only=options.looks_only, stands=stops
+        )
         agent = Agent(
             keys=keys, link=board.link(), journal=book.journal, runner=runner, clock=book.clock,
             command_clock=wall, failed=board.fail,
         )  # fmt: skip
         with on_link(agent):
-            runner.await_news(options.timeout_s, compares=options.compares)
+            if not stops:
+                runner.await_news(options.timeout_s, compares=options.compares)
             who = options.commander or whoami()
             yield Station(board.link(), keys, commander=who, timeout_s=options.timeout_s)

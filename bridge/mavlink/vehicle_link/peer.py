@@ -403,7 +403,7 @@ def _heartbeats(
         message = waiting.get(min(KNOCK_S, left_s))
         if message is None and not beats:
             knock()
-        if message is None or not _of_autopilot(message):
+        if message is None or not is_of_autopilot(message):
             continue
         if not beats and vehicle is None:
             until = min(until, time.monotonic() + OTHERS_S)
@@ -419,7 +419,8 @@ def _knock(wire: Wire, vehicle: int | None, beat: Callable[[], Message]) -> None
     wire.send(request(Who(vehicle or 0, Component.AUTOPILOT1), MessageId.HEARTBEAT))
 
 
-def _of_autopilot(heartbeat: Message) -> bool:
+def is_of_autopilot(heartbeat: Message) -> bool:
+    """True for the heartbeat of an autopilot, not of its camera or of a station."""
     return (
         heartbeat.get_srcComponent() == Component.AUTOPILOT1
         and heartbeat.autopilot != Firmware.INVALID
