@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import queue
 import time
-import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
@@ -67,7 +66,6 @@ def reports(
     `keep` reports to the robot that somebody watches it, and returns its state. `recorded` returns true if
     the robot has a telemetry log of its runs.
     """
-    link.announce(keys.watcher(uuid.uuid4().hex[:12]))
     received = _subscribe(link, keys, keep)
     kept_at = time.monotonic()
     follower = RunFollower(link, keys, recorded)

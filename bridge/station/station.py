@@ -15,6 +15,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -163,15 +164,17 @@ class Station:
             )
         return info
 
-    def keep(self) -> StateReport | None:
+    def keep(self, token: str | None = None) -> StateReport | None:
         """Report to the robot that somebody watches, and return its state; this renews the station's lease.
+
+        `token` is the name of the token that this station shows.
 
         Raises
         ------
         NegativeResult
             If two robots answer to one name.
         """
-        watching = encode(Watching(commander=self.commander))
+        watching = encode(Watching(commander=self.commander, token=token))
         info = self._only_info(self.link.ask_all(self.keys.keep, watching, timeout_s=TRY_S), "watch")
         return None if info is None else info.state
 
@@ -407,7 +410,10 @@ class Station:
 
         If the robot's mission has not been run yet, wait for the next run.
         """
-        return follow.reports(self.link, self.keys, self.keep, lambda: RECORD in self.capabilities)
+        token = uuid.uuid4().hex[:12]
+        self.link.announce(self.keys.watcher(token))
+        keep = partial(self.keep, token)
+        return follow.reports(self.link, self.keys, keep, lambda: RECORD in self.capabilities)
 
     def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
         key = self.keys.mission(mission_id, f"part/{number}")
