@@ -128,6 +128,8 @@ class Station:
         self.held = held
         self.capabilities: tuple[str, ...] = ()
         """Capabilities that the robot reported last."""
+        self.asked_at = time.monotonic()
+        """Time of the last query for the robot's state: its answer is no older than that."""
         self.keys = keys
         self.commander = commander
         self.timeout_s = timeout_s
@@ -398,7 +400,8 @@ class Station:
             page = follow.log_page(self.link, self.keys, since=since, run_id=run_id, timeout_s=self.timeout_s)
             if page is None:
                 raise OutcomeUnknown(
-                    f"{self.keys.robot} stopped answering; its journal was not read to the end"
+                    f"{self.keys.robot}: its journal was not read whole, log is not answered;"
+                    " the link is lost or drops log, or access rules deny it"
                 )
             events += page.events
             if not page.events:
@@ -459,6 +462,7 @@ class Station:
         """Repeat a query to all who serve a key expression, until one answers or the time is up."""
         deadline = time.monotonic() + within_s
         while (left := deadline - time.monotonic()) > 0:
+            self.asked_at = time.monotonic()
             replies = self.link.ask_all(key, payload, timeout_s=min(TRY_S, left))
             if replies:
                 return replies
