@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -191,10 +193,11 @@ def print_status(connection: Connection, *, as_json: bool) -> None:
     """Request the state of one robot, and print it."""
     with in_time(connection.for_reading()) as station:
         report = station.status()
+        age_s = time.monotonic() - station.asked_at
     if as_json:
-        print_json(status_json(report))
+        print_json(status_json(report) | {"age_s": round(age_s, 3)})
     else:
-        print_line(state_line(report))
+        print_line(f"{state_line(report)}; at most {math.ceil(age_s * 10) / 10:.1f} s old")
 
 
 def fleet_status(

@@ -170,6 +170,8 @@ class Watching(Tagged, frozen=True):
     """Sign of a station that watches the robot; renews its lease, if it has it; answered with `Info`."""
 
     commander: ShortText
+    token: ShortText | None = None
+    """Name of the sender's token on `watch/<name>`; while it is shown, the sender is in contact."""
 
 
 class Booted(Tagged, frozen=True):

@@ -165,7 +165,7 @@ class Agent:
         for verb in FREE_VERBS:  # each on a key of its own: a stop waits behind no other command
             link.serve(keys.command(verb), self._command)
         link.serve(keys.command("*"), self._other_command)
-        link.watch_presence(keys.watcher("*"), self._contact.on_presence)
+        link.watch_presence(keys.watcher("*"), self._on_token)
 
     def open(self) -> None:
         """Answer, start the threads, and announce the robot."""
@@ -213,11 +213,22 @@ class Agent:
         if self._recorder is not None:
             self._recorder.close()
 
+    def _commander(self) -> str | None:
+        """Return the holder of the lease, also of one that has ended; a failing disk does not matter."""
+        lease = self._reported.lease
+        return None if lease is None else lease.commander
+
+    def _on_token(self, key: str, alive: bool) -> None:
+        self._contact.on_presence(key.rpartition("/")[2], alive)
+
+    def _note_contact(self, request: Request, *, sender: str | None = None, token: str | None = None) -> None:
+        self._contact.on_request(request, self._commander(), sender=sender, token=token)
+
     def _mission(self, request: Request) -> bytes:
-        self._contact.on_request(request)
         _, step = address_of(request.key)
         if step[:1] == ["commit"]:
             return self._ordered(request, Commit, self._commit)
+        self._note_contact(request)
         try:
             if step[:1] != ["part"]:
                 check_ordering(request)
@@ -244,6 +255,7 @@ class Agent:
             self._refusals.note(kind.__name__.lower(), order.commander, str(error))
             return encode(untrusted(error))
         reply = carry_out(request, order)
+        self._note_contact(request, sender=order.commander)  # a stop waits for nothing, and leases change
         what = order.verb if isinstance(order, Order) else f"push of {order.manifest.mission_id[:12]}"
         self._refusals.note_reply(what, order.commander, reply)
         return encode(reply)
@@ -255,10 +267,11 @@ class Agent:
         except msgspec.DecodeError as error:
             return encode(Malformed(message=f"Watching: {error}"))
         except Untrusted:
-            return self._info(request)  # viewers watch as well
+            return self._answered_info()  # viewers watch as well
         if request.fresh:
             self._keep_lease(watching.commander)
-        return self._info(request)
+        self._note_contact(request, sender=watching.commander, token=watching.token)
+        return self._answered_info()
 
     def _keep_lease(self, commander: str) -> None:
         """Renew the lease of a commander who watches during a run."""
@@ -267,7 +280,10 @@ class Agent:
             keep_lease(self._journal, commander, now_ns=self._command_clock.now_ns())
 
     def _info(self, request: Request) -> bytes:
-        self._contact.on_request(request)
+        self._note_contact(request)
+        return self._answered_info()
+
+    def _answered_info(self) -> bytes:
         info = Info(
             protocol=VERSION,
             stopgo=__version__,
@@ -291,7 +307,6 @@ class Agent:
         return self._command(request)
 
     def _command(self, request: Request) -> bytes:
-        self._contact.on_request(request)
         return self._ordered(request, Order, self._obey)
 
     def _obey(self, request: Request, order: Order) -> Reply:
@@ -300,18 +315,18 @@ class Agent:
         return self._runner.execute(order)
 
     def _log(self, request: Request) -> bytes:
-        self._contact.on_request(request)
+        self._note_contact(request)
         try:
             return encode(events_page(self._journal, request))
         except sqlite3.DatabaseError as error:
             return encode(Malformed(message=f"the journal cannot be read: {error}"))
 
     def _past_poses(self, request: Request) -> bytes:
-        self._contact.on_request(request)
+        self._note_contact(request)
         return encode(self._poses.page(request))
 
     def _record(self, request: Request) -> bytes:
-        self._contact.on_request(request)
+        self._note_contact(request)
         assert self._recorder is not None
         return encode(self._recorder.answer(request))
 
@@ -321,7 +336,7 @@ class Agent:
         while not self._closing.is_set():
             self._news.wait(STATE_EVERY_S)
             self._news.clear()
-            self._runner.on_link_silence(self._contact.silent_s())
+            self._runner.on_link_silence(self._contact.silent_s(self._commander()))
             self._look_for_twin()
             for event in self._reported.events(since=published):
                 self._publish_event(encode(event))

@@ -45,7 +45,7 @@ class Runner(Protocol):
         """Carry out a command once, however often it comes."""
 
     def on_link_silence(self, silent_s: float) -> None:
-        """React to `silent_s` seconds without data from any station."""
+        """React to `silent_s` seconds without a message from the commander."""
 
     def stand_still(self, error: BaseException) -> None:
         """Command the base to stand until the program ends, because of `error`; nothing is stored before."""

@@ -5,7 +5,8 @@
 
 Invariants:
 - `RunFollower.newest` is the number of the last event yielded; events are yielded in order, without gaps.
-- A state is yielded only after all events that it counts (`last_event`).
+- A state is yielded only after all events that it counts (`last_event`), and never after a newer one. While
+  events are missing, `ReportsMissing` has the newest state.
 - The subscription starts before the first query, so nothing falls between the two.
 - The run is over when its last event and a state that counts it were yielded.
 """
@@ -14,7 +15,6 @@ from __future__ import annotations
 
 import queue
 import time
-import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
@@ -23,24 +23,35 @@ import msgspec
 
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, decode
+from stopgo.bridge.station.freshness import BackgroundQuery, Freshness
 from stopgo.bridge.station.logged_run import AGAIN_S, LoggedReport, LogHistory
 from stopgo.bridge.station.robot_replies import PastEvents, read_events, read_reply
+from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
+    Event,
     Finished,
     Health,
     PoseReport,
     PosesMissing,
     Report,
+    ReportsMissing,
     StateReport,
     event_of,
 )
 
 SILENCE_S = 1.0
 """Time without data after which the robot is queried."""
+OLD_S = 1.5
+"""Age of the newest state at which the robot is queried; it publishes one every second."""
 KEEP_S = 5.0
 """Period of the message that somebody watches the robot."""
+UNREAD_S = 1.0
+"""Time for missing events before the gap is reported; other reports do not wait for longer."""
+GIVEN_UP_S = 10.0
+"""Time for the last events of a run that is over, while the robot's states arrive."""
+DENIED = "log has an empty answer at once: access rules on the link deny it, or the robot does not serve it"
 PAGE_S = 5.0
 """Timeout for a page of events or poses: on a slow link it takes a second."""
 
@@ -52,7 +63,7 @@ class Silence(msgspec.Struct, frozen=True, kw_only=True):
 
 
 LiveReport = Report | Health
-Followed = Report | Silence | PosesMissing | LoggedReport
+Followed = Report | Silence | PosesMissing | ReportsMissing | LoggedReport
 """Item that `reports` yields."""
 
 
@@ -67,27 +78,76 @@ def reports(
     `keep` reports to the robot that somebody watches it, and returns its state. `recorded` returns true if
     the robot has a telemetry log of its runs.
     """
-    link.announce(keys.watcher(uuid.uuid4().hex[:12]))
-    received = _subscribe(link, keys, keep)
-    kept_at = time.monotonic()
+    watched = WatchedLink(keep)
+    received = _subscribe(link, keys)
     follower = RunFollower(link, keys, recorded)
-    received_at = time.monotonic()
+    yield from _taken(follower, watched.ask())
     while not follower.ended:
-        item = _next(received, 0.0 if follower.poses.behind else SILENCE_S)
-        if item is not None:
-            received_at = time.monotonic()
-        elif follower.poses.behind:
+        item = _next(received, 0.0 if follower.poses.behind else AGAIN_S)
+        if item is None and follower.poses.behind:
             yield from follower.poses.catch_up()
-        if item is None and time.monotonic() - received_at >= SILENCE_S:
-            yield Silence(seconds=time.monotonic() - received_at)
-            item = keep()
-        elif time.monotonic() - kept_at >= KEEP_S:
-            kept_at = time.monotonic()
-            state = keep()
-            yield from () if state is None else follower.take(state)
-        if item is not None:
-            yield from follower.take(item)
+        silent_s = watched.take(item)
+        if item is None and silent_s >= SILENCE_S:
+            yield Silence(seconds=silent_s)
+        if watched.to_ask:
+            yield from _taken(follower, watched.ask())
+        yield from _taken(follower, item if watched.is_news else None)
+        yield from follower.catch_up()
+        yield from watched.missing(follower)
     yield from _late_poses(received, follower)
+
+
+def _taken(follower: RunFollower, item: LiveReport | None) -> Iterator[Followed]:
+    return iter(()) if item is None else follower.take(item)
+
+
+class WatchedLink:
+    """Link while a run is followed: when something last came on it, and when the robot is asked."""
+
+    def __init__(self, keep: Callable[[], StateReport | None]) -> None:
+        self._keep = keep
+        self._asked_at = self._received_at = time.monotonic()
+        self._fresh = Freshness(self._asked_at)
+        self.is_news = True
+        """True if the last item is no state, or the newest."""
+
+    @property
+    def to_ask(self) -> bool:
+        """True if it is time for a sign of watching, or the newest state is old."""
+        now = time.monotonic()
+        old = now - self._fresh.state_at >= OLD_S and now - self._asked_at >= SILENCE_S
+        return old or now - self._asked_at >= KEEP_S
+
+    def ask(self) -> StateReport | None:
+        """Report that somebody watches; return the robot's state if it is the newest."""
+        self._asked_at = time.monotonic()
+        state = self._keep()
+        if state is None or not self._fresh.answered(state, self._asked_at, time.monotonic()):
+            return None
+        self._received_at = time.monotonic()
+        return state
+
+    def take(self, item: LiveReport | None) -> float:
+        """Note an item, and return the seconds without any."""
+        now = time.monotonic()
+        self.is_news = True
+        if item is not None:
+            self._received_at = now
+        if isinstance(item, StateReport):
+            self.is_news = self._fresh.published(item, now)
+        elif isinstance(item, PoseReport):
+            self._fresh.pose(item, now)
+        elif isinstance(item, Event):
+            self._fresh.event(item, now)
+        return now - self._received_at
+
+    def missing(self, follower: RunFollower) -> Iterator[ReportsMissing]:
+        """Yield the topics that do not arrive, when there is something to report."""
+        now = time.monotonic()
+        report = self._fresh.missing(follower.log_fault(now), now)
+        if report is not None:
+            yield report
+        follower.check_end(report)
 
 
 class PoseHistory:
@@ -162,6 +222,11 @@ class RunFollower:
         """Number of the last event that was yielded; -1 before the first state."""
         self.end: Finished | Aborted | None = None
         self.last_state: StateReport | None = None
+        self._ahead: StateReport | None = None
+        """Newest state, of which events are missing."""
+        self._behind_since: float | None = None
+        self._log = BackgroundQuery(time.monotonic)
+        self._log_reason, self._ask_at = "", 0.0
         self._health: Health | None = None
         """Newest health report; it may come before the first state of its run."""
 
@@ -176,10 +241,8 @@ class RunFollower:
         if isinstance(item, StateReport):
             self._choose_run(item)
             yield from self._take_health()
-            yield from self._missed(item.last_event)
-            if self.newest >= item.last_event:
-                self.last_state = item
-                yield item
+            self._ahead = item
+            yield from self.catch_up()
         elif isinstance(item, PoseReport):
             yield from self.poses.take(item)
         elif isinstance(item, Health):
@@ -187,6 +250,42 @@ class RunFollower:
             yield from self._take_health()
         elif self.run_id is not None:
             yield from self._missed(item.number)
+
+    def catch_up(self) -> Iterator[Followed]:
+        """Yield the events that the newest state counts, then that state; nothing if they do not come."""
+        state = self._ahead
+        if state is None:
+            return
+        yield from self._missed(state.last_event)
+        if self.newest >= state.last_event:
+            self._ahead, self._behind_since = None, None
+            self.last_state = state
+            yield state
+        elif self._behind_since is None:
+            self._behind_since = time.monotonic()
+
+    def log_fault(self, now_s: float) -> str:
+        """Return why events are missing; empty if none is, or not for long."""
+        if self._behind_since is None or now_s - self._behind_since < UNREAD_S:
+            return ""
+        return self._log_reason or f"the link drops log: no answer for {now_s - self._behind_since:.0f} s"
+
+    def check_end(self, report: ReportsMissing | None) -> None:
+        """End the following of a run that is over, but whose events do not come.
+
+        Raises
+        ------
+        OutcomeUnknown
+            After `GIVEN_UP_S`.
+        """
+        state, since = self._ahead, self._behind_since
+        if report is None or state is None or since is None or state.state not in ("FINISHED", "ABORTED"):
+            return
+        if time.monotonic() - since >= GIVEN_UP_S and report.topics:
+            raise OutcomeUnknown(
+                f"{state.robot}: the run is {state.state}, but its events from number {self.newest + 1} on"
+                f" were not received ({report.topics[-1]}); see stopgo watch --run {state.run_id}"
+            )
 
     def _take_health(self) -> Iterator[LoggedReport]:
         if self._health is not None and isinstance(self.poses, LogHistory):
@@ -205,9 +304,10 @@ class RunFollower:
     def _missed(self, newest: int) -> Iterator[AnyEvent]:
         """Yield the missing events up to `newest`, read from the robot's journal."""
         while self.run_id is not None and self.newest < newest and self.end is None:
-            page = log_page(self._link, self._keys, since=self.newest, run_id=self.run_id, timeout_s=PAGE_S)
+            page = self._next_page()
             if page is None:
                 return
+            self._behind_since = None
             for event in page.events:
                 self.newest = event.number
                 if isinstance(event, Finished | Aborted):
@@ -216,28 +316,47 @@ class RunFollower:
             if not page.events:
                 self.newest = max(self.newest, page.newest)
 
+    def _next_page(self) -> PastEvents | None:
+        """Return the next page of the journal; `None` if it has not come yet."""
+        if time.monotonic() < self._ask_at:
+            return None
+        since, run_id = self.newest, self.run_id
+        ask = partial(ask_log, self._link, self._keys, since=since, run_id=run_id, timeout_s=PAGE_S)
+        answered = self._log.answer(ask, UNREAD_S)
+        if answered is None:
+            return None
+        if answered.reply is None:
+            self._ask_at = time.monotonic() + AGAIN_S
+            at_once = answered.took_s < PAGE_S / 2
+            self._log_reason = DENIED if at_once else f"the link drops log: no answer in {PAGE_S:g} s"
+            return None
+        self._log_reason = ""
+        return read_events(answered.reply, since=since, robot=self._keys.robot)
+
+
+def ask_log(
+    link: Link, keys: KeyExpressions, *, since: int, run_id: str | None, timeout_s: float
+) -> bytes | None:
+    """Request one page of the journal."""
+    parameters = {"since": str(since)} | ({"run": run_id} if run_id else {})
+    return link.ask(keys.log, timeout_s=timeout_s, parameters=parameters)
+
 
 def log_page(
     link: Link, keys: KeyExpressions, *, since: int, run_id: str | None, timeout_s: float
 ) -> PastEvents | None:
     """Request one page of the journal; `None` without an answer."""
-    parameters = {"since": str(since)} | ({"run": run_id} if run_id else {})
-    reply = link.ask(keys.log, timeout_s=timeout_s, parameters=parameters)
+    reply = ask_log(link, keys, since=since, run_id=run_id, timeout_s=timeout_s)
     return None if reply is None else read_events(reply, since=since, robot=keys.robot)
 
 
-def _subscribe(
-    link: Link, keys: KeyExpressions, keep: Callable[[], StateReport | None]
-) -> queue.SimpleQueue[LiveReport]:
+def _subscribe(link: Link, keys: KeyExpressions) -> queue.SimpleQueue[LiveReport]:
     """Return a queue of live reports; the subscription comes before the first query, so no gap is left."""
     received: queue.SimpleQueue[LiveReport] = queue.SimpleQueue()
     link.hear(keys.event, lambda key, payload: _put(received, payload, event_of))
     link.hear(keys.pose, lambda key, payload: _put(received, payload, _POSE))
     link.hear(keys.health, lambda key, payload: _put(received, payload, _HEALTH))
     link.hear(keys.state, lambda key, payload: _put(received, payload, _STATE))
-    state = keep()
-    if state is not None:
-        received.put(state)
     return received
 
 

@@ -15,6 +15,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -127,6 +128,8 @@ class Station:
         self.held = held
         self.capabilities: tuple[str, ...] = ()
         """Capabilities that the robot reported last."""
+        self.asked_at = time.monotonic()
+        """Time of the last query for the robot's state: its answer is no older than that."""
         self.keys = keys
         self.commander = commander
         self.timeout_s = timeout_s
@@ -163,15 +166,17 @@ class Station:
             )
         return info
 
-    def keep(self) -> StateReport | None:
+    def keep(self, token: str | None = None) -> StateReport | None:
         """Report to the robot that somebody watches, and return its state; this renews the station's lease.
+
+        `token` is the name of the token that this station shows.
 
         Raises
         ------
         NegativeResult
             If two robots answer to one name.
         """
-        watching = encode(Watching(commander=self.commander))
+        watching = encode(Watching(commander=self.commander, token=token))
         info = self._only_info(self.link.ask_all(self.keys.keep, watching, timeout_s=TRY_S), "watch")
         return None if info is None else info.state
 
@@ -395,7 +400,8 @@ class Station:
             page = follow.log_page(self.link, self.keys, since=since, run_id=run_id, timeout_s=self.timeout_s)
             if page is None:
                 raise OutcomeUnknown(
-                    f"{self.keys.robot} stopped answering; its journal was not read to the end"
+                    f"{self.keys.robot}: its journal was not read whole, log is not answered;"
+                    " the link is lost or drops log, or access rules deny it"
                 )
             events += page.events
             if not page.events:
@@ -407,7 +413,10 @@ class Station:
 
         If the robot's mission has not been run yet, wait for the next run.
         """
-        return follow.reports(self.link, self.keys, self.keep, lambda: RECORD in self.capabilities)
+        token = uuid.uuid4().hex[:12]
+        self.link.announce(self.keys.watcher(token))
+        keep = partial(self.keep, token)
+        return follow.reports(self.link, self.keys, keep, lambda: RECORD in self.capabilities)
 
     def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
         key = self.keys.mission(mission_id, f"part/{number}")
@@ -453,6 +462,7 @@ class Station:
         """Repeat a query to all who serve a key expression, until one answers or the time is up."""
         deadline = time.monotonic() + within_s
         while (left := deadline - time.monotonic()) > 0:
+            self.asked_at = time.monotonic()
             replies = self.link.ask_all(key, payload, timeout_s=min(TRY_S, left))
             if replies:
                 return replies

@@ -12,6 +12,7 @@ import msgspec
 
 from stopgo.bridge.station.finished_run import past_reports
 from stopgo.bridge.station.follow import Followed, Silence
+from stopgo.bridge.station.freshness import LATE_S
 from stopgo.bridge.station.logged_run import LoggedReport
 from stopgo.bridge.station.station import Station
 from stopgo.mission.comparing.run_collector import RunSink
@@ -28,6 +29,7 @@ from stopgo.mission.run.events import (
     Held,
     PoseReport,
     PosesMissing,
+    ReportsMissing,
     RevisionDropped,
     RevisionTaken,
     RevisionWaits,
@@ -37,8 +39,10 @@ from stopgo.mission.run.events import (
 )
 from stopgo.mission.run.tolerance import outside_tolerance_text, stops_outside_text
 
+UNNUMBERED = PoseReport | Silence | PosesMissing | ReportsMissing | LoggedReport
+"""Items that are of no revision."""
 REDRAW_S = 0.2
-LOST_S = 3.0
+LOST_S = 2.0
 """Time without data after which a line reports it: a state comes every second, and may be late."""
 LAST_EVENTS = 8
 
@@ -95,7 +99,7 @@ def _revision_of(report: Followed) -> tuple[str | None, int | None] | None:
 
     Events name every revision in turn; a state may come after two changes.
     """
-    if isinstance(report, PoseReport | Silence | PosesMissing | LoggedReport) or not report.run_id:
+    if isinstance(report, UNNUMBERED) or not report.run_id:
         return None
     return report.run_id, report.revision
 
@@ -117,6 +121,8 @@ def hand_over(record: RunSink, report: Followed) -> None:
         record.pose(report)
     elif isinstance(report, PosesMissing):
         record.missing(report)
+    elif isinstance(report, ReportsMissing):
+        record.incomplete(report)
     elif isinstance(report, LoggedReport):
         past = report.report
         record.health(past) if isinstance(past, Health) else record.state(past)
@@ -140,6 +146,10 @@ class EventLines:
     def show(self, report: Followed) -> None:
         if isinstance(report, Silence):
             self._take_silence(report.seconds)
+            return
+        if isinstance(report, ReportsMissing):
+            if report.changed:
+                self._say(report.words)
             return
         if self._lost_s:
             self._say(f"data again after {self._lost_s:.0f} s")
@@ -176,6 +186,10 @@ class EventObjects:
     def show(self, report: Followed) -> None:
         if isinstance(report, PosesMissing):
             self._write({"missing": msgspec.to_builtins(report)})
+        elif isinstance(report, ReportsMissing):
+            if report.changed:
+                state = None if report.state is None else report.state.state
+                self._write({"stale": {"topics": report.topics, "state": state, "age_s": report.age_s}})
         elif not isinstance(report, StateReport | PoseReport | Silence | LoggedReport):
             error = outside_tolerance_text(report, self._stops.get(getattr(report, "stop", "")))
             self._write(msgspec.to_builtins(report) | ({"beside": error} if error else {}))
@@ -195,6 +209,7 @@ class RunTable:
         self._pose: PoseReport | None = None
         self._events: deque[AnyEvent] = deque(maxlen=LAST_EVENTS)
         self._silent_s = 0.0
+        self._gaps: ReportsMissing | None = None
         self._missing = ""
         self._height = 0
         """Lines of the table that was drawn last."""
@@ -207,6 +222,9 @@ class RunTable:
         self._silent_s = report.seconds if isinstance(report, Silence) else 0.0
         if isinstance(report, StateReport):
             self._state = report
+        elif isinstance(report, ReportsMissing):
+            self._gaps = report if report.topics else None
+            self._state = report.state or self._state
         elif isinstance(report, PoseReport):
             self._pose = report
         elif isinstance(report, PosesMissing):
@@ -218,7 +236,9 @@ class RunTable:
             self._draw()
 
     def _draw(self) -> None:
-        lines = table_lines(self._mission, self._state, self._pose, tuple(self._events), self._silent_s)
+        lines = table_lines(
+            self._mission, self._state, self._pose, tuple(self._events), self._silent_s, self._gaps
+        )
         lines += [self._missing] if self._missing else []
         up = f"\x1b[{self._height}A" if self._height else ""
         self._write(up + "".join(f"\x1b[2K{printable(line)}\n" for line in lines))
@@ -232,10 +252,12 @@ def table_lines(
     pose: PoseReport | None,
     events: tuple[AnyEvent, ...],
     silent_s: float,
+    gaps: ReportsMissing | None = None,
 ) -> list[str]:
     """Return the lines of a table of the run, of fixed height."""
+    told = () if gaps is None else gaps.topics
     if state is None:
-        return ["waiting for the robot's state"]
+        return ["waiting for the robot's state", *told]
     of = f" of {len(mission.stops)}" if mission else ""
     stop = f"{state.stop} {state.stop_state}" if state.stop else "-"
     elapsed = pose.mission_time_s if pose and pose.mission_time_s is not None else 0.0
@@ -243,18 +265,24 @@ def table_lines(
     outside = stops_outside_text(state.outside, state.outside_count)
     rows = [
         ("robot", f"{state.robot}  run {state.run_id or 'none yet'}"),
-        ("state", f"{state.state}  {stop}"),
+        ("state", f"{state.state}  {stop}{_age_text(silent_s, gaps)}"),
         ("stops", f"{state.done_count} done{outside}, {state.skipped_count} skipped{of}"),
         ("position", f"{pose.pose.x:.2f}, {pose.pose.y:.2f} m at {pose.speed:.2f} m/s" if pose else "-"),
         ("battery", f"{state.battery:.0%}"),
         ("time", f"{clock(elapsed)} run, {'-' if left is None else clock(left)} left as planned"),
-        ("link", f"no data for {silent_s:.0f} s, retrying" if silent_s else "alive"),
+        ("link", f"no data for {silent_s:.0f} s, retrying" if silent_s else "; ".join(told) or "alive"),
     ]
     stops = {} if mission is None else {stop.id: stop for stop in mission.stops}
     lines = [event_line(event, stops) for event in events]
     if state.state == "HELD":
         lines = [*lines[1 - LAST_EVENTS :], HINT]
     return [f"  {name:8} {value}" for name, value in rows] + lines + [""] * (LAST_EVENTS - len(lines))
+
+
+def _age_text(silent_s: float, gaps: ReportsMissing | None) -> str:
+    """Return the age of a state that may be older than `LATE_S`; else nothing."""
+    age_s = silent_s + (gaps.age_s if gaps is not None and not silent_s else 0.0)
+    return f"  ({age_s:.0f} s ago)" if age_s >= LATE_S or gaps is not None else ""
 
 
 def remaining_s(

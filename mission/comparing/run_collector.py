@@ -11,7 +11,7 @@ import numpy as np
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.document import Mission
-from stopgo.mission.run.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
+from stopgo.mission.run.events import AnyEvent, Health, PoseReport, PosesMissing, ReportsMissing, StateReport
 from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.mission.stages.sight import Sight
 
@@ -32,6 +32,8 @@ class RunSink(Protocol):
     def health(self, health: Health) -> None: ...
 
     def missing(self, gap: PosesMissing) -> None: ...
+
+    def incomplete(self, report: ReportsMissing) -> None: ...
 
 
 class RunCollector:
@@ -82,6 +84,11 @@ class RunCollector:
         """Pass a gap in the poses on."""
         if self._sink is not None:
             self._sink.missing(gap)
+
+    def incomplete(self, report: ReportsMissing) -> None:
+        """Pass on that topics do not arrive."""
+        if self._sink is not None:
+            self._sink.incomplete(report)
 
     def log(self) -> RunLog | None:
         """Return the log of the newest run; None before its first event."""

@@ -286,5 +286,29 @@ class PosesMissing(msgspec.Struct, frozen=True, kw_only=True):
         return f"no poses for {seconds:.1f} s: {self.reason}" if seconds > 0 else f"no poses: {self.reason}"
 
 
+class ReportsMissing(msgspec.Struct, frozen=True, kw_only=True):
+    """Topics of a robot that do not arrive, and the age of its newest state; without topics, all arrive."""
+
+    run_id: str | None
+    robot_ns: Nanoseconds
+    """Time of the newest state on the robot's clock."""
+    state: StateReport | None
+    """The newest state, also one whose events are missing; `None` if none came."""
+    age_s: float
+    """Age of that state."""
+    topics: tuple[str, ...]
+    """A line for each topic, with the reason."""
+    changed: bool = True
+    """True if other topics were missing before."""
+
+    @property
+    def words(self) -> str:
+        """The gaps in words, with the newest state and its age."""
+        if not self.topics:
+            return "all reports arrive again"
+        state = "no state" if self.state is None else f"{self.state.state} {self.age_s:.0f} s ago"
+        return f"{'; '.join(self.topics)} (newest state: {state})"
+
+
 Report = StateReport | PoseReport | AnyEvent
 """Report of a robot on itself and its run."""

@@ -23,6 +23,7 @@ from stopgo.mission.run.events import (
     LinkLost,
     PoseReport,
     PosesMissing,
+    ReportsMissing,
     RevisionDropped,
     RevisionTaken,
     RevisionWaits,
@@ -77,7 +78,9 @@ class RunDrawing:
         self._describe()
 
     def follow(
-        self, mission: Mission, report: StateReport | PoseReport | AnyEvent | PosesMissing | Health
+        self,
+        mission: Mission,
+        report: StateReport | PoseReport | AnyEvent | PosesMissing | ReportsMissing | Health,
     ) -> None:
         """Continue with another revision of the mission from `report` on, and draw its changes."""
         self.read_start_time(report)
@@ -119,6 +122,11 @@ class RunDrawing:
         self._trail.end()
         line = rr.TextLog(gap.words, level="WARN")
         self._at(self.names.log, line, gap.robot_ns)
+
+    def incomplete(self, report: ReportsMissing) -> None:
+        """Log which topics do not arrive, and the age of the newest state."""
+        line = rr.TextLog(report.words, level="WARN" if report.topics else "INFO")
+        self._at(self.names.log, line, report.robot_ns)
 
     def health(self, report: Health) -> None:
         """Write the base's health, and log each change of a value that stops a robot."""
@@ -260,7 +268,9 @@ class RunDrawing:
         for entity in (self.names.flat(entities.RUN_REPORT), entities.LATEST_REPORT):
             self._at(entity, document, event.robot_ns)
 
-    def read_start_time(self, report: StateReport | PoseReport | AnyEvent | PosesMissing | Health) -> None:
+    def read_start_time(
+        self, report: StateReport | PoseReport | AnyEvent | PosesMissing | ReportsMissing | Health
+    ) -> None:
         """Read the mission's start time from a report that contains mission time."""
         seconds = getattr(report, "mission_time_s", None)
         if seconds is not None:

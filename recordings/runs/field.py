@@ -20,6 +20,7 @@ from stopgo.mission.run.events import (
     PoseReport,
     PosesMissing,
     Report,
+    ReportsMissing,
     StateReport,
 )
 from stopgo.recordings.drawing.canvas import Canvas, Sheet, mission_origin, open_canvas
@@ -32,7 +33,7 @@ from stopgo.recordings.rrd.compact import compact
 from stopgo.recordings.rrd.segment_file import SegmentFile
 from stopgo.recordings.runs.drawing import RunDrawing
 
-DrawnReport = Report | Health | PosesMissing
+DrawnReport = Report | Health | PosesMissing | ReportsMissing
 """Reports of a run that are drawn."""
 MOST_POSES = 1000
 """Limit of poses that wait to be drawn together; the state report of each second draws them, too."""
@@ -120,6 +121,12 @@ class FieldRecording:
     def missing(self, gap: PosesMissing) -> None:
         """Draw a gap in the poses: no path is drawn through it."""
         self._accept(gap)
+
+    def incomplete(self, report: ReportsMissing) -> None:
+        """Log that topics of the robot do not arrive, with the age of its newest state."""
+        if report.changed:
+            self._accept(report)
+            self._save()
 
     def event(self, event: AnyEvent) -> None:
         """Draw an event of the robot's journal; afterwards, all earlier reports are on disk."""
@@ -242,7 +249,14 @@ class _Draw(dict[type, Callable[[RunDrawing, Any], None]]):
         return RunDrawing.event
 
 
-_DRAW = _Draw({StateReport: RunDrawing.state, Health: RunDrawing.health, PosesMissing: RunDrawing.missing})
+_DRAW = _Draw(
+    {
+        StateReport: RunDrawing.state,
+        Health: RunDrawing.health,
+        PosesMissing: RunDrawing.missing,
+        ReportsMissing: RunDrawing.incomplete,
+    }
+)
 
 
 def _free_name(path: Path) -> Path:

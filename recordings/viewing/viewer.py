@@ -15,7 +15,7 @@ from pathlib import Path
 from stopgo.mission.console.ports import free_port
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.run.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
+from stopgo.mission.run.events import AnyEvent, Health, PoseReport, PosesMissing, ReportsMissing, StateReport
 from stopgo.recordings.rrd.compact import VIEWER
 from stopgo.recordings.runs.field import FieldRecording
 
@@ -95,3 +95,6 @@ class Viewed:
 
     def missing(self, gap: PosesMissing) -> None:
         self._record.missing(gap)
+
+    def incomplete(self, report: ReportsMissing) -> None:
+        self._record.incomplete(report)

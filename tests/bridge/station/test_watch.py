@@ -48,6 +48,7 @@ from stopgo.mission.run.events import (
     Held,
     PoseReport,
     PosesMissing,
+    ReportsMissing,
     Scanned,
     StateReport,
 )
@@ -131,7 +132,7 @@ def test_lines_tell_a_lost_link_once_and_its_return_once() -> None:
     lines = EventLines(said.append)
     for seconds in (1.0, 2.0, 3.0, 4.0, 5.0, 29.0):
         lines.show(Silence(seconds=seconds))
-    assert said == ["no data for 3 s; retrying"]
+    assert said == ["no data for 2 s; retrying"]
     lines.show(Field().report())
     assert said[1:] == ["data again after 29 s", "r1 is IDLE; waiting for a run"]
     lines.show(Silence(seconds=1.0))
@@ -291,6 +292,8 @@ class Taken:
     def health(self, told: Health) -> None: ...
 
     def missing(self, gap: PosesMissing) -> None: ...
+
+    def incomplete(self, report: ReportsMissing) -> None: ...
 
 
 def test_a_recording_is_handed_every_revision_in_turn_also_when_it_comes_late() -> None:
