@@ -72,9 +72,8 @@ def conform_robot(
 ) -> None:
     """Test every requirement on a robot, as a station, and print which it meets and which it does not.
 
-    The robot receives small missions around its present position; its own mission is stored again at the
-    end. It does not move without --drive. A robot on a run is not tested. Whether its memory is durable is
-    tested by a restart: by --restart, or by asking the person at the terminal.
+    The robot receives small missions around its present position; its own is stored again at the end. It
+    does not move without --drive, and is not tested on a run. Durability is tested by a restart.
 
     Ends with 0 if nothing failed, 1 if something did, 2 if nothing was tested, and 3 if the robot stopped
     answering or its durability was not tested.

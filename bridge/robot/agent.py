@@ -138,16 +138,15 @@ class Agent:
         self._inbox = inbox
         self._recorder = recorder
         self._clock, self._command_clock = clock, command_clock
+        self._stand_still, self._on_failure = stand_still, failed
         self._refusals = refusals or RefusalLog(lambda line: None, now_utc)
         self._contact = StationContact(command_clock)
         self._poses = PublishedPoses(keys.robot, runner.boot_id)
         self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
         self._to_map = None if to_map is None else msgspec.convert(to_map, OwnMap, from_attributes=True)
-        self._stand_still = stand_still
         self._twin_check_ns = command_clock.now_ns()
         self._closing, self._news, self._failed = threading.Event(), threading.Event(), threading.Event()
         self._error: Exception | None = None
-        self._on_failure = failed
         self._threads: list[threading.Thread] = []
         self._state_seq, self._state_lock = 0, threading.Lock()
 
