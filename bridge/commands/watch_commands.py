@@ -34,8 +34,8 @@ Follow the robot's run until it ends, gaps filled from its journal; Ctrl-C leave
 
 Then print every stop as planned and as driven and, with the plan, the coverage of the scans.
 Ends with 0 when the run finished with the required coverage, 1 when it was aborted or covered less
-(without the plan: when a stop was left out), 3 when the scans are not confirmed, as with some
-autopilots, and 2 when the run is complete and its recording is not, as on a full disk. While a
+(without the plan: when a stop was left out), 3 when it cannot be told, as without confirmed
+scans, and 2 when the run is complete and its recording is not, as on a full disk. While a
 vehicle is watched over MAVLink, this command does what the mission says for a stop that failed.
 
 With --run a link loss is waited out, and reading continues at the same entry. A command
@@ -97,7 +97,7 @@ def _display(*, as_json: bool) -> RunDisplay:
 def print_comparison(collector: RunCollector, state: StateReport, *, as_json: bool) -> int:
     """Print the run's comparison with its mission; return the exit code."""
     from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
-    from stopgo.mission.comparing.run_verdict import judge
+    from stopgo.mission.comparing.run_verdict import EXIT_CODES, judge
 
     comparison = collector.compared()
     if as_json:
@@ -105,8 +105,11 @@ def print_comparison(collector: RunCollector, state: StateReport, *, as_json: bo
         print_json(status_json(state) | compared)
     elif comparison is not None:
         print_text(comparison_text(comparison))
-    if comparison is None or state.state != "FINISHED":
-        return 0 if state.state == "FINISHED" else 1
+    if state.state != "FINISHED":
+        return 1
+    if comparison is None:
+        say("the run has finished, but no event or no mission of it was received: its scans cannot be told")
+        return EXIT_CODES["unknown"]
     if collector.sights and comparison.acquired is None:
         say("--plan: belongs to another mission than the run; the coverage of the scans is not known")
     return judge(comparison).exit_code

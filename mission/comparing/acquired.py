@@ -22,7 +22,7 @@ class Acquired:
     seen: BoolArray
     """True for units that enough scanned stops saw (n,)."""
     perhaps: BoolArray
-    """The same, if every passed stop was scanned for which no scan is confirmed."""
+    """The same, if every doubtful stop was scanned."""
     lost: dict[str, float]
     """Gain of a scan at each missing stop, as a fraction of all that is visible."""
     unknown: tuple[str, ...] = ()

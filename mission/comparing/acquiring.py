@@ -28,15 +28,15 @@ def acquired_by(
         return None
     last = plans[-1]
     planned = {stop.id: stop for mission in missions for stop in mission.stops}
-    done = [item.stop for item in stops if item.outcome == SCANNED]
-    unconfirmed = [item.stop for item in stops if item.outcome == UNCONFIRMED]
+    done = [item.stop for item in stops if item.outcome == SCANNED and not item.is_doubtful]
+    doubtful = [item.stop for item in stops if item.is_doubtful]
     views = _views(done, planned, plans)
     seen = last.ledger.enough(views)
     wanted = [item.stop for item in stops if item.outcome not in (SCANNED, UNCONFIRMED)]
     return Acquired(
         sight=last,
         seen=seen,
-        perhaps=last.ledger.enough(views + _views(unconfirmed, planned, plans)),
+        perhaps=last.ledger.enough(views + _views(doubtful, planned, plans)),
         lost={stop: last.brings(stop, views) for stop in wanted if stop in last.ids},
         unknown=tuple(stop for stop in done if _plan_with(stop, planned, plans) is None),
     )

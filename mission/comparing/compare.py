@@ -10,8 +10,11 @@ import numpy as np
 
 from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.acquiring import acquired_by
+from stopgo.mission.comparing.blocked_stops import held_reasons
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
+from stopgo.mission.comparing.evidence import disputed_m, missing_events
 from stopgo.mission.comparing.path_deviation import cross_track_of
+from stopgo.mission.comparing.sighting import sighted_path
 from stopgo.mission.comparing.spans import spans_of
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.schedule import schedule
@@ -53,14 +56,18 @@ def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = 
     plans = [_Planned(item) for item in followed]
     visited = [event.stop for event in log.events if isinstance(event, VISITS)]
     ids = dict.fromkeys([*plans[-1].stops, *(stop for plan in plans for stop in plan.stops), *visited])
-    stops = [_stop(stop, plans, log.events) for stop in ids]
+    held = held_reasons(log, [stop.id for stop in followed[-1].stops])
+    conclusive = log.ended and not missing_events(log)
+    stops = [_stop(stop, plans, log, held.get(stop, ""), conclusive=conclusive) for stop in ids]
     acquired = acquired_by(stops, followed, sights)
+    cross_track = cross_track_of(log, followed)
     return Comparison(
         missions=followed,
         log=log,
         stops=tuple(replace(item, lost=_lost(item, acquired, log.ended)) for item in stops),
         spans=spans_of(log),
-        cross_track=cross_track_of(log, followed),
+        cross_track=cross_track,
+        sighted=sighted_path(log, followed[0], cross_track),
         planned_s=schedule(followed[-1]).total_s,
         driven_s=_end_s(log),
         acquired=acquired,
@@ -94,19 +101,22 @@ class _Planned:
         self.arrival_s = {stop.id: s for stop, s in zip(mission.stops, arrivals, strict=True)}
 
 
-def _stop(stop: str, plans: list[_Planned], events: Sequence[AnyEvent]) -> StopComparison:
-    mine = [event for event in events if isinstance(event, VISITS) and event.stop == stop]
+def _stop(stop: str, plans: list[_Planned], log: RunLog, held: str, *, conclusive: bool) -> StopComparison:
+    mine = [event for event in log.events if isinstance(event, VISITS) and event.stop == stop]
     arrivals = [event for event in mine if isinstance(event, Arrived)]
     ends = [event for event in mine if isinstance(event, Scanned | Unconfirmed)]
     plan = _reached_by(stop, plans, mine[-1].revision if mine else None)
+    outcome = _outcome(mine) if mine or stop in plans[-1].stops else "withdrawn"
     item = StopComparison(
         stop=stop,
         planned_s=None if plan is None else plan.arrival_s[stop],
         arrived_s=arrivals[0].mission_time_s if arrivals else None,
         settle_s=_settling_s(mine),
         tries=_tries(mine),
-        outcome=_outcome(mine) if mine or stop in plans[-1].stops else "withdrawn",
-        reason=_reason(mine),
+        outcome=outcome,
+        reason="; ".join(dict.fromkeys(why for why in (held, _reason(mine)) if why)),
+        disputed_m=None if plan is None else disputed_m(plan.stops[stop], mine, log.poses),
+        is_open=outcome in ("arrived", "not reached") and not conclusive,
     )
     pose = next((event.pose for event in reversed([*arrivals, *ends]) if event.pose is not None), None)
     return item if plan is None or pose is None else _with_offset(item, pose, plan.stops[stop])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from stopgo.mission.comparing.acquired import Acquired
+from stopgo.mission.comparing.sighted_path import SightedPath
 from stopgo.mission.document import Mission
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.run.events import State
@@ -45,6 +47,10 @@ class StopComparison:
     dropped it unreached."""
     reason: str = ""
     """Reason why it was not scanned, in the robot's words."""
+    disputed_m: float | None = None
+    """Distance between the pose in its last event and the poses sent meanwhile; None within the tolerance."""
+    is_open: bool = False
+    """True if the stop may have been scanned, or may still be: events are missing, or the run goes on."""
     lost: float | None = None
     """Fraction of all visible that its scan would have added; None if it is not missing."""
 
@@ -61,9 +67,21 @@ class StopComparison:
         return away is not None and limit is not None and is_outside(away, limit)
 
     @property
+    def is_doubtful(self) -> bool:
+        """True if nothing tells for certain that it was scanned, or that it was not."""
+        return self.outcome == "unconfirmed" or self.disputed_m is not None or self.is_open
+
+    @property
+    def disputed_text(self) -> str:
+        """The contradiction in words; empty if there is none."""
+        if self.disputed_m is None:
+            return ""
+        return f"event and sent poses are {1000 * self.disputed_m:.0f} mm apart"
+
+    @property
     def outside_text(self) -> str:
         """Position error of a scanned or passed stop outside tolerance, in words; empty if within."""
-        if self.outcome not in DONE or not self.outside_tolerance:
+        if self.disputed_m is not None or self.outcome not in DONE or not self.outside_tolerance:
             return ""
         return f"{DONE[self.outcome]} {position_error_text(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
 
@@ -92,6 +110,10 @@ class CrossTrack:
     """Signed distance, positive to the left of the driving direction (n,); NaN where no leg is driven."""
     arc: FloatArray
     """Distance along the path since the last stop (n,)."""
+    route: FloatArray
+    """Distance along all legs since the start (n,); NaN on the way back."""
+    route_end: float = math.nan
+    """The same where the driven path ended, by the events; NaN if they do not tell it."""
 
     @property
     def greatest(self) -> int | None:
@@ -115,6 +137,7 @@ class Comparison:
     stops: tuple[StopComparison, ...]
     spans: tuple[Span, ...]
     cross_track: CrossTrack
+    sighted: SightedPath
     planned_s: float
     driven_s: float | None
     """Duration of the run; None if it has not ended."""

@@ -43,7 +43,7 @@ def stop_cells(item: StopComparison) -> tuple[str, ...]:
         _number(item.heading_rad, 180 / math.pi, sign="+"),
         *(_number(item.settle_s), str(item.tries)),
         _number(item.lost, 100),
-        "; ".join(why for why in (item.outside_text, item.reason) if why),
+        "; ".join(why for why in (item.outside_text, item.disputed_text, item.reason) if why),
     )
 
 
@@ -57,7 +57,7 @@ def _number(value: float | None, scale: float = 1.0, *, sign: str = "-") -> str:
 def _totals(comparison: Comparison) -> list[str]:
     position, cross_track = comparison.greatest_deviation_m, comparison.cross_track.greatest_m
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
-    paused_s = comparison.seconds_in("PAUSED", "HELD")
+    paused_s, seen = comparison.seconds_in("PAUSED", "HELD"), comparison.sighted
     revisions = [str(mission.revision) for mission in comparison.missions]
     several = [f"revisions {', '.join(revisions)} of the mission, one after another"]
     return [
@@ -66,7 +66,9 @@ def _totals(comparison: Comparison) -> list[str]:
         f"run {printable(comparison.run_id or 'without a name')}: {comparison.scanned} of "
         f"{len(comparison.asked)} stops scanned; planned {duration(comparison.planned_s)}, driven {driven}"
         + (f", of which paused or held {duration(paused_s)}" if paused_s else ""),
-        f"greatest position error {_millimetres(position)}, cross-track error {_millimetres(cross_track)}",
+        f"greatest position error {_millimetres(position)}, cross-track error "
+        + (f"≤ {_millimetres(cross_track)} {seen.limits}" if seen.gaps else _millimetres(cross_track)),
+        *seen.lines,
     ]
 
 
@@ -115,12 +117,34 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         "greatest_deviation_m": comparison.greatest_deviation_m,
         "greatest_beside_route_m": comparison.cross_track.greatest_m,
         "travelled_m": comparison.log.poses.length_m if len(comparison.log.poses) else None,
+        **_seen_json(comparison),
         "pieces": _pieces(comparison),
         "coverage": None if comparison.acquired is None else _acquired_json(comparison.acquired),
         "stops": [_stop_json(item) for item in comparison.stops],
         "states": [
             {"state": span.state, "begin_s": span.begin_s, "end_s": span.end_s, "why": span.why}
             for span in comparison.spans
+        ],
+    }
+
+
+def _seen_json(comparison: Comparison) -> dict[str, Any]:
+    """Return the seen fraction of the path (None without poses), and the gaps in the poses."""
+    seen = comparison.sighted
+    return {
+        "seen": seen.fraction if len(comparison.log.poses) else None,
+        "unseen_s": seen.unseen_s,
+        "unseen_m": seen.unseen_m,
+        "gaps": [
+            {
+                "begin_s": gap.begin_s,
+                "end_s": gap.end_s,
+                "begin": gap.begin,
+                "end": gap.end,
+                "unseen_m": gap.metres,
+                "restarted": gap.restarted,
+            }
+            for gap in seen.gaps
         ],
     }
 
@@ -140,7 +164,7 @@ def _pieces(comparison: Comparison) -> list[list[str]] | None:
 def _stop_json(item: StopComparison) -> dict[str, Any]:
     keys = (
         *("stop", "outcome", "reason", "planned_s", "arrived_s", "late_s", "deviation_m", "along_m"),
-        *("across_m", "heading_rad", "tolerance_m", "settle_s", "tries", "lost"),
+        *("across_m", "heading_rad", "tolerance_m", "settle_s", "tries", "lost", "disputed_m"),
     )
     return {**{key: getattr(item, key) for key in keys}, "outside_tolerance": bool(item.outside_text)}
 

@@ -41,8 +41,10 @@ Invariants
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -74,15 +76,18 @@ def cross_track_of(log: RunLog, missions: Sequence[Mission]) -> CrossTrack:
     follower = PathFollower(missions[0])
     poses = log.poses.between(log.began_ns or 0, log.ended_ns or 0)
     revised = {mission.revision: mission for mission in missions}
-    measured, at = [], 0
+    measured, at, route = [], 0, []
     for event in log.events:
         behind = int(np.searchsorted(poses.ns, event.robot_ns, side="right"))
         measured.append(follower.measure(poses.xy[at:behind]))
+        route.append(follower.begin_m + measured[-1][:, 1])
         at = max(at, behind)
         follower.take(event, revised.get(event.revision))
     measured.append(follower.measure(poses.xy[at:]))
+    route.append(follower.begin_m + measured[-1][:, 1])
     table = np.concatenate(measured)
-    return CrossTrack(poses.ns, frozen(table[:, 0]), frozen(table[:, 1]))
+    columns = frozen(table[:, 0]), frozen(table[:, 1]), frozen(np.concatenate(route))
+    return CrossTrack(poses.ns, *columns, follower.end_m)
 
 
 class PathFollower:
@@ -94,6 +99,10 @@ class PathFollower:
         self._from = 0
         self._to = 0
         self._path = _DrivenPath(self._legs(), anywhere=True)
+        self.begin_m = 0.0
+        """Distance along all legs where the measured path begins; NaN on the way back."""
+        self.end_m = 0.0
+        """Distance along all legs of the last leg's end that the events tell; NaN on the way back."""
 
     def take(self, event: AnyEvent, revised: Mission | None = None) -> None:
         """Take an event; for a `RevisionTaken`, `revised` is the new mission."""
@@ -111,10 +120,14 @@ class PathFollower:
     def _follow(self, mission: Mission) -> None:
         self._mission = mission
         self._number = {stop.id: number for number, stop in enumerate(mission.stops)}
+        lengths = (_DrivenPath([stop.approach]).length_m for stop in mission.stops)
+        self._route = tuple(accumulate(lengths, initial=0.0))
+        """Length of all legs before each leg, and of all."""
 
     def _start(self, event: Started) -> None:
         self._from = self._to = 0
         self._path = _DrivenPath(self._legs(), anywhere=True)
+        self.begin_m = self.end_m = 0.0
 
     def _arrive(self, event: Any) -> None:
         """Complete the leg to the stop where the robot has arrived."""
@@ -124,6 +137,7 @@ class PathFollower:
                 self._to = number
                 self._path = self._path.extended(self._legs())
             self._from = number + 1
+            self.end_m = self._route[self._from]
 
     def _leave(self, event: Any) -> None:
         """Go on to the next leg after a stop that is done, or that was skipped."""
@@ -138,13 +152,17 @@ class PathFollower:
         self._to = number
         legs = self._legs()
         self._path = _DrivenPath(legs) if leaving else self._path.extended(legs)
+        if leaving:
+            self.begin_m = self.end_m = self._route[self._from]
 
     def _home(self, event: Homing) -> None:
         """Take the return leg if all legs are complete, else the driven legs in reverse."""
         count = len(self._mission.stops)
         if self._mission.return_ is not None and self._from >= count:
             self._path = _DrivenPath([self._mission.return_])
+            self.begin_m = self.end_m = self._route[count]
             return
+        self.begin_m = self.end_m = math.nan
         legs = [stop.approach for stop in self._mission.stops[: min(self._to, count - 1) + 1]]
         self._path = _DrivenPath([tuple(reversed(leg)) for leg in reversed(legs)], anywhere=True)
 
@@ -157,6 +175,8 @@ class PathFollower:
         return legs
 
     def _end(self, event: AnyEvent) -> None:
+        if self._to >= len(self._mission.stops) and self._from >= len(self._mission.stops):
+            self.end_m = self.begin_m + self._path.length_m
         self._path = _DrivenPath([])
 
 
@@ -189,6 +209,10 @@ class _DrivenPath:
         self.begin = np.concatenate([[0.0], np.cumsum(self.length)])[:-1]
         self.cost = np.full(len(both), 0.0 if anywhere else np.inf)
         self.cost[:1] = 0.0
+
+    @property
+    def length_m(self) -> float:
+        return float(self.length.sum())
 
     def extended(self, legs: Iterable[Sequence[Point]]) -> _DrivenPath:
         """Return a path of these legs that keeps the costs of this one's segments."""

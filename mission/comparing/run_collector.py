@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.document import Mission
+from stopgo.mission.run.boots import joined_boots
 from stopgo.mission.run.events import AnyEvent, Health, PoseReport, PosesMissing, ReportsMissing, StateReport
 from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.mission.stages.sight import Sight
@@ -63,8 +65,9 @@ class RunCollector:
     def pose(self, report: PoseReport) -> None:
         """Take a pose, if it is of a run."""
         if self._is_of(report.run_id):
-            self._ns.append(report.robot_ns)
-            self._poses.extend((report.pose.x, report.pose.y, report.pose.heading))
+            ns, poses = self._boots.setdefault(report.boot_id, (array("q"), array("d")))
+            ns.append(report.robot_ns)
+            poses.extend((report.pose.x, report.pose.y, report.pose.heading))
         if self._sink is not None:
             self._sink.pose(report)
 
@@ -92,12 +95,13 @@ class RunCollector:
 
     def log(self) -> RunLog | None:
         """Return the log of the newest run; None before its first event."""
-        events = tuple(self._events[number] for number in sorted(self._events))
-        if not events:
+        if not self._events:
             return None
-        last, table = events[-1], np.array(self._poses).reshape(-1, 3)
-        poses = Track.of(np.array(self._ns, dtype=np.int64), table[:, :2], table[:, 2])
-        return RunLog(last.robot, last.run_id, last.mission_id, last.revision, SOURCE, poses, events)
+        tracks = {boot: _track(*columns) for boot, columns in self._boots.items()}
+        joined = joined_boots([self._events[number] for number in sorted(self._events)], tracks)
+        last, source = joined.events[-1], replace(SOURCE, notes=joined.notes)
+        about = (last.robot, last.run_id, last.mission_id, last.revision)
+        return RunLog(*about, source, joined.poses, joined.events)
 
     def compared(self) -> Comparison | None:
         """Return the comparison of the newest run; None if its events or its mission are missing."""
@@ -116,7 +120,13 @@ class RunCollector:
 
     def _forget(self) -> None:
         self._events: dict[int, AnyEvent] = {}
-        self._ns, self._poses = array("q"), array("d")
+        self._boots: dict[str, tuple[array[int], array[float]]] = {}
+        """Times and poses of each boot of the robot."""
+
+
+def _track(ns: array[int], poses: array[float]) -> Track:
+    table = np.array(poses).reshape(-1, 3)
+    return Track.of(np.array(ns, dtype=np.int64), table[:, :2], table[:, 2])
 
 
 def track_of(reports: Sequence[PoseReport]) -> Track:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 from stopgo.mission.comparing.acquired import Acquired, Certainty
 from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.comparing.evidence import missing_events
 from stopgo.mission.run.events import Aborted
 from stopgo.mission.stages.figures import percent
 
 EXIT_CODES: dict[Certainty, int] = {"yes": 0, "no": 1, "unknown": 3}
-HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Not known"}
+HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Cannot be told"}
 MOST_NAMED = 6
 """Number of stops named in a sentence; of more, only their number is given."""
 
@@ -49,11 +50,11 @@ def _answer(comparison: Comparison) -> Certainty:
     if comparison.outside:
         return "no"
     if acquired is not None:
-        return acquired.answer
-    if comparison.missing:
+        disputed = any(item.disputed_m is not None for item in comparison.asked)
+        return "unknown" if disputed and acquired.answer == "yes" else acquired.answer
+    if any(not item.is_doubtful for item in comparison.missing):
         return "no"
-    unsure = any(item.outcome == "unconfirmed" for item in comparison.asked)
-    return "unknown" if unsure else "yes"
+    return "unknown" if any(item.is_doubtful for item in comparison.asked) else "yes"
 
 
 def _sentences(comparison: Comparison) -> Iterator[str]:
@@ -67,11 +68,24 @@ def _sentences(comparison: Comparison) -> Iterator[str]:
     yield from _outcomes(comparison)
     for item in comparison.outside:
         yield f"{item.stop} was {item.outside_text}."
-    if not comparison.log.ended:
-        yield "The run has not ended."
+    yield from _missing_evidence(comparison)
     for event in comparison.log.events:
         if isinstance(event, Aborted):
             yield f"The run was aborted: {event.reason}."
+
+
+def _missing_evidence(comparison: Comparison) -> Iterator[str]:
+    """Yield what the evidence lacks, and what would tell it."""
+    for item in comparison.asked:
+        if item.disputed_m is not None:
+            yield f"{item.stop} cannot be told: {item.disputed_text}; the scan's cloud would tell."
+    if any(item.outcome == "unconfirmed" for item in comparison.asked):
+        yield "The scanner's files would tell which of the unconfirmed scans were made."
+    if not comparison.log.ended:
+        yield "The run has not ended."
+    missing = missing_events(comparison.log)
+    if missing:
+        yield f"The recording lacks {missing}; `stopgo watch --run` would fetch them from the robot."
 
 
 def _coverage(acquired: Acquired) -> Iterator[str]:

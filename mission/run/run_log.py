@@ -7,14 +7,16 @@ them, and `RunLog.alignment` records the transform.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Started
+from stopgo.mission.run.pose_gaps import gap_limit_ns, gaps_after
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +29,17 @@ class Track:
     """Positions (n, 2), metres in the mission's frame."""
     heading: FloatArray
     """Headings (n,), radians counter-clockwise from +x."""
+    restarts_ns: tuple[int, ...] = ()
+    """Times of the first data after each restart of the robot: no path joins the poses around them."""
 
     @classmethod
-    def of(cls, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike) -> Track:
+    def empty(cls) -> Track:
+        return cls.of((), (), ())
+
+    @classmethod
+    def of(
+        cls, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike, *, restarts_ns: Iterable[int] = ()
+    ) -> Track:
         """A track from poses in any order.
 
         Raises
@@ -46,15 +56,26 @@ class Track:
         if not (np.isfinite(positions).all() and np.isfinite(headings).all()):
             raise ValueError("a pose is not finite")
         order = np.argsort(times, kind="stable")
-        return cls(frozen(times[order], np.int64), frozen(positions[order]), frozen(headings[order]))
+        rows = frozen(times[order], np.int64), frozen(positions[order]), frozen(headings[order])
+        return cls(*rows, tuple(restarts_ns))
 
     def __len__(self) -> int:
         return len(self.ns)
 
+    @cached_property
+    def gaps(self) -> BoolArray:
+        """Mask of the poses that a gap follows (n - 1,)."""
+        return gaps_after(self.ns, self.restarts_ns)
+
     @property
     def length_m(self) -> float:
-        """Distance travelled, from pose to pose."""
-        return float(np.hypot(*np.diff(self.xy, axis=0).T).sum()) if len(self) > 1 else 0.0
+        """Distance travelled, from pose to pose; what was driven in a gap is not known and not counted."""
+        return float(np.hypot(*np.diff(self.xy, axis=0).T)[~self.gaps].sum()) if len(self) > 1 else 0.0
+
+    @property
+    def paths(self) -> list[FloatArray]:
+        """Positions between the gaps, as lines (k, 2)."""
+        return np.split(self.xy, np.flatnonzero(self.gaps) + 1) if len(self) else []
 
     def between(self, begin_ns: int, end_ns: int) -> Track:
         """The poses from `begin_ns` to `end_ns`, both included."""
@@ -66,13 +87,14 @@ class Track:
         found = int(np.searchsorted(self.ns, ns, side="right")) - 1
         return found if found >= 0 else None
 
+    def is_known(self, index: int, ns: int) -> bool:
+        """True if no gap is between the pose at an index and the time `ns`, where it is the newest."""
+        steps = np.diff(self.ns)
+        return ns - int(self.ns[index]) <= gap_limit_ns(steps[steps > 0])
+
     def _rows(self, rows: slice) -> Track:
-        return Track(frozen(self.ns[rows], np.int64), frozen(self.xy[rows]), frozen(self.heading[rows]))
-
-
-def _no_poses() -> Track:
-    empty: NDArray[Any] = np.empty(0)
-    return Track.of(empty, empty, empty)
+        kept = frozen(self.ns[rows], np.int64), frozen(self.xy[rows]), frozen(self.heading[rows])
+        return Track(*kept, self.restarts_ns)
 
 
 @dataclass(frozen=True)
@@ -121,7 +143,7 @@ class RunLog:
     revision: int | None
     """The revision that was followed last."""
     source: LogSource
-    poses: Track = field(default_factory=_no_poses)
+    poses: Track = field(default_factory=Track.empty)
     events: tuple[AnyEvent, ...] = ()
     """In the order of their numbers."""
     alignment: Alignment | None = None

@@ -117,6 +117,14 @@ def range_lines(targets: Targets, segment: IntArray, first: IntArray, last: IntA
     return a[:, None] + t[:, :, None] * (b - a)[:, None]
 
 
+def dashes(ends: FloatArray, length: float) -> FloatArray:
+    """Return dashes (k, 2, 2) of a length along a straight line (2, 2), as far apart as they are long."""
+    whole = float(np.hypot(*(ends[1] - ends[0])))
+    begins = np.arange(0.0, whole, 2 * length)
+    t = np.stack([begins, np.minimum(begins + length, whole)], axis=1) / max(whole, length)
+    return ends[0] + t[:, :, None] * (ends[1] - ends[0])
+
+
 def circle(radius: float, points: int = 32) -> FloatArray:
     """Return a closed circle (points + 1, 2) around the origin."""
     angle = np.linspace(0.0, 2 * np.pi, points + 1)

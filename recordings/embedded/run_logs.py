@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from hashlib import file_digest
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.run.boots import joined_boots
 from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.recordings.drawing import entities
@@ -40,18 +43,27 @@ def _source(path: Path, digest: str, contents: Contents) -> LogSource:
 def _log(run_id: str, values: Values, source: LogSource) -> RunLog:
     names = entities.RunEntities(run_id)
     events = {event.number: event for event in _events(values, names.events, source.name)}
-    ns, poses = values.columns(names.flat(entities.ROBOT), "x", "y", "heading")
-    ordered = tuple(events[number] for number in sorted(events))
+    joined = joined_boots([events[number] for number in sorted(events)], _poses(values, names))
+    ordered = joined.events
     last = ordered[-1] if ordered else None
     return RunLog(
         robot="" if last is None else last.robot,
         run_id=run_id,
         mission_id=None if last is None else last.mission_id,
         revision=None if last is None else last.revision,
-        source=source,
-        poses=Track.of(ns, poses[:, :2], poses[:, 2]),
+        source=replace(source, notes=(*source.notes, *joined.notes)),
+        poses=joined.poses,
         events=ordered,
     )
+
+
+def _poses(values: Values, names: entities.RunEntities) -> dict[str, Track]:
+    """Return the poses of each boot of the robot; recordings of older versions do not name the boot."""
+    entity = names.flat(entities.ROBOT)
+    ns, poses = values.columns(entity, "x", "y", "heading")
+    boots = np.array(values.texts(entity, "boot_id", "x", "y", "heading"), dtype=np.str_)
+    mine = {str(boot): boots == boot for boot in np.unique(boots)}
+    return {boot: Track.of(ns[rows], poses[rows, :2], poses[rows, 2]) for boot, rows in mine.items()}
 
 
 def _events(values: Values, entity: str, name: str) -> list[AnyEvent]:

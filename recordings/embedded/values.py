@@ -49,6 +49,20 @@ class Values:
         times = np.concatenate([np.empty(0, np.int64), *(ns for ns, _ in parts)])
         return times, np.concatenate([np.empty((0, len(components))), *(table for _, table in parts)])
 
+    def texts(self, entity: str, component: str, *beside: str) -> list[str]:
+        """Return a text of each row that `columns` returns for `beside`; empty where a row has none."""
+        found: list[str] = []
+        for chunk in self.chunks.get(entity, ()):
+            batch = chunk.to_record_batch()
+            count, columns = len(_columns(batch, beside)[0]), _components(batch)
+            cells = (
+                columns[component].filter(_having(columns, beside)).to_pylist()
+                if component in columns and count
+                else []
+            )
+            found += [cell[0] if cell else "" for cell in cells] or [""] * count
+        return found
+
 
 def _components(batch: Any) -> dict[str, Any]:
     return {name.rpartition(":")[2]: batch.column(name) for name in batch.schema.names if ":" in name}
@@ -63,7 +77,12 @@ def _columns(batch: Any, components: tuple[str, ...]) -> tuple[IntArray, FloatAr
     columns = _components(batch)
     if not set(components) <= set(columns) or entities.ROBOT_TIME not in batch.schema.names:
         return np.empty(0, np.int64), np.empty((0, len(components)))
-    having = np.logical_and.reduce([columns[name].is_valid().to_numpy(False) for name in components])
+    having = _having(columns, components)
     ns = batch.column(entities.ROBOT_TIME).cast("int64").to_numpy(zero_copy_only=False)[having]
     table = [columns[name].filter(having).flatten().to_numpy(zero_copy_only=False) for name in components]
     return ns, np.stack(table, axis=1).astype(np.float64)
+
+
+def _having(columns: dict[str, Any], components: tuple[str, ...]) -> Any:
+    """Return a mask of the rows with all these components."""
+    return np.logical_and.reduce([columns[name].is_valid().to_numpy(False) for name in components])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.files.svg import text_width
 from stopgo.mission.geometry import BoolArray, FloatArray, bounds
@@ -168,8 +169,26 @@ def _paths(mission: Mission, comparison: Comparison | None, frame: PictureFrame)
     legs = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
     yield stroke(frame.path(legs), "#444", 1.1, stroke_dasharray="6 4")
     if comparison is not None and len(comparison.log.poses):
-        driven = _thinned(comparison.log.poses.xy, max(frame.width, frame.height) / 1500)
-        yield stroke(frame.path([driven]), PURPLE, 2, stroke_linejoin="round", stroke_opacity=0.9)
+        least = max(frame.width, frame.height) / 1500
+        driven = [_thinned(path, least) for path in comparison.log.poses.paths]
+        yield stroke(frame.path(driven), PURPLE, 2, stroke_linejoin="round", stroke_opacity=0.9)
+        yield from _gaps(comparison, frame)
+
+
+def _gaps(comparison: Comparison, frame: PictureFrame) -> Iterator[str]:
+    """Draw gaps in the poses dashed between their ends, the longest with their duration."""
+    named = {gap for gap in comparison.sighted.longest if gap.metres > 2 * frame.mark}
+    for gap in comparison.sighted.gaps:
+        if gap.begin is None or gap.end is None:
+            continue
+        line = frame.path([np.array([gap.begin, gap.end])])
+        yield tag("g", tag("title", shown(gap.words)), stroke(line, PURPLE, 1.8, stroke_dasharray="3 4"))
+        if gap in named:
+            x, y = np.mean([frame.to_picture(*gap.begin), frame.to_picture(*gap.end)], axis=0).tolist()
+            label = f"{duration(gap.seconds)}, {gap.metres:.1f} m unseen"
+            size = {"font_size": f"{1.1 * frame.mark:.3f}", "text_anchor": "middle", "fill": "#6b2a55"}
+            halo = {"stroke": "#fff", "stroke_width": f"{0.25 * frame.mark:.3f}", "paint_order": "stroke"}
+            yield tag("text", shown(label), x=f"{x:.3f}", y=f"{y:.3f}", **size, **halo)
 
 
 def _thinned(xy: FloatArray, least: float) -> FloatArray:

@@ -11,6 +11,7 @@ from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.console.table import duration
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.run.events import Scanned
+from stopgo.mission.run.pose_gaps import gaps_after
 from stopgo.recordings.page.style import BLUE, GREY, PURPLE, VERMILION
 from stopgo.recordings.page.words import shown, tag
 
@@ -45,8 +46,10 @@ def _plots(comparison: Comparison) -> Iterator[str]:
         limits = [
             PlotLine(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3") for side in (tolerance, -tolerance)
         ]
-        curve = PlotLine(*_decimated(seconds, 1000 * cross_track.metres[finite]), PURPLE)
-        yield _plot("cross-track error, mm, left positive; dashed: tolerance", [*limits, curve])
+        cuts = np.flatnonzero(gaps_after(cross_track.ns[finite], log.poses.restarts_ns)) + 1
+        pieces = zip(np.split(seconds, cuts), np.split(1000 * cross_track.metres[finite], cuts), strict=True)
+        curves = [PlotLine(*_decimated(x, y), PURPLE) for x, y in pieces]
+        yield _plot("cross-track error, mm, left positive; dashed: tolerance", [*limits, *curves])
     delays = [(item.arrived_s, item.late_s) for item in comparison.stops if item.late_s is not None]
     if delays:
         times, values = np.array(delays, dtype=np.float64).T

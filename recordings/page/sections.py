@@ -137,13 +137,15 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
     yield section("Stops", tag("div", _stop_grid(comparison), class_="scroll"))
     if comparison.acquired is not None:
         yield tag("div", *_coverage_tables(comparison.acquired), class_="columns")
+    gaps = [tag("li", shown(line)) for line in comparison.sighted.lines]
+    yield section("Gaps in the poses", tag("ul", *gaps) if gaps else "")
     for title, lines in subject.more.get(comparison.run_id, ()):
         yield section(title, tag("ul", *(tag("li", shown(line)) for line in lines)))
     yield section("During the run", plots(comparison))
 
 
 def _tiles(comparison: Comparison) -> Iterator[str]:
-    deviation_m, cross_track_m = comparison.greatest_deviation_m, comparison.cross_track.greatest_m
+    deviation_m = comparison.greatest_deviation_m
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
     tolerance = max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
     paused, held = (sum(span.state == state for span in comparison.spans) for state in ("PAUSED", "HELD"))
@@ -160,9 +162,17 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
     yield tile("greatest position error at a stop", _millimetres(deviation_m), limit)
     poses = comparison.log.poses
     driven_m = f"{poses.length_m:.1f} m driven" if len(poses) else "the path is not in the log"
-    yield tile("greatest cross-track error", _millimetres(cross_track_m), driven_m)
+    limits = comparison.sighted.limits
+    note = f"{driven_m} {limits}" if limits else driven_m
+    yield tile("greatest cross-track error", _path_error(comparison), note)
     stationary_s = comparison.seconds_in("PAUSED", "HELD")
     yield tile("stationary", duration(stationary_s), f"paused {paused}, held {held}")
+
+
+def _path_error(comparison: Comparison) -> str:
+    """Return the greatest cross-track error; of a path with gaps, it is that of the seen part."""
+    greatest = _millimetres(comparison.cross_track.greatest_m)
+    return f"≤ {greatest}" if comparison.sighted.gaps else greatest
 
 
 def _millimetres(metres: float | None) -> str:
@@ -191,7 +201,10 @@ def _pictured(subject: ReportSubject, comparison: Comparison | None) -> str:
     if comparison is not None:
         diamond = tag("path", d="M13 1L18 6L13 11L8 6Z", fill=YELLOW, stroke="#111")
         cross = tag("path", d="M8 1H18V11H8ZM10 3L16 9M10 9L16 3", fill=VERMILION, stroke="#111")
-        marks += [(line_sample(PURPLE, 2), "driven path"), (cross, "not scanned"), (diamond, "stationary")]
+        marks += [(line_sample(PURPLE, 2), "driven path")]
+        if comparison.sighted.gaps:
+            marks.append((line_sample(PURPLE, 1.8, "3 4"), "no poses: path unseen"))
+        marks += [(cross, "not scanned"), (diamond, "stationary")]
     return legend(marks) + plan_picture(subject, comparison)
 
 
@@ -222,7 +235,8 @@ def _stop_grid(comparison: Comparison) -> str:
 
 
 def _stop_cells(item: StopComparison) -> list[str]:
-    outcome = ": ".join(word for word in (item.outside_text or item.outcome, item.reason) if word)
+    words = (item.outside_text or item.outcome, item.disputed_text, item.reason)
+    outcome = ": ".join(word for word in words if word)
     return [
         *(shown(item.stop), shown(outcome), _clock(item.planned_s), _clock(item.arrived_s)),
         *(number(item.late_s, sign=True), number(item.along_m, 1000, sign=True)),
@@ -319,7 +333,8 @@ _ROWS = (
     ("coverage", lambda run: "" if run.acquired is None else percent(run.acquired.shares.whole.coverage)),
     ("run time", lambda run: _clock(run.driven_s)),
     ("greatest position error at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
-    ("greatest cross-track error", lambda run: _millimetres(run.cross_track.greatest_m)),
+    ("greatest cross-track error", _path_error),
+    ("path seen", lambda run: percent(run.sighted.fraction) if len(run.log.poses) else ""),
     ("stationary", lambda run: duration(run.seconds_in("PAUSED", "HELD"))),
 )
 """Rows of the table of runs."""

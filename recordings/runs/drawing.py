@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -43,8 +44,10 @@ from stopgo.recordings.plan.mission import ABOVE_FLOOR, state_colours
 from stopgo.recordings.runs.acquired_drawing import AcquiredDrawing
 from stopgo.recordings.runs.report import StopRecord, run_report
 from stopgo.recordings.runs.revision import change_between, draw_change
-from stopgo.recordings.runs.trail import Thinner, Trail
+from stopgo.recordings.runs.trail import Thinner, Trail, TrailGap
 
+DASH_M = 0.15
+"""Length in metres of a dash, and of the space after it."""
 SOLID_S = 0.5
 """Interval in seconds of the robot's poses in 3D."""
 WARNINGS = (Skipped, Failed, Unconfirmed, Held, LinkLost, Aborted)
@@ -71,6 +74,7 @@ class RunDrawing:
         self.records: dict[str, StopRecord] = {}
         self._began_ns: int | None = None
         self._last_xy: FloatArray | None = None
+        self._boot_id = ""
         self._acquired = AcquiredDrawing(sights[-1]) if sights else None
         self._thinner, self._trail, self._cross_track = Thinner(), Trail(), DelayedDeviation(mission)
         self._stops: dict[str, bool | None] = {}
@@ -91,8 +95,14 @@ class RunDrawing:
         self.stops = {stop.id: stop for stop in mission.stops}
         self._describe()
 
-    def poses(self, track: Track) -> None:
-        """Move the robot, and extend its path. `measure` plots what depends on later events."""
+    def poses(self, track: Track, boot_id: str = "") -> None:
+        """Move the robot, and extend its path. `measure` plots what depends on later events.
+
+        All poses are of one boot; no path joins the poses of two.
+        """
+        if boot_id != self._boot_id:
+            self._trail.end()
+            self._boot_id = boot_id
         poses = self._thinner.thin(track)
         if not len(poses):
             return
@@ -102,7 +112,7 @@ class RunDrawing:
             draw_robot(draw, *robots, radius=self.mission.robot.radius, colour=palette.DRIVEN)
         self._move(poses)
         self._extend_path(poses)
-        self._cross_track.poses(poses)
+        self._cross_track.poses(poses, boot_id)
         self._last_xy = poses.xy[-1]
 
     def state(self, report: StateReport) -> None:
@@ -170,9 +180,10 @@ class RunDrawing:
         states = state_colours()
         for lane in (entities.STATE, entities.STOP_STATE):
             canvas.show(names.flat(lane), states)
-        style(canvas, names.flat(entities.DRIVEN), Pen(palette.DRIVEN, "robot", on_screen(1.5)))
-        solid = rr.LineStrips3D.from_fields(colors=palette.DRIVEN, radii=0.03)
-        canvas.show(names.solid(entities.DRIVEN), solid)
+        for name, points in ((entities.DRIVEN, 1.5), (entities.UNSEEN, 0.75)):
+            style(canvas, names.flat(name), Pen(palette.DRIVEN, "robot", on_screen(points)))
+            solid = rr.LineStrips3D.from_fields(colors=palette.DRIVEN, radii=0.02 * points)
+            canvas.show(names.solid(name), solid)
         for metric, name in _PLOTTED.items():
             canvas.show(names.metric(metric), rr.SeriesLines(colors=palette.DRIVEN, names=name, widths=1.5))
         dots = rr.SeriesPoints(colors=palette.ARRIVED.colour, marker_sizes=4, names="deviation")
@@ -200,9 +211,10 @@ class RunDrawing:
         """Move the robot to its poses, and write them as exact values: Rerun draws in float32."""
         rotation = quaternions(poses.heading)
         positions = strokes.level(self.canvas.local(poses.xy), 0.0)
-        exact = {"x": poses.xy[:, 0], "y": poses.xy[:, 1], "heading": poses.heading}
+        exact: dict[str, Any] = {"x": poses.xy[:, 0], "y": poses.xy[:, 1], "heading": poses.heading}
+        boots = {"boot_id": [self._boot_id] * len(poses)}
         moves = rr.Transform3D.columns(translation=positions, quaternion=rotation)
-        values = rr.DynamicArchetype.columns(archetype="Pose", components=exact)
+        values = rr.DynamicArchetype.columns(archetype="Pose", components=exact | boots)
         self._columns(self.names.flat(entities.ROBOT), poses.ns, moves, values)
         thinned = self._thinned_for_3d(poses.ns)
         self._columns(
@@ -224,6 +236,22 @@ class RunDrawing:
             self._columns(self.names.flat(entities.DRIVEN), ns, rr.LineStrips2D.columns(strips=flat))
             raised = [strokes.level(strip, 2 * ABOVE_FLOOR) for strip in flat]
             self._columns(self.names.solid(entities.DRIVEN), ns, rr.LineStrips3D.columns(strips=raised))
+        gaps, self._trail.unseen = self._trail.unseen, []
+        for gap in gaps:
+            self._draw_gap(gap)
+
+    def _draw_gap(self, gap: TrailGap) -> None:
+        """Draw a gap dashed between its ends, with its duration and their distance."""
+        dashes = strokes.dashes(gap.ends, DASH_M)
+        if not len(dashes):
+            return
+        seconds = f" for {gap.seconds:.1f} s" if gap.seconds > 0 else ""
+        label = f"no poses{seconds}; {math.dist(*gap.ends):.1f} m apart"
+        flat = self.canvas.strips(dashes)
+        lines = rr.LineStrips2D(flat, labels=[label, *[""] * (len(flat) - 1)], show_labels=len(flat) > 1)
+        self._at(self.names.flat(entities.UNSEEN), lines, gap.end_ns)
+        raised = [strokes.level(strip, 2 * ABOVE_FLOOR) for strip in flat]
+        self._at(self.names.solid(entities.UNSEEN), rr.LineStrips3D(raised), gap.end_ns)
 
     def measure(self, until_ns: int | None = None) -> None:
         """Plot the cross-track error, up to a time until which all events are known."""

@@ -222,13 +222,13 @@ class FieldRecording:
         _DRAW[type(report)](run, report)
 
     def _draw_poses(self) -> None:
-        """Draw the collected poses, run by run."""
+        """Draw the collected poses, run by run and boot by boot."""
         poses, self._poses = self._poses, []
-        for run_id in dict.fromkeys(item.run_id for item in poses):
-            mine = [item for item in poses if item.run_id == run_id]
+        for run_id, boot_id in dict.fromkeys((item.run_id, item.boot_id) for item in poses):
+            mine = [item for item in poses if (item.run_id, item.boot_id) == (run_id, boot_id)]
             run = self._runs[str(run_id)]
             run.read_start_time(mine[-1])
-            run.poses(track_of(mine))
+            run.poses(track_of(mine), boot_id)
 
     def _start(self, run_id: str) -> RunDrawing:
         assert self._first is not None

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.run.pose_gaps import KEPT_S, gap_limit_ns
 from stopgo.mission.run.run_log import Track
 
-SAME_M, SAME_RAD, SAME_S = 0.001, math.radians(0.1), 1.0
-"""Limits below which a pose counts as equal to the last one and is left out, except one each second."""
+SAME_M, SAME_RAD = 0.001, math.radians(0.1)
+"""Limits below which a pose counts as equal to the last one and is left out, except one each `KEPT_S`."""
 POINT_DISTANCE_M = 0.05
 """Smallest distance between two points of the driven path."""
 STRIP_S = 1.0
 """Duration of one strip of the path."""
-GAP_S = 10.0
-"""Gap in seconds after which the path is unknown, and is not drawn."""
+MOST_STEPS = 1000
+"""Number of last steps that tell the robot's usual one."""
 
 
 class Thinner:
@@ -42,10 +45,25 @@ class Thinner:
 
 def _same(a: tuple[int, float, float, float], b: tuple[int, float, float, float]) -> bool:
     return (
-        b[0] - a[0] < SAME_S * 1e9
+        b[0] - a[0] < KEPT_S * 1e9
         and math.hypot(b[1] - a[1], b[2] - a[2]) < SAME_M
         and abs(math.remainder(b[3] - a[3], math.tau)) < SAME_RAD
     )
+
+
+@dataclass(frozen=True, eq=False)
+class TrailGap:
+    """A part of the path that no pose shows."""
+
+    begin_ns: int
+    end_ns: int
+    ends: FloatArray
+    """Last position before, and first after it (2, 2)."""
+
+    @property
+    def seconds(self) -> float:
+        """Duration; negative or 0 if the robot's clock went back in it."""
+        return (self.end_ns - self.begin_ns) / 1e9
 
 
 class Trail:
@@ -55,19 +73,26 @@ class Trail:
         self._end: tuple[float, float] | None = None
         """End of the path drawn so far."""
         self._last_ns = 0
+        self._steps_ns: deque[int] = deque(maxlen=MOST_STEPS)
+        self._before_gap: tuple[float, float] | None = None
+        self.unseen: list[TrailGap] = []
+        """Gaps since this list was last emptied."""
 
     def end(self) -> None:
         """Begin again with the next pose: the path to it is unknown."""
-        self._end = None
+        self._before_gap, self._end = self._end or self._before_gap, None
 
     def extended(self, track: Track) -> tuple[IntArray, list[FloatArray]]:
-        """Return the strips that these poses add, and the end time of each."""
+        """Return the strips that these poses add, and the end time of each; add to `unseen`."""
         times: list[int] = []
         strips: list[list[tuple[float, float]]] = []
         strip_begin_ns = None
         for ns, x, y in zip(track.ns.tolist(), *track.xy.T.tolist(), strict=True):
-            if self._end is None or ns - self._last_ns > GAP_S * 1e9:
-                self._end, strip_begin_ns = (x, y), None
+            if self._end is None or self._misses(ns):
+                self.end()
+                self._end, strip_begin_ns = self._begin_again(ns, (x, y)), None
+            elif ns > self._last_ns:
+                self._steps_ns.append(ns - self._last_ns)
             self._last_ns = ns
             if math.hypot(x - self._end[0], y - self._end[1]) < POINT_DISTANCE_M:
                 continue
@@ -79,3 +104,17 @@ class Trail:
             strips[-1].append(self._end)
             times[-1] = ns
         return frozen(times, np.int64), [np.array(strip) for strip in strips]
+
+    def _misses(self, ns: int) -> bool:
+        step = ns - self._last_ns
+        return step > gap_limit_ns(()) and step > gap_limit_ns(self._steps_ns)
+
+    def _begin_again(self, ns: int, position: tuple[float, float]) -> tuple[float, float]:
+        """Note the gap before a position, if there is one, and return the position."""
+        if self._before_gap is not None:
+            gap = TrailGap(self._last_ns, ns, np.array([self._before_gap, position]))
+            self.unseen.append(gap)
+            self._before_gap = None
+            if gap.seconds > 0:
+                self._steps_ns.append(ns - self._last_ns)
+        return position

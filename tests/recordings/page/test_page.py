@@ -61,6 +61,30 @@ def test_a_run_tells_its_verdict_and_every_figure() -> None:
     assert "stationary 0:16 paused 1, held 0" in text
 
 
+def test_a_gap_in_the_poses_is_dashed_and_told() -> None:
+    mission, sight = planned()
+    path = [(k * 0.5, 1, 1) for k in range(20)] + [(40 + k * 0.5, 3.2, 1) for k in range(100)]
+    log = told(
+        mission, START, *visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1), (Finished, 133.0, {}), poses=path
+    )
+    subject = ReportSubject((mission,), (compare(log, [mission], [sight]),), sight)
+    page = report_html(subject)
+    assert (
+        "no poses for 0:30 from 0:10: 2.2 m of the path unseen, from (1.00, 1.00) to (3.20, 1.00)"
+        in words(page)
+    )
+    driven, gap = (
+        next(
+            item
+            for item in tree(page).iter("path")
+            if item.get("stroke") == "#CC79A7" and item.get("stroke-dasharray") == dash
+        )
+        for dash in (None, "3 4")
+    )
+    assert gap.get("d") is not None
+    assert driven.get("d") is not None
+
+
 def test_a_bar_marks_the_required_coverage() -> None:
     mission, sight = planned()
     asked = replace(sight, ledger=replace(sight.ledger, kind_required=0.7))

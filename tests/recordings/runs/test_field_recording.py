@@ -382,3 +382,40 @@ def test_no_path_is_drawn_through_what_nobody_knows_of() -> None:
         [[0.0, 0.0], [1.0, 0.0]],
         [[5.0, 0.0], [6.0, 0.0]],
     ]
+
+
+def test_a_gap_is_drawn_dashed_with_its_length(tmp_path: Path, mission: Mission) -> None:
+    path = tmp_path / "field.rrd"
+    poses = [item for item in run.reports(mission) if isinstance(item, PoseReport)]
+    first, last = poses[0], poses[-1]
+    with FieldRecording(path, mission) as recording:
+        recording.pose(first)
+        recording.pose(last)
+    (labels,) = on(path, f"{RUN}/unseen", "LineStrips2D:labels", entities.ROBOT_TIME).values()
+    away = np.hypot(last.pose.x - first.pose.x, last.pose.y - first.pose.y)
+    seconds = (last.robot_ns - first.robot_ns) / 1e9
+    assert labels[0] == f"no poses for {seconds:.1f} s; {away:.1f} m apart"
+
+
+def test_poses_of_the_past_are_measured_against_the_events_of_their_time(
+    tmp_path: Path, mission: Mission
+) -> None:
+    """A station that comes late reads all events first, then a state of now, and then the poses."""
+    path, late = tmp_path / "field.rrd", tmp_path / "late.rrd"
+    reports = list(run.reports(mission))
+    with FieldRecording(path, mission) as recording:
+        for report in reports:
+            tell(recording, report)
+    events = [item for item in reports if not isinstance(item, PoseReport | StateReport)]
+    poses = [item for item in reports if isinstance(item, PoseReport)]
+    with FieldRecording(late, mission) as recording:
+        for report in (*events[:-1], reports[-1]):
+            tell(recording, report)
+        for report in poses:
+            tell(recording, report)
+        tell(recording, events[-1])
+    metric = f"{entities.METRIC_CROSS_TRACK}/{run.RUN}"
+    watched, fetched = (on(item, metric, "Scalars:scalars", entities.ROBOT_TIME) for item in (path, late))
+    assert {time: value[0] for time, value in fetched.items()} == pytest.approx(
+        {time: value[0] for time, value in watched.items()}
+    )
