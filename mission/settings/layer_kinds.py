@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -11,6 +12,11 @@ from stopgo.mission.settings.toml_file import read_toml
 
 LAYER_ROLES = ("floor", "rooms", "names", "doors", "openings", "passages", *KINDS, "furniture", "ignore")
 """Roles of a layer; `names` are of rooms, `openings` are doors and windows alike."""
+
+
+def layer_option(layer: str, kind: str = "KIND") -> str:
+    """Return the option that gives a layer a kind, quoted so that a shell takes it as it is printed."""
+    return f"--layer {shlex.quote(f'{layer}={kind}')}"
 
 
 def entries_in(given: str) -> tuple[str, ...]:

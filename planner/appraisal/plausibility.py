@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import FloatArray
+from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.mission.stages.figures import LEG_OVER_IGNORED
 from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, to_shape, union
@@ -86,8 +87,8 @@ def over_ignored(
             names = _named(sorted(set(leg.tolist())), stops)
             message = (
                 f"the robot drives over lines on layer {layer}, which are not read: {names} "
-                f"(first at {at[0]:.2f}, {at[1]:.2f}); say what they are: --layer {layer}=KIND, "
-                f"or {layer}=ignore if nothing stands there"
+                f"(first at {at[0]:.2f}, {at[1]:.2f}); say what they are: {layer_option(layer)}, "
+                f"or {layer_option(layer, 'ignore')} if nothing stands there"
             )
             yield Finding(LEG_OVER_IGNORED, message, at=at)
 
@@ -148,11 +149,15 @@ def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
 def _not_read(floor: FloorPlan) -> str:
     """Layers that may hold what is missing."""
     layers = sorted({line.layer for line in floor.ignored})
-    unknown = [item.message.split(" ")[1] for item in floor.findings if item.code == "unknown_layer"]
+    unknown = [
+        item.message.removeprefix("layer ").partition(" is not one of")[0]
+        for item in floor.findings
+        if item.code == "unknown_layer"
+    ]
     names = sorted({*layers, *unknown})
     if not names:
         return "; is the layer WALLS complete?"
-    return f"; layers that are not read: {', '.join(names[:8])} (--layer {names[0]}=walls)"
+    return f"; layers that are not read: {', '.join(names[:8])} ({layer_option(names[0], 'walls')})"
 
 
 def _stray_elements(floor: FloorPlan) -> Iterator[Finding]:

@@ -17,6 +17,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import bounds
+from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawing import open_drawing
 from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
@@ -131,7 +132,7 @@ def _no_walls(sheet: DxfSheet) -> str:
     )
     if len(layers) < 2:
         return f"{why} (walls cannot be distinguished from other lines; ask for an export with layers)"
-    return f"{why} (say which one holds the walls, such as --layer {layers[0]}=walls)"
+    return f"{why} (say which one holds the walls, such as {layer_option(layers[0], 'walls')})"
 
 
 def _listed(names: Sequence[str], *, most: int = 20) -> str:

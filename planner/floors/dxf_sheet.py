@@ -11,6 +11,7 @@ from ezdxf.document import Drawing
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
+from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
 from stopgo.planner.floors.drawn_shapes import Shape, shapes_of
 from stopgo.planner.floors.layers import Layers, is_layered, missing_in
@@ -73,7 +74,7 @@ def _by_name(shapes: Sequence[Shape]) -> list[Finding]:
     taken = {(shape.layer, shape.role, shape.why) for shape in shapes if shape.role != "other"}
     return [
         Finding(
-            "layer_by_name", f"layer {layer} is taken for {role}: {why} (--layer {layer}=KIND corrects it)"
+            "layer_by_name", f"layer {layer} is taken for {role}: {why} ({layer_option(layer)} corrects it)"
         )
         for layer, role, why in sorted(taken)
         if why not in ("its name", "as given", "by the map")

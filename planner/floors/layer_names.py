@@ -3,7 +3,7 @@
 AIA/NCS writes discipline and group (`A-WALL-FULL`); ISO 13567 and BS 1192 write a discipline and a code
 of the CI/SfB or Uniclass table (`A-21----E-`, `A-210-M_Wall`); everybody else writes words of his language,
 alone or in compounds. Words come before codes, and what is written on a thing before the thing: `DOOR-IDEN`
-is text.
+is text. Of several things the last one decides: `Stair Wall` is a wall.
 """
 
 from __future__ import annotations
@@ -28,11 +28,17 @@ def reading_of(name: str) -> LayerReading | None:
 
 
 def _reading(plain: str) -> LayerReading | None:
-    for role, pattern in _PATTERNS:
-        found = pattern.search(plain)
+    """Return the meaning by the first group of words that has one; within a group the last word decides."""
+    for group in _GROUPS:
+        found = [(match, role) for role, pattern in group for match in pattern.finditer(plain)]
         if found:
-            return LayerReading(role, f"the word {_whole_words(plain, found)}")
+            match, role = max(found, key=lambda item: (_word_end(plain, item[0]), item[0].end()))
+            return LayerReading(role, f"the word {_whole_words(plain, match)}")
     return _by_code(plain)
+
+
+def _word_end(plain: str, found: re.Match[str]) -> int:
+    return plain.find(" ", found.end())
 
 
 def _whole_words(plain: str, found: re.Match[str]) -> str:
@@ -104,9 +110,12 @@ _STAIRS = """
 """
 _FURNITURE = """
     FURN FURNITURE* FURNISH* MÖBEL* MOEBEL* *MÖBEL *MOEBEL MOBILIER* MEUBLE* MOBILIARIO* MUEBLE* MOBILI
-    ARREDO* ARREDI MEUBILAIR* MEUBEL* CASE CASEWORK* CABINET* KITCHEN* KÜCHE* KUECHE* CUISINE* COCINA*
-    CUCINA* KEUKEN* COZINHA* FIXT FIXTURE* SANR SANIT* BATH TOILET* WC APPL APPLIANCE* EQPM EQUIP*
+    ARREDO* ARREDI MEUBILAIR* MEUBEL* CASE CASEWORK* CABINET* FIXT FIXTURE* SANR SANIT* APPL APPLIANCE*
+    EQPM EQUIP*
     EINRICHT* PFIX PLUMB* SPCQ МЕБЕЛ* САНТЕХ* 家具* 什器* 衛生*
+"""
+_PLACES = """
+    KITCHEN* KÜCHE* KUECHE* CUISINE* COCINA* CUCINA* KEUKEN* COZINHA* BATH TOILET* WC
 """
 _DOORS = """
     DOOR* *DOOR *DOORS DORS TÜR* TUER* *TÜR *TÜREN *TUER *TUEREN PORTE PORTES PUERTA* PORTA PORTAS
@@ -116,6 +125,8 @@ _OPENINGS = """
     OPENING* OPNG ÖFFNUNG* OEFFNUNG* BAIE BAIES OUVERTURE* ABERTURA* HUECO* APERTUR* INFISSI SERRAMENTI
     MENUISERIE* CARPINTERIA* ESQUADRIA* KOZIJN* ПРОЕМ* 建具* 開口*
 """
+_GLASS_WALLS = "CURTAIN+WALL* GLASS+WALL* GLAZED+WALL* GLASWAND* GLASWÄND* GLAS+WAND* MUR+RIDEAU"
+_ON_WALLS = "WALL+MOUNT* WALL+HUNG WALL+MTD"
 _WINDOWS = """
     WINDOW* *WINDOW *WINDOWS WNDW GLAZ GLAZING* GLASS GLAS VERGLASUNG* CURT CURTAIN* CRYSTAL* CRISTAL*
     VIDRO* VIDRIO* VETRO VETRI VITRAGE* FENSTER* *FENSTER FENÊTRE* VENTANA* FINESTR* JANELA* RAAM RAMEN
@@ -147,12 +158,17 @@ _FLOOR = """
     SOLS DALLE* PLANCHER* SUELO* PISO PISOS FORJADO* SOLADO* PAVIMENT* SOLAIO* VLOER* *VLOER LAJE* ПОЛ
     ПЕРЕКРЫТ* 床*
 """
-_PATTERNS = tuple(
-    (role, _any(words))
-    for role, words in (
-        ("names", _ROOM_NAMES),
-        ("ignore", _WRITTEN),
-        ("ignore", _NOT_ON_THE_FLOOR),
+
+
+def _group(*words: tuple[str, str]) -> tuple[tuple[str, re.Pattern[str]], ...]:
+    return tuple((role, _any(listed)) for role, listed in words)
+
+
+_GROUPS = (
+    _group(("names", _ROOM_NAMES)),
+    _group(("ignore", _WRITTEN), ("ignore", _NOT_ON_THE_FLOOR)),
+    _group(("windows", _GLASS_WALLS), ("furniture", _ON_WALLS)),
+    _group(
         ("railings", _RAILINGS),
         ("stairs", _STAIRS),
         ("furniture", _FURNITURE),
@@ -162,12 +178,16 @@ _PATTERNS = tuple(
         ("columns", _COLUMNS),
         ("beams", _BEAMS),
         ("walls", _WALLS),
-        ("ignore", _DRAWN_OVER),
-        ("rooms", _ROOMS),
-        ("floor", _FLOOR),
-    )
+    ),
+    _group(("ignore", _DRAWN_OVER)),
+    _group(("rooms", _ROOMS)),
+    _group(("furniture", _PLACES)),
+    _group(("floor", _FLOOR)),
 )
-"""Roles by words; the first match counts."""
+"""Roles by words. The first group with a word of the name counts, and its last word decides.
+
+Storeys and places come last: they say where a thing is (`Wall - Kitchen`, `Walls Floor 1`).
+"""
 
 
 def _by_code(plain: str) -> LayerReading | None:

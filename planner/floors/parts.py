@@ -10,6 +10,7 @@ from pathlib import Path
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Element, Finding, IgnoredLine, Opening, Room
 from stopgo.mission.geometry import Polygon
+from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawn import Drawn, drawn, outline_faces
 from stopgo.planner.floors.elements import elements_of
 from stopgo.planner.floors.joints import without_joints
@@ -110,7 +111,7 @@ def _unknown_layers(other: Drawn, words: Iterable[Word], known: frozenset[str]) 
             "unknown_layer",
             f"layer {layer} is not one of a floor's: {closed[layer]} closed shapes are obstacles, "
             f"{lines[layer]} open lines and {texts[layer]} texts or dimensions are ignored "
-            f"(--layer {layer}=KIND says what it is)",
+            f"({layer_option(layer)} says what it is)",
         )
         for layer in sorted({*closed, *lines, *texts} - known)
     ]

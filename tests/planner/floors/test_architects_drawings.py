@@ -18,6 +18,7 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings.layer_kinds import entries_in, kinds_by_name
 from stopgo.planner.floors import FloorOptions, read_floor, survey_floor
 from stopgo.planner.floors.layer_map import layer_map
+from stopgo.planner.floors.layer_names import reading_of
 
 
 def flat(
@@ -95,6 +96,41 @@ def test_layers_are_known_by_standards_and_in_many_languages(tmp_path: Path, wal
     drawing = new_drawing()
     flat(drawing.modelspace(), walls=walls, doors=doors)
     is_the_flat(read(drawing, tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("name", "role"),
+    [
+        ("Room - Kitchen", "rooms"),
+        ("Room - WC", "rooms"),
+        ("KITCHEN", "furniture"),
+        ("Kitchen Wall", "walls"),
+        ("Wall - Kitchen", "walls"),
+        ("Küchen-Wand", "walls"),
+        ("Stair Wall", "walls"),
+        ("Treppenhauswand", "walls"),
+        ("Plbg-Toilet Wall Mount - 1ST FLOOR PLAN", "furniture"),
+        ("Walls Floor 1", "walls"),
+        ("Curtain Wall", "windows"),
+        ("Glass Wall", "windows"),
+        ("A-FLOR-CASE", "furniture"),
+        ("A-FLOR-STRS", "stairs"),
+        ("A-WALL-PATT", "walls"),
+        ("A-DOOR-IDEN", "ignore"),
+        ("A-AREA-IDEN", "names"),
+    ],
+)
+def test_a_layers_name_is_read_whole_and_its_last_thing_decides(name: str, role: str) -> None:
+    found = reading_of(name)
+    assert found is not None
+    assert found.role == role
+
+
+def test_printed_advice_on_a_layer_can_be_pasted_into_a_shell(tmp_path: Path) -> None:
+    drawing = new_drawing()
+    flat(drawing.modelspace(), walls="A210g - Ext Walls")
+    told = [item.message for item in read(drawing, tmp_path).findings if item.code == "layer_by_name"]
+    assert any("(--layer 'A210g - Ext Walls=KIND' corrects it)" in message for message in told)
 
 
 @pytest.mark.parametrize("version", ["R12", "R2000", "R2018"])
