@@ -21,6 +21,10 @@ BACK_MS = 1_000
 """A clock that goes back by more was restarted; by less, two messages arrived out of order."""
 LOST_S = 3.0
 """Three heartbeats: a bad link loses one or two."""
+MISSION_ID_AT = 6
+"""Place of `mission_id` in the payload of MISSION_CURRENT, behind seq, total, state and mode."""
+VERSION_2, HEADER_BYTES = b"\xfd", 10
+"""First byte and header of a frame of MAVLink 2, whose payload may have newer fields."""
 COMPLAINTS = ("PreArm:", "Preflight Fail:", "Arm:")
 """First words of a vehicle's texts that say why it does not arm."""
 
@@ -48,6 +52,15 @@ def is_arming_refusal(text: str) -> bool:
 def charge_of(remaining: int) -> float | None:
     """Return a battery_remaining (percent) as 0 to 1; `None` if the vehicle does not know it (-1)."""
     return remaining / 100 if 0 <= remaining <= 100 else None
+
+
+def mission_id_of(message: Any) -> int:
+    """Return the mission id in a MISSION_CURRENT, a newer field of 32 bits; 0 if there is none."""
+    frame = bytes(message.get_msgbuf() or b"")
+    if frame[:1] != VERSION_2:
+        return 0
+    payload = frame[HEADER_BYTES : HEADER_BYTES + frame[1]]
+    return int.from_bytes(payload[MISSION_ID_AT : MISSION_ID_AT + 4], "little")
 
 
 def place_of(message: Any) -> Geodetic | None:

@@ -31,18 +31,22 @@ Invariants
 4. Steps of the run go before changes by somebody else, and end a look if they end the run or hold it.
 5. Nothing is looked at before `begin`: before, the state of the vehicle is known only in part.
 6. A process that only looks stores nothing and sends nothing.
+7. A stop is done only once the list was found to be the one that was sent, after the work there was over.
 
-Two threads work here. `look` runs in the one that receives messages, and must not wait. `act` runs in the
-other one: it sends commands, and waits until messages confirm them.
+Three threads work here. `look` runs in the one that receives messages, and must not wait. `act` runs in
+another one: it sends commands, and waits until messages confirm them. `guard` reads the vehicle's list back,
+in the third, so that no command waits for that.
 """
 
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from functools import partial
 
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
 from stopgo.bridge.mavlink.auto.external_changes import ExternalChanges
+from stopgo.bridge.mavlink.auto.list_guard import ListGuard
 from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.auto.pending_commands import PendingCommands
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
@@ -59,7 +63,7 @@ from stopgo.mission.mavlink.following.steps import (
     steps,
     tried_again,
 )
-from stopgo.mission.mavlink.telemetry import has_restarted
+from stopgo.mission.mavlink.telemetry import Message, has_restarted
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Arrived
 from stopgo.mission.run.states import Change, Run
@@ -82,23 +86,27 @@ class AutoFollower:
         self._book = book
         self._observer = observer
         self._commands = commands
-        self._others = ExternalChanges(book, peer, observer)
-        self._pending = PendingCommands(book, observer, commands, self._others)
+        self._guard = ListGuard(book, peer, observer)
+        self._others = ExternalChanges(book, observer, self._guard)
+        self._pending = PendingCommands(book, observer, commands, self._guard)
         self._looks_only = looks_only
         self._closing = threading.Event()
         self._due = threading.Event()
         """Set when `act` has something to do."""
-        self._compare_due = False
+        self._compare_due = threading.Event()
         self.looking = False
         """False until all state of the vehicle that can be requested is known."""
         self._left: tuple[tuple[str, int, int], int] | None = None
         """Run, stop and attempt that the vehicle has left without a report of a scan, and since when."""
+        self._ended: tuple[tuple[str, int, int], int] | None = None
+        """Run, stop and attempt that was left or whose scan was reported, and since when."""
         self.run = book.run
         """The present run, as this process sees it."""
 
     def close(self) -> None:
         self._closing.set()
         self._due.set()
+        self._compare_due.set()
 
     def begin(self) -> None:
         """Look from now on, first for a restart of the vehicle.
@@ -111,7 +119,7 @@ class AutoFollower:
 
     def compare(self) -> None:
         """Compare the vehicle's list with the one that was sent."""
-        self._others.compare_list()
+        self._guard.compare()
 
     # In the thread that receives messages
 
@@ -121,12 +129,18 @@ class AutoFollower:
         listed = self._book.listed
         if not self.looking:
             return
+        if not self._looks_only and self._guard.is_due(self.run):
+            self._compare_due.set()
         if name in CLOCKS:
             self._check_clock()
         if listed is None or self.run.state == "IDLE" or self._busy():
             return
         while self._look_once(listed):
             pass
+
+    def overhear(self, message: Message) -> None:
+        """Take in a message of another station's upload."""
+        self._guard.hear(message)
 
     def _check_clock(self) -> None:
         """Reset the run of a vehicle that was restarted: it stopped, and lost its mode, origin and item."""
@@ -156,7 +170,9 @@ class AutoFollower:
             return self.run.at > before.at and self._book.pending is None
         if changes:
             self._store(listed, observed, before)
-        pending = self._pending.past_skipped(self.run, listed, observed)
+        pending = self._pending.past_skipped(self.run, listed, observed) or self._pending.held_again(
+            self.run, listed, observed
+        )
         if pending is not None:
             self._book.journal.store_fact("pending", pending)
             self._due.set()
@@ -166,7 +182,12 @@ class AutoFollower:
         """The vehicle's present state; requests again the scan of a stop that the vehicle has left."""
         run, now_ns = self.run, self._book.clock.now_ns()
         observed = self._observer.observe(run, listed, self._arrived(listed), after=self._book.used)
-        if observed is None or not has_left(run, listed, observed):
+        if observed is None:
+            return None
+        has_gone = has_left(run, listed, observed)
+        ends = has_gone or run.stop_state == "VERIFYING"
+        observed = replace(observed, is_ours=ends and self._is_ours(run, listed, now_ns))
+        if not has_gone:
             return observed
         stop = (run.run_id or "", run.at, run.attempt)
         if self._left is None or self._left[0] != stop:
@@ -174,6 +195,16 @@ class AutoFollower:
         if observed.scan is None:
             self._commands.ask_for(MessageId.CAMERA_IMAGE_CAPTURED)
         return since_left(run, listed, observed, now_ns - self._left[1])
+
+    def _is_ours(self, run: Run, listed: ListedMission, now_ns: int) -> bool:
+        """True if the list was found to be ours after the work at the current stop was over."""
+        stop = (run.run_id or "", run.at, run.attempt)
+        if self._ended is None or self._ended[0] != stop:
+            self._ended = (stop, now_ns)
+        is_ours = self._guard.is_ours(listed, self._ended[1])
+        if not is_ours:
+            self._guard.want()
+        return is_ours
 
     def _arrived(self, listed: ListedMission) -> Arrived | None:
         """The arrival at the current stop: scans reported before it are older ones."""
@@ -205,19 +236,23 @@ class AutoFollower:
             if capture is not None and self.run != before and not waiting:
                 self._book.use(*capture.name)
         if self.run.state == "RUNNING" and before.state in ("READY", "PAUSED", "HELD"):
-            self._compare_due = True  # somebody else let it go on, perhaps with another mission
-            self._due.set()
+            self._guard.want()  # somebody else let it go on, perhaps with another mission
 
-    # In a thread of its own
+    # In threads of their own
+
+    def guard(self) -> None:
+        """Until closed: compare the lists when that is due."""
+        while not self._closing.is_set():
+            self._compare_due.wait()
+            self._compare_due.clear()
+            if not self._closing.is_set():
+                self.compare()
 
     def act(self) -> None:
-        """Until closed: compare the lists when that is due, and send the pending command until confirmed."""
+        """Until closed: send the pending command until confirmed."""
         while not self._closing.is_set():
             self._due.wait()
             self._due.clear()
-            if self._compare_due:
-                self._compare_due = False
-                self.compare()
             pending, listed = self._book.pending, self._book.listed
             if pending is None or listed is None or self._looks_only:
                 continue

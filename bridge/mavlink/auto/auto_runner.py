@@ -12,6 +12,7 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
+from stopgo.bridge.mavlink.auto.list_guard import UPLOAD_MESSAGES
 from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
@@ -31,10 +32,17 @@ ASK_AGAIN_S = 2.0
 
 
 class Telemetry(MessageQueue):
-    """Telemetry of a vehicle's run; its scanner may be a component of its own and report the scans."""
+    """Telemetry of a vehicle's run; its scanner may be a component of its own and report the scans.
+
+    Uploads by other stations are overheard.
+    """
+
+    overhears = True
 
     def wants(self, message: Message) -> bool:
         assert self.of is not None
+        if message.get_type() in UPLOAD_MESSAGES:
+            return True
         of_scanner = message.get_type() == "CAMERA_IMAGE_CAPTURED"
         return (of_scanner and message.get_srcSystem() == self.of.system) or super().wants(message)
 
@@ -63,7 +71,7 @@ class AutoRunner:
         self._commands = ConfirmedCommands(peer, self._observer, book.clock)
         self._orders = VehicleOrders(book, peer, self._observer, self._commands, wall, consent, stands=stands)
         self._follower = AutoFollower(book, peer, self._observer, self._commands, looks_only=looks_only)
-        self.works: tuple[Callable[[], None], ...] = (self._look, self._act)
+        self.works: tuple[Callable[[], None], ...] = (self._look, self._act, self._follower.guard)
         self._reported_ns = 0
         self._closing = threading.Event()
         self._observer.take(peer.heartbeat, book.listed, book.clock.now_ns())
@@ -146,6 +154,8 @@ class AutoRunner:
         self._board.cut = is_lost(self._peer.silent_s)  # then nothing answers for it
         if message is None:
             return
+        if message.get_type() in UPLOAD_MESSAGES:
+            return self._follower.overhear(message)
         with self._commands.news:
             name = self._observer.take(message, self._book.listed, self._book.clock.now_ns())
             self._commands.news.notify_all()

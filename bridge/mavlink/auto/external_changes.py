@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import uuid
-from contextlib import suppress
 
+from stopgo.bridge.mavlink.auto.list_guard import ListGuard
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
-from stopgo.bridge.mavlink.transfer.download import download
-from stopgo.bridge.mavlink.vehicle_link.peer import Peer
-from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.steps import SOMEBODY, Observation
-from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.states import Change, Run
 
@@ -26,45 +22,33 @@ REMEMBERED_NS = 60 * 10**9
 class ExternalChanges:
     """Finds the change to a run that somebody else has caused, with the name of who caused it if known."""
 
-    def __init__(self, book: Logbook, peer: Peer, observer: Observer) -> None:
+    def __init__(self, book: Logbook, observer: Observer, guard: ListGuard) -> None:
         self._book = book
-        self._peer = peer
         self._observer = observer
-        self._difference: str | None = None
-        """Difference between the vehicle's list and the one that was sent; `None` before a comparison."""
-
-    def compare_list(self) -> None:
-        """Compare the vehicle's list with the one that was sent, unless the vehicle does not send it now."""
-        listed, state = self._book.listed, self._book.run.state
-        if listed is None or state in ("FINISHED", "ABORTED"):
-            return
-        with suppress(NegativeResult, RobotUnreachable):
-            self._difference = next(iter(differences(listed.sent, download(self._peer))), "")
+        self._guard = guard
 
     def change(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
         """The change by somebody else, once the vehicle's mode has settled and is explained."""
         settled = self._observer.mode_ns >= self._book.changed_ns + SETTLED_NS
         if not (settled and self._observer.mode_explained(self._book.clock.now_ns())):
             return None
-        return (
-            self.changed_list(run, listed)
-            or self._begun_elsewhere(run, listed, observed)
-            or progress.taken_over(run, listed, observed, by=self._by(observed))
+        if self._guard.difference(listed, run):  # then no mode of the vehicle lets the run go on
+            return self.changed_list(run, listed)
+        return self._begun_elsewhere(run, listed, observed) or progress.taken_over(
+            run, listed, observed, by=self._by(observed)
         )
 
     def changed_list(self, run: Run, listed: ListedMission) -> Change | None:
         """Hold the run, if the vehicle's list is not the one that was sent."""
         if run.over or run.state == "HELD":
             return None
-        items, why = self._observer.items, self._difference
-        if items is not None and items != listed.end:
-            why = f"it holds {items} items, {listed.end} were sent"
-        return runs.held(run, f"somebody has changed the vehicle's mission: {why}") if why else None
+        why = self._guard.difference(listed, run)
+        return runs.held(run, f"{why}; push it again (stopgo push)") if why else None
 
     def _begun_elsewhere(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
         """Start the run, if the vehicle drives the list that it was sent without a start from here."""
         by = self._by(observed)
-        ours = by != SOMEBODY or self._difference == ""
+        ours = by != SOMEBODY or self._guard.is_compared(listed)
         if run.state != "READY" or not observed.drives or observed.place >= listed.end or not ours:
             return None
         now_ns = self._book.clock.now_ns()

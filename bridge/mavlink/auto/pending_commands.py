@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
-from stopgo.bridge.mavlink.auto.external_changes import ExternalChanges
+from stopgo.bridge.mavlink.auto.list_guard import ListGuard
 from stopgo.bridge.mavlink.auto.logbook import Logbook, PendingCommand
 from stopgo.mission.mavlink.autopilots.kind import AUTO
 from stopgo.mission.mavlink.following import steps as progress
@@ -18,12 +18,12 @@ class PendingCommands:
     """Decides on pending commands, and sends them."""
 
     def __init__(
-        self, book: Logbook, observer: Observer, commands: ConfirmedCommands, others: ExternalChanges
+        self, book: Logbook, observer: Observer, commands: ConfirmedCommands, guard: ListGuard
     ) -> None:
         self._book = book
         self._observer = observer
         self._commands = commands
-        self._others = others
+        self._guard = guard
 
     def after_step(self, listed: ListedMission, before: Run, after: Run) -> PendingCommand | None:
         """The command that a step of the run requires; none for a run that somebody else has stopped."""
@@ -32,7 +32,7 @@ class PendingCommands:
             return PendingCommand(command="jump", place=listed.stops[after.at].at, since_ns=since_ns)
         early = after.state == "FINISHED" and (self._observer.sequence or 0) < listed.sequence(listed.end - 1)
         stops = before.state == "RUNNING" and (after.state in ("HELD", "ABORTED") or early)
-        if stops and self._observer.mode == AUTO and self._others.changed_list(before, listed) is None:
+        if stops and self._observer.mode == AUTO:
             return PendingCommand(command="hold", place=0, since_ns=since_ns)
         return None
 
@@ -44,6 +44,12 @@ class PendingCommands:
         if place is None:
             return None
         return PendingCommand(command="jump", place=place, since_ns=self._book.clock.now_ns())
+
+    def held_again(self, run: Run, listed: ListedMission, observed: Observation) -> PendingCommand | None:
+        """The command for a vehicle that drives another list than the one that was sent: it must stand."""
+        if run.state != "HELD" or not observed.drives or not self._guard.difference(listed, run):
+            return None
+        return PendingCommand(command="hold", place=0, since_ns=self._book.clock.now_ns())
 
     def send(self, pending: PendingCommand, listed: ListedMission) -> None:
         """Send a command; a refused one holds the run. It is pending no more after either.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import replace
 from typing import Any
 
@@ -103,3 +104,21 @@ def picture(
     return dialect.MAVLink_camera_image_captured_message(
         boot_ms, now_ns // 1000, 0, *place, alt_mm, 0, facing, index, 1 if file_url else 0, file_url.encode()
     )
+
+
+class MissionCurrentWithId(dialect.MAVLink_mission_current_message):
+    """MISSION_CURRENT with its newer fields, which the dialect lacks: ids of mission, fence and rally."""
+
+    number = 0
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        fields = (self.seq, self.total, self.mission_state, self.mission_mode, self.number, 0, 0)
+        payload = struct.pack("<HHBBIII", *fields)
+        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1))
+
+
+def mission_current(seq: int, total: int, state: int, mode: int, *, number: int) -> Message:
+    """Current item, with the id of the list."""
+    message = MissionCurrentWithId(seq, total, state, mode)
+    message.number = number
+    return message

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import zlib
 
+from stopgo.bridge.mavlink.simulated import replies
 from stopgo.bridge.mavlink.simulated.rover import bearing
 from stopgo.bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
@@ -131,7 +133,10 @@ def extended_state(vehicle: Vehicle) -> Message:
 def mission_current(vehicle: Vehicle) -> Message:
     auto = vehicle.auto
     mode = 1 if vehicle.mode == "auto" else 2
-    return dialect.MAVLink_mission_current_message(auto.current, auto.total, mission_state(vehicle), mode)
+    fields = (auto.current, auto.total, mission_state(vehicle), mode)
+    if not vehicle.autopilot.behaviour.mission_ids:
+        return dialect.MAVLink_mission_current_message(*fields)
+    return replies.mission_current(*fields, number=zlib.crc32(repr(vehicle.store.stored.mission).encode()))
 
 
 def mission_state(vehicle: Vehicle) -> int:

@@ -43,12 +43,17 @@ def download(
     AnswerIsNo
         If it refuses, which it does while another station uploads.
     """
+    with peer.reading_list:
+        return _downloaded(peer, patience_s or peer.patience_s, progress)
+
+
+def _downloaded(peer: Peer, patience_s: float, progress: Progress | None) -> tuple[Item, ...]:
     window = 1 if peer.in_order or peer.autopilot.gives_items == "in order" else window_for(peer)
-    reading = _Reading(peer, window, patience_s or peer.patience_s, progress)
+    reading = _Reading(peer, window, patience_s, progress)
     refused = reading.run()
     if refused is not None and window > 1:
         peer.in_order = True
-        reading = _Reading(peer, 1, patience_s or peer.patience_s, progress)
+        reading = _Reading(peer, 1, patience_s, progress)
         refused = reading.run()
     if refused is not None:
         raise NegativeResult(

@@ -127,6 +127,8 @@ class Peer:
         self.round_trips = RoundTrips()
         self.in_order = False
         """True if it was found to send its items only one by one."""
+        self.reading_list = threading.Lock()
+        """Held while its items are read: most vehicles serve one transfer at a time."""
         self._newest = newest
         self._commanding = threading.Lock()
 

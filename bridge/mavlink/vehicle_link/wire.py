@@ -63,6 +63,9 @@ B = TypeVar("B", bound="MessageQueue")
 class MessageQueue:
     """Queue of messages for one reader: of these types (empty: all), from one sender (`None`: all)."""
 
+    overhears = False
+    """True to get messages for others as well."""
+
     def __init__(self, types: frozenset[str] = frozenset(), of: Who | None = None) -> None:
         self.types = types
         self.of = of
@@ -196,11 +199,10 @@ class Wire:
             self.dropped[_why_dropped(message)] += 1
             return
         self._routes[message.get_srcSystem(), message.get_srcComponent()] = address
-        if not self._for_us(message):
-            self.dropped["for others"] += 1
-            return
+        for_us = self._for_us(message)
+        self.dropped["for others"] += not for_us
         for waiting in list(self._queues):
-            if waiting.wants(message):
+            if (for_us or waiting.overhears) and waiting.wants(message):
                 waiting.put(message)
 
     def _for_us(self, message: Message) -> bool:

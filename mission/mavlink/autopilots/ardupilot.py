@@ -119,7 +119,8 @@ BEHAVIOUR = ProtocolBehaviour(
         206, 207, 208, 209, 210, 211, 212, 213, 217, 218, 222, 223, 1000, 42702,
     },
     done_mode="auto", pauses=False, origin_again=False, says_no=CommandResult.FAILED, modes_by_flags=False,
-    acknowledges_set_mode=True, jumps_by_command=True, start_takes_item=False, start_arms=False,
+    acknowledges_set_mode=True, mission_ids=False,
+    jumps_by_command=True, start_takes_item=False, start_arms=False,
     pauses_by_command=False,
     speed_while_driving=True,  # source
     speed_parameter="WP_SPEED", system_parameter="SYSID_THISMAV",

@@ -35,7 +35,8 @@ BEHAVIOUR = ProtocolBehaviour(
     restarts_item=False, same_is_nothing=False, checks_frame_first=False, highest_m=math.inf,
     takes=EVERYWHERE | {177, 183, 187, 189, 195, 197, 211, 530},
     done_mode="hold", pauses=True, origin_again=True, says_no=CommandResult.DENIED, modes_by_flags=True,
-    acknowledges_set_mode=False, jumps_by_command=True, start_takes_item=True, start_arms=False,
+    acknowledges_set_mode=False, mission_ids=False,
+    jumps_by_command=True, start_takes_item=True, start_arms=False,
     pauses_by_command=True,
     speed_while_driving=False, speed_parameter="SPEED", system_parameter="SYSTEM_ID",
 )  # fmt: skip

@@ -148,6 +148,8 @@ class ProtocolBehaviour:
     modes_by_flags: bool
     """SET_MODE and DO_SET_MODE may name a mode by flags alone."""
     acknowledges_set_mode: bool
+    mission_ids: bool
+    """MISSION_CURRENT has an id of the list, which changes with it."""
     jumps_by_command: bool
     """DO_SET_MISSION_CURRENT is executed; else only MISSION_SET_CURRENT."""
     start_takes_item: bool

@@ -89,7 +89,8 @@ BEHAVIOUR = ProtocolBehaviour(
         400, 530, 532, 534, 1000, 1001, 2003, 2500, 2501, 3000, 4501, 42600,
     },
     done_mode="hold", pauses=True, origin_again=True, says_no=CommandResult.DENIED, modes_by_flags=False,
-    acknowledges_set_mode=False, jumps_by_command=False, start_takes_item=True,
+    acknowledges_set_mode=False, mission_ids=True,
+    jumps_by_command=False, start_takes_item=True,
     start_arms=True,  # source
     pauses_by_command=False, speed_while_driving=False,
     speed_parameter="RO_SPEED_LIM", system_parameter="MAV_SYS_ID",

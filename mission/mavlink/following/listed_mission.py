@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.autopilots import autopilot_named
-from stopgo.mission.mavlink.items import ItemList, Placed
+from stopgo.mission.mavlink.items import Command, ItemList, Placed
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,12 @@ class ListedMission:
     def sequence(self, place: int) -> int:
         """Return the sequence number on the vehicle of the item at an index of the list."""
         return autopilot_named(self.sent.autopilot).sequence(place)
+
+    def wait_s(self, first: int, end: int) -> float:
+        """Return the waiting time of the items from `first` up to `end`, without that one, in seconds."""
+        waiting = (Command.NAV_DELAY, Command.NAV_WAYPOINT)
+        items = (placed.item for placed in self.sent.placed[max(0, first) : end])
+        return sum(item.params[0] for item in items if item.command in waiting)
 
     @property
     def speed(self) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stopgo.mission.frames.geodesy import heading_of
 from stopgo.mission.mavlink.autopilots import autopilot_named
@@ -22,6 +22,7 @@ from stopgo.mission.mavlink.telemetry import (
     global_speed,
     is_lost,
     local_speed,
+    mission_id_of,
     origin_of,
     place_of,
     stands_still,
@@ -30,7 +31,8 @@ from stopgo.mission.run.events import Arrived, Pose
 from stopgo.mission.run.states import Run
 
 CAPTURES_KEPT = 100
-MOVES_KEPT = 1000
+JUMP_SLACK_S = 1.0
+"""Lateness of the vehicle's clock: its messages come several times a second, and may be lost."""
 USED_MESSAGES = (
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
     "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
@@ -45,17 +47,6 @@ class TimestampedMessage:
 
     message: Message
     ns: int
-
-
-@dataclass(frozen=True)
-class ItemMove:
-    """Change of the current item."""
-
-    before: int
-    after: int
-    """Sequence numbers."""
-    unheard_ns: int
-    """Time between the last report of the one and the first of the other."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +69,17 @@ class CaptureReport:
     ns: int
 
 
+@dataclass(frozen=True)
+class Jump:
+    """A change of the current item beyond waits that cannot have been over."""
+
+    listed: ListedMission
+    first: int
+    """Index of the item before it."""
+    end: int
+    """Index of the item after it."""
+
+
 class Observer:
     """Takes messages one after another; returns the state on request."""
 
@@ -90,9 +92,10 @@ class Observer:
         """Sequence number of the current item, and True if all is done."""
         self._work_ns = 0
         """Time since when it is current."""
-        self._heard_ns = 0
-        """Time of the last report of it."""
-        self._moves: deque[ItemMove] = deque(maxlen=MOVES_KEPT)
+        self._work_ms = 0
+        """Time since then on the vehicle's own clock."""
+        self._jump: Jump | None = None
+        """The last jump, as far as the vehicle has not gone back behind it."""
         self._mode_began_ns = 0
         """Time when the vehicle was first in its present mode."""
         self.fix: Fix | None = None
@@ -188,6 +191,12 @@ class Observer:
             return 0
         return newest.message.total if 0 < newest.message.total < UNKNOWN_TOTAL else None
 
+    @property
+    def mission_id(self) -> int:
+        """Id of the vehicle's list, which changes with it; 0 if the vehicle reports none."""
+        newest = self._newest.get("MISSION_CURRENT")
+        return 0 if newest is None else mission_id_of(newest.message)
+
     def observe(
         self, run: Run, listed: ListedMission, arrived: Arrived | None = None, *, after: Picture = NONE_YET
     ) -> Observation | None:
@@ -206,19 +215,8 @@ class Observer:
             still=fix is not None and fix.still,
             scan=None if report is None else report.capture.result,
             stood=_stood(report, arrived),
-            jumped=run.at < len(listed.stops) and self._jumped(listed, run.at),
+            is_jumped=self._is_jumped(run, listed),
         )  # fmt: skip
-
-    def _jumped(self, listed: ListedMission, at: int) -> bool:
-        """Return True if the current item passed a stop's waits in less time than half of them takes."""
-        items, stop = listed.stops[at], listed.mission.stops[at]
-        half_ns = round((stop.settle_s + stop.scan.duration_s) / 2 * 1e9)
-        crossing = (
-            move.unheard_ns < half_ns
-            for move in reversed(self._moves)
-            if listed.place(move.before) <= items.at and items.after <= listed.place(move.after)
-        )
-        return next(crossing, False)
 
     def place(self, listed: ListedMission) -> int:
         """Return the index in the list of the current item; the list's length once all is done."""
@@ -259,11 +257,30 @@ class Observer:
 
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         work = (message.seq, message.mission_state == MissionState.COMPLETE)
-        if self._work != work:
-            if self._work is not None:
-                self._moves.append(ItemMove(self._work[0], message.seq, now_ns - self._heard_ns))
-            self._work, self._work_ns = work, now_ns
-        self._heard_ns = now_ns
+        if self._work == work:
+            return
+        if self._work is not None and listed is not None:
+            self._take_place(listed, self._work, now_ns)
+        self._work, self._work_ns, self._work_ms = work, now_ns, self.boot_ms
+
+    def _take_place(self, listed: ListedMission, before: tuple[int, bool], now_ns: int) -> None:
+        """Note a jump: the item has changed before the waits between the two can have been over."""
+        first = listed.end if before[1] else listed.place(before[0])
+        place, waits_s = self.place(listed), 0.0
+        if self._jump is not None and (self._jump.listed is not listed or place < self._jump.end):
+            self._jump = replace(self._jump, end=place) if self._jump.listed is listed else None
+        if place <= first or not 0 < self._work_ms <= self.boot_ms:
+            return
+        waits_s = listed.wait_s(first, place)
+        passed_s = max((now_ns - self._work_ns) / 1e9, (self.boot_ms - self._work_ms) / 1e3)
+        if waits_s > passed_s + JUMP_SLACK_S:
+            self._jump = Jump(listed, first, place)
+
+    def _is_jumped(self, run: Run, listed: ListedMission) -> bool:
+        jump = self._jump
+        if jump is None or jump.listed is not listed or run.at >= len(listed.stops):
+            return False
+        return jump.first < listed.stops[run.at].after <= jump.end
 
     def _take_origin(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         self._frame = None

@@ -23,7 +23,10 @@ from stopgo.mission.run.tolerance import deviation, is_outside
 
 SOMEBODY = "the vehicle's operator"
 """Commander of commands that were not sent from here."""
-JUMPED = "the vehicle was sent on to a later item"
+JUMPED = (
+    "jumped over by somebody: the vehicle's current item was set beyond it; drive to it again by"
+    " stopgo start --again, or plan a follow-up mission (stopgo review)"
+)
 LATE_REPORTS = ("NAVIGATING", "SCANNING")
 """States in which a scanner's report is still expected after the stop was left."""
 GRACE_NS = 2 * 10**9
@@ -54,6 +57,10 @@ class Observation:
     """True if the current item passed that stop's waits without time for them: somebody ordered it."""
     report_overdue: bool = False
     """True if no scanner report, with its pose, is expected any more."""
+    is_jumped: bool = False
+    """True if somebody has made a later item the current one before the current stop's waits were over."""
+    is_ours: bool = True
+    """True if the vehicle's list is known to be the one that was sent; before that no stop is done."""
 
     @property
     def drives(self) -> bool:
@@ -119,26 +126,34 @@ def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopI
     """Check a waypoint that the vehicle reports as reached."""
     if observed.place <= items.at:
         return None
-    left = observed.place >= items.after
-    pose = observed.stood if left else observed.pose
-    if pose is None:
-        return _left_unseen(run, listed, observed) if left else None
-    stop, wrong = listed.mission.stops[run.at], stop_error_text(pose, run, listed)
+    if observed.place >= items.after:
+        return _passed(run, listed, observed)
+    if observed.pose is None:
+        return None
+    wrong = stop_error_text(observed.pose, run, listed)
     if not wrong:
-        return runs.reached(changed(run, leg=run.at), listed.mission, pose, deviation(pose, stop))
-    if left:
-        return runs.failed(_last_try(run, stop), listed.mission, wrong)
+        return _reached(run, listed, observed.pose)
     if observed.still or observed.place >= items.scan:
         return runs.failed(run, listed.mission, wrong)
     return None
 
 
-def _left_unseen(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
-    """Complete a stop at which no pose was seen: skipped if the vehicle had no time to wait there."""
-    if observed.jumped:
-        return runs.skipped(changed(run, leg=run.at + 1), listed.mission, JUMPED)
-    reason = "no pose of the vehicle at the stop"
-    return _unconfirmed(run, listed, None, reason) if observed.report_overdue else None
+def _passed(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+    """Check a stop that the vehicle has left before its arrival was seen."""
+    if observed.is_jumped:
+        return _jumped(run, listed)
+    if observed.stood is None:
+        over = observed.report_overdue and observed.is_ours
+        return _unconfirmed(run, listed, None, "no pose of the vehicle at the stop") if over else None
+    wrong = stop_error_text(observed.stood, run, listed)
+    if wrong:
+        return runs.failed(_last_try(run, listed.mission.stops[run.at]), listed.mission, wrong)
+    return _reached(run, listed, observed.stood)
+
+
+def _reached(run: Run, listed: ListedMission, pose: Pose) -> Change:
+    stop = listed.mission.stops[run.at]
+    return runs.reached(changed(run, leg=run.at), listed.mission, pose, deviation(pose, stop))
 
 
 def _settled(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
@@ -165,8 +180,10 @@ def _scanned(run: Run, listed: ListedMission, observed: Observation, items: Stop
         left = observed.place >= items.after
         tried = _last_try(run, listed.mission.stops[run.at]) if left else run
         return runs.scan_ended(tried, listed.mission, observed.scan)
-    if observed.place < items.after or not observed.report_overdue:
+    if observed.place < items.after or not (observed.report_overdue and observed.is_ours):
         return None
+    if observed.is_jumped:
+        return _jumped(run, listed)
     return _unconfirmed(run, listed, observed.stood, "no scan report from the vehicle")
 
 
@@ -182,7 +199,7 @@ def _scan_over(run: Run, listed: ListedMission, observed: Observation, items: St
 
 def _verified(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
     pose = observed.stood or observed.pose
-    return None if pose is None else runs.verified(run, listed.mission, pose)
+    return None if pose is None or not observed.is_ours else runs.verified(run, listed.mission, pose)
 
 
 def _unconfirmed(run: Run, listed: ListedMission, pose: Pose | None, reason: str) -> Change:
@@ -191,6 +208,11 @@ def _unconfirmed(run: Run, listed: ListedMission, pose: Pose | None, reason: str
     behind = runs.next_stop(runs.with_done(changed(run, leg=run.at + 1), stop, pose), listed.mission)
     event = partial(Unconfirmed, stop=stop.id, pose=pose, reason=reason)
     return Change(behind.run, (event, *behind.events))
+
+
+def _jumped(run: Run, listed: ListedMission) -> Change:
+    """Skip a stop that somebody has jumped over."""
+    return runs.skipped(changed(run, leg=run.at + 1), listed.mission, JUMPED)
 
 
 STEPS: dict[str, Callable[[Run, ListedMission, Observation, StopItems], Change | None]] = {

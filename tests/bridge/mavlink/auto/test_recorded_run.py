@@ -11,6 +11,7 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.mavlink.auto import list_guard
 from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.logbook import Logbook, remember
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
@@ -20,6 +21,7 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.items import Command, Item, ItemList
+from stopgo.mission.mavlink.read_back import home_item
 from stopgo.mission.mavlink.recognise import recognise
 from stopgo.mission.run.events import AnyEvent, Arrived, Failed
 from stopgo.mission.run.states import started
@@ -95,12 +97,17 @@ def followed(log: list[Any], tour: Mission) -> tuple[AnyEvent, ...]:
     for message in (armed_in_auto, origin):
         observer.take(message, book.listed, clock.now_ns())
     began_us = log[0].TimeUS
-    for entry in log:
-        clock.wait((entry.TimeUS - began_us) / 1e6 - (clock.now_ns() - SimulatedClock().now_ns()) / 1e9)
-        for message in as_messages(entry):
-            follower.look(observer.take(message, book.listed, clock.now_ns()))
-    clock.wait(3.0)  # it is waited for a word of the last scan
-    follower.look("HEARTBEAT")
+    read_back = (home_item(ORIGIN), *items_of(log))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(list_guard, "download", lambda peer: read_back)
+        for entry in log:
+            clock.wait((entry.TimeUS - began_us) / 1e6 - (clock.now_ns() - SimulatedClock().now_ns()) / 1e9)
+            follower.compare()
+            for message in as_messages(entry):
+                follower.look(observer.take(message, book.listed, clock.now_ns()))
+        clock.wait(3.0)  # it is waited for a word of the last scan
+        follower.compare()
+        follower.look("HEARTBEAT")
     return book.journal.events()
 
 
