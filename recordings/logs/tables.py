@@ -36,7 +36,9 @@ def read_table(path: Path, reading: Reading) -> FieldLog:
 
 
 def read_tum(path: Path, reading: Reading) -> FieldLog:
-    """Read a trajectory in TUM's format; other lines are left out and counted.
+    """Read a trajectory in TUM's format, or EuRoC's eight columns; other lines are left out and counted.
+
+    EuRoC's have nanoseconds, and the quaternion's w first.
 
     Raises
     ------
@@ -45,10 +47,13 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
     """
     rows: list[Numbers] = []
     lost = 0
+    euroc = _looks_like_euroc(path)
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:
             words = line.split("#")[0].replace(",", " ").split()
             row = _numbers(words) if len(words) == TUM_COLUMNS else None
+            if row is not None and euroc:
+                row = (row[0] / 1e9, *row[1:4], *row[5:], row[4])
             row = row if row is not None and abs(row[0]) < LATEST_S else None
             lost += bool(words) and row is None
             rows += [] if row is None else [row]
@@ -56,8 +61,19 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
         raise InputError(f"{path}: no line is `t x y z qx qy qz qw`; give a trajectory in TUM's format")
     table = np.array(rows)
     ns = np.rint(table[:, 0] * 1e9).astype(np.int64)
-    track = poses_of("TUM", "trajectory", ns, table[:, 1:3], headings_of(table[:, 4:]))
-    return _log(path, "TUM trajectory", track, len(rows), lost, ns)
+    name = "EuRoC" if euroc else "TUM"
+    track = poses_of(name, "trajectory", ns, table[:, 1:3], headings_of(table[:, 4:]))
+    return _log(path, f"{name} trajectory", track, len(rows), lost, ns)
+
+
+def _looks_like_euroc(path: Path) -> bool:
+    """True if the first row has commas, and a whole number of nanoseconds since 1970."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in _first_lines(file):
+            stamp, comma, _ = line.split("#")[0].partition(",")
+            if stamp.strip():
+                return bool(comma) and stamp.strip().isdigit() and int(stamp) > LATEST_S
+    return False
 
 
 def _numbers(words: list[str]) -> Numbers | None:
@@ -83,7 +99,7 @@ def read_csv(path: Path, reading: Reading) -> FieldLog:
         )
         rows, lost = [], 0
         for cells in csv.reader(file, delimiter=separator):
-            row = columns.row(cells)
+            row = columns.row([cell.replace(",", ".") for cell in cells] if separator == ";" else cells)
             lost += bool(cells) and row is None
             rows += [] if row is None else [row]
     if not rows:

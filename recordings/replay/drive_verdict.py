@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from stopgo.mission.comparing.acquired import Certainty
+from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.comparing.run_verdict import Judgement, named
 from stopgo.mission.run.events import Settled
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.stop_evidence import StopEvidence, apart_from_plan, stop_evidence
 
 
 def drive_verdict(replay: Replay) -> Judgement:
@@ -18,13 +20,16 @@ def drive_verdict(replay: Replay) -> Judgement:
     If the floor is known, all required targets must have been visible as well. No needs evidence against it;
     without either the answer is unknown.
     """
-    if missing(replay) or outside(replay):
+    evidence = stop_evidence(replay)
+    answers = {one.answer for one in evidence}
+    apart = tuple(apart_from_plan(replay)) if "unknown" in answers else ()
+    if "no" in answers or apart:
         answer: Certainty = "no"
-    elif unplaced(replay):
+    elif "unknown" in answers:
         answer = "unknown"
     else:
         answer = "yes" if replay.sight is None or replay.sight.enough else "no"
-    return DriveJudgement(answer, tuple(_sentences(replay)))
+    return DriveJudgement(answer, tuple(_sentences(replay, evidence, apart)))
 
 
 class DriveJudgement(Judgement):
@@ -45,37 +50,37 @@ def outside(replay: Replay) -> list[StopComparison]:
     return [item for item in replay.comparison.asked if item.outside_text]
 
 
-def unplaced(replay: Replay) -> list[StopComparison]:
-    """Return stops that the robot passed or scanned, and no pose in the log shows where it was."""
-    return [item for item in replay.comparison.asked if item.outcome in DONE and item.deviation_m is None]
-
-
-def _sentences(replay: Replay) -> Iterator[str]:
-    asked = replay.comparison.asked
-    good = len(asked) - len(missing(replay)) - len(outside(replay)) - len(unplaced(replay))
-    yield f"{good} of {len(asked)} stops were visited within tolerance."
+def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence[str]) -> Iterator[str]:
+    good = sum(one.answer == "yes" for one in evidence)
+    yield f"{good} of {len(evidence)} stops were visited within tolerance."
+    for why in dict.fromkeys(one.why for one in evidence if one.answer == "unknown"):
+        names = named([one.item.stop for one in evidence if one.why == why])
+        yield f"{names} cannot be told: {why}."
+    against = [one.item for one in evidence if one.answer == "no"]
     for outcome, words in WORDS.items():
-        stops = [item.stop for item in asked if item.outcome == outcome]
+        stops = [item.stop for item in against if item.outcome == outcome]
         if stops:
             yield f"{words} {named(stops)}."
-    for item in outside(replay):
-        far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
-        yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
-    if unplaced(replay):
-        names = named([item.stop for item in unplaced(replay)])
-        yield f"Position at {names} cannot be told: no pose in the log; the robot's own log may have it."
+    for item in against:
+        if item.outside_text:
+            far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
+            yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
+    yield from (f"{line}." for line in apart)
     if replay.sight is not None:
-        whole = replay.sight.shares.whole
-        short = [share for share in replay.sight.shares.short if share is not whole]
-        for share in (whole, *short):
-            name, least = share.name if share is not whole else "what is visible", percent(share.required)
-            yield f"Of {name}, {percent(share.coverage)} was visible; {least} is required."
+        yield from _coverage_sentences(replay.sight)
     if replay.extra:
         yield f"{len(replay.extra)} standstills were not at a stop."
     if replay.inferred:
         yield f"Visits are inferred from standstills; {_scans_text(replay)}."
     if replay.log.lost:
         yield f"The log is damaged; this is the result of the readable part: {replay.log.lost}."
+
+
+def _coverage_sentences(sight: AsDriven) -> Iterator[str]:
+    whole = sight.shares.whole
+    for share in (whole, *(share for share in sight.shares.short if share is not whole)):
+        name, least = share.name if share is not whole else "what is visible", percent(share.required)
+        yield f"Of {name}, {percent(share.coverage)} was visible; {least} is required."
 
 
 def _scans_text(replay: Replay) -> str:

@@ -99,7 +99,12 @@ def _skips(
 
 def long_enough(standstill: Standstill, stop: Stop) -> bool:
     """True if a standstill was long enough for a scan."""
-    return standstill.seconds >= ENOUGH * (stop.settle_s + stop.scan.duration_s) - SLACK_S
+    return standstill.seconds >= least_stay_s(stop)
+
+
+def least_stay_s(stop: Stop) -> float:
+    """Return the shortest standstill in which a scan may have been made there."""
+    return ENOUGH * (stop.settle_s + stop.scan.duration_s) - SLACK_S
 
 
 def _costs(positions: FloatArray, stops: FloatArray, reach: FloatArray) -> FloatArray:

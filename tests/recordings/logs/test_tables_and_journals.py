@@ -52,6 +52,41 @@ def test_a_table_is_read_by_its_header(
     assert np.allclose(track.heading, [heading])
 
 
+def test_eurocs_eight_columns_are_not_tums(tmp_path: Path) -> None:
+    """Nanoseconds, commas, and w first; both begin with a comment, or with none."""
+    half = math.sin(math.pi / 4)
+    rows = [f"{1_403_636_580_838_555_648 + k * 10**8},1,{k},0,{half},0,0,{half}" for k in range(3)]
+    for head in ("#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n", ""):
+        path = tmp_path / "a.csv"
+        path.write_text(head + "\n".join(rows))
+        log = read_log(path)
+        assert log.format == "EuRoC trajectory"
+        assert np.allclose(log.poses[0].heading, math.pi / 2)
+        assert np.allclose(log.poses[0].xy, [(1, 0), (1, 1), (1, 2)])
+        assert log.seconds == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_spreadsheets_decimal_commas_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time;x;y;heading_deg\n1,5;2,25;-3,5;90,0\n2,5;2,5;-3,5;90,0\n")
+    (track,) = read_log(path).poses
+    assert track.ns.tolist() == [1_500_000_000, 2_500_000_000]
+    assert np.allclose(track.xy, [(2.25, -3.5), (2.5, -3.5)])
+
+
+@pytest.mark.parametrize("cell", ["170000000000000", "1.7e300", "-1e30", "9" * 400])
+@pytest.mark.parametrize("form", ["{} 1 2 0 0 0 0 1", "{},1,2,0"])
+def test_a_stamp_with_digits_run_together_is_a_line_that_cannot_be_read(
+    tmp_path: Path, cell: str, form: str
+) -> None:
+    path = tmp_path / "a.csv"
+    rows = [form.format(stamp) for stamp in ("1.0", "2.0", cell, "3.0")]
+    path.write_text("\n".join(rows if " " in form else ["time,x,y,heading", *rows]))
+    log = read_log(path)
+    assert log.lost == "1 of 4 lines cannot be read"
+    assert log.seconds == 2.0
+
+
 @pytest.mark.parametrize("content", ["a,b\n1,2\n", "time,x,y\n", "time,x,y\nu,v,w\n", "\n"])
 def test_a_table_without_poses_is_refused(tmp_path: Path, content: str) -> None:
     path = tmp_path / "a.csv"

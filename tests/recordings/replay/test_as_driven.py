@@ -87,7 +87,7 @@ def test_the_command_tells_coverage_and_writes_the_top_up(
     (folder / "run.csv").write_text("time_ns,x,y,heading\n" + table)
     given = [str(folder / "run.csv"), "--mission", str(folder / "mission.json"), "--align", "first", "--json"]
     floor = ["--floor", str(folder / "floor.dxf"), "--top-up", str(folder / "next.json")]
-    assert main(["replay", *given, *floor]) == 1
+    assert main(["replay", *given, *floor]) == 3  # the log ends where the stop would be
     told = json.loads(capsys.readouterr().out)
     whole = told["coverage"]["shares"]["all"]
     seen = as_driven(planned, places(planned, last)).shares.whole

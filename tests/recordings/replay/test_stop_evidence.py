@@ -1,0 +1,92 @@
+"""Yes only from evidence for every stop, no only from evidence against one, else it cannot be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.run_log import Track
+from stopgo.recordings.replay.drive_verdict import drive_verdict
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replaying import replay
+from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
+from tests.recordings.replay.test_replaying import log_of
+
+MISSION = wandering(1)
+THERE = Placing(to_map=Transform(x=0.0, y=0.0, heading=0.0))
+
+
+def seen(drive: Drive, kept: Callable[[np.ndarray], np.ndarray]) -> Track:
+    """The log of a drive without the poses at some seconds."""
+    track = logged(drive)
+    mask = kept((track.ns - BEGIN_NS) / 1e9)
+    return Track.of(track.ns[mask], track.xy[mask], track.heading[mask])
+
+
+@pytest.mark.parametrize("placing", [Placing(align="first"), Placing(align="stops")])
+def test_odometry_that_drifts_by_more_than_the_tolerance_tells_neither_yes_nor_no(placing: Placing) -> None:
+    found = replay(log_of(logged(driven(MISSION), Senses(slip=0.01))), MISSION, placing)
+    judged = drive_verdict(found)
+    assert (judged.answer, judged.exit_code) == ("unknown", 3)
+    assert "drift" in judged.text and "would tell" in judged.text
+
+
+def test_a_robot_that_stood_off_its_stops_is_told_though_the_log_drifts() -> None:
+    """Distances between its standstills differ from those planned by more than any drift."""
+    drive = driven(MISSION, Odd(beside_m=0.5))
+    found = replay(log_of(logged(drive, Senses(slip=0.01))), MISSION, Placing(align="first"))
+    assert drive_verdict(found).answer == "no"
+
+
+def test_one_stop_that_was_missed_by_a_little_is_told_where_the_others_hold() -> None:
+    drive = driven(MISSION)
+    track = logged(drive)
+    halt = drive.halts[4]
+    seconds = (track.ns - BEGIN_NS) / 1e9
+    xy = track.xy.copy()
+    xy[(seconds > halt.begin_s - 0.5) & (seconds < halt.end_s + 0.5)] += (0.08, 0.0)
+    found = replay(log_of(Track.of(track.ns, xy, track.heading)), MISSION, THERE)
+    assert drive_verdict(found).answer == "no"
+    assert "s05: position error 80 mm" in drive_verdict(found).text
+
+
+def test_poses_that_are_missing_during_a_stop_do_not_tell_that_nobody_was_there() -> None:
+    drive = driven(MISSION)
+    halt = drive.halts[4]
+    track = seen(drive, lambda s: (s < halt.begin_s - 2) | (s > halt.end_s + 2))
+    judged = drive_verdict(replay(log_of(track), MISSION, THERE))
+    assert judged.answer == "unknown"
+    assert "8 of 9" in judged.text and "s05 cannot be told" in judged.text and "without poses" in judged.text
+
+
+def test_a_stop_that_was_passed_in_sight_is_a_no() -> None:
+    track = logged(driven(MISSION, Odd(skipped=frozenset({4}))))
+    assert drive_verdict(replay(log_of(track), MISSION, THERE)).answer == "no"
+
+
+def test_a_log_that_begins_late_does_not_tell_of_the_stops_before() -> None:
+    drive = driven(MISSION)
+    track = seen(drive, lambda s: s > drive.halts[2].end_s + 1)
+    judged = drive_verdict(replay(log_of(track), MISSION, THERE))
+    assert judged.answer == "unknown"
+    assert "s01, s02 and s03 cannot be told: the log begins" in judged.text
+
+
+def test_half_a_log_does_not_tell_of_the_stops_after() -> None:
+    drive = driven(MISSION)
+    track = seen(drive, lambda s: s < drive.halts[5].end_s + 1)
+    judged = drive_verdict(replay(log_of(track), MISSION, THERE))
+    assert judged.answer == "unknown"
+    assert "s07, s08 and s09 cannot be told: the log ends" in judged.text
+
+
+def test_rare_poses_do_not_tell_that_a_standstill_was_too_short() -> None:
+    """Every 5 s a pose, and scans of 14 s: what is seen of them is 5 or 10 s."""
+    track = logged(driven(MISSION))
+    rare = np.arange(len(track)) % 50 == 3
+    found = replay(log_of(Track.of(track.ns[rare], track.xy[rare], track.heading[rare])), MISSION, THERE)
+    assert drive_verdict(found).answer == "unknown"
+    assert found.extra == ()
