@@ -75,7 +75,7 @@ def kinds_of(floor: FloorPlan) -> list[str]:
     return known + sorted(there - set(known))
 
 
-_ORDER = ("stairs", "other", "walls", "windows", "columns", "railings", "beams")
+_ORDER = ("stairs", "other", "objects", "walls", "windows", "columns", "railings", "beams")
 _EVEN_ODD: dict[str, object] = {"fill_rule": "evenodd"}
 
 

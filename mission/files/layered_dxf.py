@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 COLOURS = {
     "FLOOR": 8, "ROOMS": 3, "DOORS": 5, "PASSAGES": 150, "WALLS": 7, "COLUMNS": 1, "BEAMS": 40,
-    "STAIRS": 30, "WINDOWS": 4, "RAILINGS": 6, "OTHER": 9,
+    "STAIRS": 30, "WINDOWS": 4, "RAILINGS": 6, "OBJECTS": 33, "OTHER": 9,
 }  # fmt: skip
 """AutoCAD colour of each layer."""
 TEXT = 0.2

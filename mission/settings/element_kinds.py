@@ -24,7 +24,12 @@ KINDS: dict[str, Kind] = {
         Kind("stairs", occludes=True, obstacle=True, target=False),
         Kind("windows", occludes=False, obstacle=True, target=False),
         Kind("railings", occludes=False, obstacle=True, target=False),
+        Kind("objects", occludes=True, obstacle=True, target=False),
         Kind("other", occludes=False, obstacle=True, target=False),
     )
 }
-"""Every element kind with its defaults; `other` is a closed shape on an unknown layer."""
+"""Every element kind with its defaults.
+
+`objects` is furniture, equipment and the like of a model, as high as the scanner; `other` is a closed shape
+on an unknown layer, and an object that the scanner sees over.
+"""

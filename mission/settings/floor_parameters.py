@@ -49,6 +49,10 @@ class FloorParameters:
         Literal["obstacle", "target"] | None,
         _floor("Elements under construction: obstacles only, or scanned too", undecided="obstacle"),
     ] = None
+    furniture: Annotated[
+        Literal["obstacle", "ignore"] | None,
+        _floor("Furniture and equipment of a model: in the robot's way, or not there", undecided="obstacle"),
+    ] = None
     units: Annotated[
         str | None, _floor("Unit of a drawing, such as mm, m or inch", undecided="as it fits walls and doors")
     ] = None

@@ -12,8 +12,9 @@ from stopgo.mission.files.coverage_json import Coverage
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.planner.checking.claims import Recount, overclaims, recount
 from stopgo.planner.checking.fit import misfits_on, other_machine
+from stopgo.planner.checking.model_clearance import too_near
 from stopgo.planner.checking.network_claims import network_overclaims
-from stopgo.planner.floors import options_of, read_floor
+from stopgo.planner.floors import options_of, read_floor, standing_bodies
 from stopgo.planner.space.navigable import navigable
 
 
@@ -39,6 +40,7 @@ def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
         return Verdict((Problem("$.origin.parameters", f"are not those of a plan: {error}"),))
     floor = read_floor(path, options_of(settings))
     misfits = (*other_machine(mission, settings), *misfits_on(floor, mission, settings))
+    misfits = (*misfits, *too_near(mission, standing_bodies(path, options_of(settings)), settings))
     try:
         counted = recount(mission, navigable(floor, settings))
     except NegativeResult as error:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from stopgo.mission.console.table import duration, printable
 from stopgo.mission.document import Mission
+from stopgo.mission.document.problems import Problem
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.floor import Finding, Rank
 from stopgo.mission.plan import PartPlan
@@ -26,6 +27,8 @@ class PlanReport:
     part: PartPlan
     files: dict[str, Path]
     times_s: dict[str, float]
+    too_near: tuple[Problem, ...] = field(default=(), kw_only=True)
+    """Stops and legs nearer to a body of the model than promised."""
 
     @property
     def mission(self) -> Mission:
@@ -42,8 +45,8 @@ class PlanReport:
 
     @property
     def exit_code(self) -> int:
-        """Exit code of the plan: 1 if the robot would drive over lines that were not read."""
-        return 1 if self.figures.crosses_ignored else 0
+        """Exit code of the plan: 1 if it comes too near a body or drives over lines that were not read."""
+        return 1 if self.too_near or self.figures.crosses_ignored else 0
 
     @property
     def strict_exit_code(self) -> int:
@@ -72,6 +75,7 @@ class PlanReport:
             ),
             **time_table(route),
             "unreached": [_attributes(item, "room", "why", "area_m2") for item in self.figures.unreached],
+            **({"too_near": [str(item) for item in self.too_near]} if self.too_near else {}),
             "times_s": {key: round(value, 4) for key, value in self.times_s.items()},
             "files": {key: str(path) for key, path in self.files.items()},
         }
@@ -139,6 +143,7 @@ class PlanReport:
             for u in figures.unreached
         ]
         lines += finding_lines(figures.findings)
+        lines += [f"  too near    {printable(item.message)}" for item in self.too_near]
         return "\n".join([*lines, *self._file_lines()])
 
     def _route_lines(self, route: dict[str, Any]) -> list[str]:

@@ -16,7 +16,8 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings
 from stopgo.mission.settings.layer_kinds import kinds_by_name
-from stopgo.planner.floors.reader import FloorFile, FloorOptions, Reader
+from stopgo.planner.floors.reader import BodiesModule, FloorFile, FloorOptions, Reader
+from stopgo.planner.floors.standing_body import StandingBody
 from stopgo.planner.floors.survey import Survey
 from stopgo.planner.floors.third_party_readers import foreign_readers, sound
 
@@ -43,9 +44,10 @@ READERS: tuple[Reader, ...] = (
         takes=frozenset(
             {
                 *("storey", "level", "scan_height", "robot_height", "date", "since", "schedule"),
-                *("schedule_columns", "in_progress"),
+                *("schedule_columns", "in_progress", "furniture", "layers", "layer_map"),
             }
         ),
+        has_bodies=True,
     ),
 )
 """Every kind of file that floors are read from."""
@@ -68,6 +70,17 @@ def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
     with reader.named_errors():
         floor = reader.what.load().read(file, options)
     return floor if reader.ours else sound(reader, floor, file.digest)
+
+
+def standing_bodies(path: Path, options: FloorOptions | None = None) -> tuple[StandingBody, ...]:
+    """Return the bodies of a model in the robot's height on the floor that `read_floor` reads.
+
+    Other files have none: their floor is all that is known.
+    """
+    file, reader, options = _opened(path, options)
+    if not reader.ours or not reader.what.has_bodies:
+        return ()
+    return cast("BodiesModule", reader.what.load()).standing(file, options)
 
 
 def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
@@ -157,4 +170,13 @@ def _bytes_of(path: Path) -> bytes:
     return data
 
 
-__all__ = ["READERS", "FloorFile", "FloorOptions", "Reader", "options_of", "read_floor", "survey_floor"]
+__all__ = [
+    "READERS",
+    "FloorFile",
+    "FloorOptions",
+    "Reader",
+    "options_of",
+    "read_floor",
+    "standing_bodies",
+    "survey_floor",
+]

@@ -131,7 +131,7 @@ def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLin
             findings.append(
                 Finding("off_floor", f"layer {shape.layer}: a shape outside the floor is ignored", at=at)
             )
-        elif spaces.filled_by(shape.region):
+        elif shape.global_id is None and spaces.filled_by(shape.region):
             text = f"layer {shape.layer}: a ring around rooms ({shape.region.area:.3g} m²) is ignored"
             findings.append(Finding("outline_not_solid", text, at=at))
             rings = [ring for part in polygons_of(shape.region) for ring in (part.exterior, *part.interiors)]
@@ -151,7 +151,8 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Eleme
         body = closed[index].region
         if inner:
             body = body.difference(shapely.union_all([hole.region for hole in inner]))
-        if not polygons_of(body) or (kind in _OUTLINES and spaces.filled_by(body)):
+        drawn_by_hand = kind in _OUTLINES and closed[index].global_id is None
+        if not polygons_of(body) or (drawn_by_hand and spaces.filled_by(body)):
             parts += [_body_or_outline(kind, shape, spaces) for shape in (closed[index], *inner)]
         else:
             anomalies = tuple(item for shape in (closed[index], *inner) for item in shape.anomalies)

@@ -13,6 +13,7 @@ from typing import Any, Literal, Protocol, cast
 
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.planner.floors.standing_body import StandingBody
 from stopgo.planner.floors.survey import Survey
 
 
@@ -65,6 +66,8 @@ class FloorOptions:
     """CSV of GlobalIds with the start and finish of their tasks."""
     schedule_columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """Name of the CSV column for each of guid, task, start, finish."""
+    furniture: Literal["obstacle", "ignore"] | None = None
+    """Treatment of a model's furniture, fixtures and equipment."""
     in_progress: Literal["obstacle", "target"] | None = None
     """Treatment of elements under construction on the day: obstacle only, or target too."""
 
@@ -91,6 +94,13 @@ class ReaderModule(Protocol):
         """The floor that the options choose in it."""
 
 
+class BodiesModule(Protocol):
+    """The module of a reader whose files hold bodies, which finished plans are checked against."""
+
+    def standing(self, file: FloorFile, options: FloorOptions) -> tuple[StandingBody, ...]:
+        """Return the bodies in the robot's height on the floor that the options choose."""
+
+
 @dataclass(frozen=True)
 class Reader:
     """One kind of file that floors are read from."""
@@ -104,6 +114,8 @@ class Reader:
     """Dotted name of its module, a ReaderModule, which is loaded when it is used."""
     takes: frozenset[str]
     """Names of the FloorOptions that apply to it, except d_dis."""
+    has_bodies: bool = False
+    """True if its module is a BodiesModule."""
 
     def load(self) -> ReaderModule:
         """Its module."""

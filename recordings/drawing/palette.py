@@ -73,6 +73,7 @@ KIND_COLOURS: dict[str, Colour] = {
     "stairs": (40, 165, 150, 255),
     "windows": (95, 165, 245, 255),
     "railings": (110, 135, 225, 255),
+    "objects": (185, 150, 90, 255),
     "other": (150, 130, 105, 255),
 }
 """Colour of every element kind of `stopgo.mission.settings.element_kinds.KINDS`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
     from stopgo.planner.commands.plan_report import PlanReport
+    from stopgo.planner.floors.standing_body import StandingBody
     from stopgo.recordings.plan import PlanRecording
 
 
@@ -47,7 +48,7 @@ def plan_files(
 ) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first."""
     from stopgo.planner.commands.outputs import names
-    from stopgo.planner.floors import options_of, read_floor
+    from stopgo.planner.floors import options_of, read_floor, standing_bodies
 
     watch = Stopwatch()
     read = read_floor(floor, options_of(settings))
@@ -57,7 +58,8 @@ def plan_files(
     with _print_findings_on_error(read):
         made = plan(read, settings, observe=watch.observe, all_parts=all_parts)
     options = print_options or PrintOptions()
-    reports = [_write_part(made, number, folder, options, watch) for number in range(len(made.parts))]
+    bodies = standing_bodies(floor, options_of(settings))
+    reports = [_write_part(made, number, folder, options, watch, bodies) for number in range(len(made.parts))]
     _set_aside_old(folder, len(reports), read, settings)
     if made.divided is None:
         return reports
@@ -95,8 +97,16 @@ WRITTEN = ("recording", "sheets", "coverage", "picture", "mission")
 """A plan's files in the order in which they appear: the mission when all else is there."""
 
 
-def _write_part(plan: Plan, number: int, folder: Path, options: PrintOptions, watch: Stopwatch) -> PlanReport:
+def _write_part(
+    plan: Plan,
+    number: int,
+    folder: Path,
+    options: PrintOptions,
+    watch: Stopwatch,
+    bodies: Sequence[StandingBody],
+) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
+    from stopgo.planner.checking.model_clearance import too_near
     from stopgo.planner.commands.outputs import names, set_aside_file
     from stopgo.planner.commands.plan_report import PlanReport
 
@@ -126,7 +136,8 @@ def _write_part(plan: Plan, number: int, folder: Path, options: PrintOptions, wa
     for path in unwanted:
         set_aside_file(path)
     watch.lap("files")
-    return PlanReport(part=part, files=files, times_s=watch.times())
+    near = tuple(too_near(part.mission, bodies, plan.settings))
+    return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near)
 
 
 def _revised(mission: Mission, path: Path) -> Mission:

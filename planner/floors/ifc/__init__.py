@@ -10,12 +10,15 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import bounds
 from stopgo.mission.settings.element_kinds import KINDS
+from stopgo.planner.floors.ifc.class_kinds import IGNORED, with_given_kinds
 from stopgo.planner.floors.ifc.levels import Level, chosen_level, levels_of, standing_at, walked, with_uses
 from stopgo.planner.floors.ifc.loading import load
 from stopgo.planner.floors.ifc.model import Model
-from stopgo.planner.floors.ifc.storey_plan import floor_on, odd_products
+from stopgo.planner.floors.ifc.standing import standing_on
+from stopgo.planner.floors.ifc.storey_plan import as_on_day, floor_on, heights_of, odd_products
 from stopgo.planner.floors.parts import in_order
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
+from stopgo.planner.floors.standing_body import StandingBody
 from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey
 
 WORKED_OUT = (
@@ -33,10 +36,19 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
     InputError
         When the file is not a model, or the storey is not given, not there or without a floor.
     """
-    model = load(file)
+    model = with_given_kinds(load(file), options, file.path)
     levels = with_uses(levels_of(model), model)
     level = chosen_level(levels, model=model, storey=options.storey, z=options.level, path=file.path)
     return floor_on(level, model, file, options)
+
+
+def standing(file: FloorFile, options: FloorOptions) -> tuple[StandingBody, ...]:
+    """Return the bodies of the model that reach into the robot's height on the storey that `read` reads."""
+    model = with_given_kinds(load(file), options, file.path)
+    levels = with_uses(levels_of(model), model)
+    level = chosen_level(levels, model=model, storey=options.storey, z=options.level, path=file.path)
+    there, _, _ = as_on_day(model, level, options)
+    return tuple(standing_on(level, there, heights_of(options)))
 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:
@@ -47,7 +59,7 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
     InputError
         As `read` does, except for a storey that is not given.
     """
-    model = load(file)
+    model = with_given_kinds(load(file), options, file.path)
     levels = with_uses(levels_of(model), model)
     is_chosen = options.storey is not None or options.level is not None or len(walked(levels)) == 1
     own = (
@@ -95,9 +107,14 @@ def _choice(
 
 def _classes(model: Model) -> tuple[LayerUse, ...]:
     """Meaning of each class of products."""
-    found = Counter((item.ifc_class, item.role) for item in model.described.products if item.faces[1])
+    products = model.described.products
+    found = Counter(
+        (item.ifc_class, item.role) for item in products if item.faces[1] and item.role != IGNORED
+    )
     bare = Counter(
-        (item.ifc_class, item.role) for item in model.described.products if not (item.faces[1] or item.parts)
+        (item.ifc_class, item.role)
+        for item in products
+        if item.role == IGNORED or not (item.faces[1] or item.parts)
     )
     return tuple(
         LayerUse(name, role, "its class", taken=found[name, role], ignored=bare[name, role])

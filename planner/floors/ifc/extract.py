@@ -7,11 +7,10 @@ goes to stderr where that is a terminal. What it was working on last is in the f
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any
 
 import ifcopenshell
 import ifcopenshell.geom
@@ -22,9 +21,19 @@ import numpy as np
 
 from stopgo.planner.floors.ifc.construction_dates import phases_of, tasks_by_product
 from stopgo.planner.floors.ifc.earth_placement import place_of
-from stopgo.planner.floors.ifc.model import Described, Model, Placement, Product, Storey, packed
+from stopgo.planner.floors.ifc.model import Described, Model, Product, Storey, packed
+from stopgo.planner.floors.ifc.product_shapes import (
+    BOX,
+    UNCUT,
+    Made,
+    all_at_once,
+    has_body,
+    is_a,
+    is_sound,
+    one_by_one,
+    placement_of,
+)
 
-KERNEL: Final = "hybrid-cgal-simple-opencascade"
 ROLES = {
     "IfcWall": "walls",
     "IfcColumn": "columns",
@@ -46,10 +55,22 @@ ROLES = {
     "IfcCovering": "coverings",
     "IfcFooting": "footings",
     "IfcBuildingElementProxy": "other",
+    "IfcFurnishingElement": "furniture",
+    "IfcDistributionElement": "furniture",
+    "IfcTransportElement": "furniture",
+    "IfcTransportationDevice": "furniture",
     "IfcSpace": "spaces",
     "IfcOpeningElement": "openings",
+    "IfcElement": "other",
 }
-"""Role of each class of a model in a plan; all other classes are left out and counted."""
+"""Role of each class in a plan; the first that fits counts. Other classes are left out and counted."""
+NO_BODY = (
+    *("IfcFeatureElement", "IfcVirtualElement", "IfcReinforcingElement", "IfcFastener"),
+    *("IfcMechanicalFastener", "IfcGeographicElement", "IfcCivilElement", "IfcBuildingElementPart"),
+)
+"""Elements that stand for no body of their own in the robot's way, or only as part of another."""
+NO_SOLID = ("PROVISIONFORVOID", "PROVISIONFORSPACE")
+"""Predefined types of proxies that reserve room and fill none."""
 UNSEEN = (
     "IfcSpatialStructureElement",
     "IfcSpatialElement",
@@ -58,12 +79,12 @@ UNSEEN = (
     "IfcPort",
     "IfcVirtualElement",
 )
-CLEAR = 0.3
-"""A style that lets more than this share of light through is glass."""
+COUNTED_APART = ("doors", "windows", "spaces", "openings")
+"""Roles that count beside the whole that encloses them."""
+SAME_BOX = 0.02
+"""A part lies in its whole's body up to this much outside its box, metres."""
 MOST_COMPLAINTS = 5
 """Lines of the library's log that are handed on."""
-LARGEST = 1e7
-"""Metres from the origin beyond which nothing is built."""
 
 
 def main(arguments: list[str]) -> int:
@@ -78,7 +99,8 @@ def main(arguments: list[str]) -> int:
         return 2
     damage = tuple(_complaints())
     alone = frozenset(rest[1:])
-    shapes = _one_by_one(model, alone, Path(f"{out}.at")) if rest else _all_at_once(model)
+    entities = _shaped_entities(model)
+    shapes = one_by_one(model, entities, alone, Path(f"{out}.at")) if rest else all_at_once(model, entities)
     Path(out).write_bytes(packed(extracted(model, shapes, damage=damage)))
     return 0
 
@@ -90,24 +112,25 @@ def _complaints() -> Iterator[str]:
     yield from [line for line in lines if line][:MOST_COMPLAINTS]
 
 
-Made = tuple[int, Any]
-"""A product's number in the file, and its geometry."""
-
-
 def extracted(model: ifcopenshell.file, shapes: Iterable[Made], *, damage: tuple[str, ...] = ()) -> Model:
     """All of a model that a plan needs."""
     unit = ifcopenshell.util.unit.calculate_unit_scale(model)
-    vertices, faces, where, clear = _arrays(shapes)
+    chosen = _chosen(model)
+    owners = _owners(model, chosen)
+    made = [item for item in shapes if item.number in owners and is_sound(item)]
+    by_owner: dict[int, list[Made]] = {}
+    for item in made:
+        by_owner.setdefault(owners[item.number], []).append(item)
+    own = _without_repeated_parts(chosen, by_owner)
+    vertices, faces, where = _arrays(own)
     tasks = tasks_by_product(model)
     products = [
-        _product(entity, role, unit, where.get(entity.id()), clear.get(entity.id(), False), tasks)
-        for entity, role in _chosen(model)
+        _product(entity, role, unit, where.get(entity.id()), own.get(entity.id(), ()), tasks)
+        for entity, role in chosen
     ]
-    failed = tuple(
-        f"{entity.is_a()} {entity.GlobalId} '{entity.Name or ''}'"
-        for entity, role in _chosen(model)
-        if entity.Representation and entity.id() not in where and _has_body(entity)
-    )
+    entities = {number: model.by_id(number) for number in owners}
+    shaped = {item.number for item in made}
+    failed = [entity for number, entity in entities.items() if number not in shaped and has_body(entity)]
     described = Described(
         schema=model.schema_identifier,
         unit_m=unit,
@@ -116,10 +139,55 @@ def extracted(model: ifcopenshell.file, shapes: Iterable[Made], *, damage: tuple
         products=tuple(products),
         place=place_of(model, unit),
         left_out=_left_out(model),
-        failed=failed,
+        failed=tuple(map(_in_words, failed)),
+        boxed=tuple(_in_words(entities[item.number]) for item in made if item.way == BOX),
+        uncut=tuple(_in_words(entities[item.number]) for item in made if item.way in UNCUT),
         damage=damage,
     )
     return Model(described, vertices, faces)
+
+
+def _in_words(entity: Any) -> str:
+    return f"{entity.is_a()} {entity.GlobalId} '{entity.Name or ''}'"
+
+
+def _owners(model: ifcopenshell.file, chosen: list[tuple[Any, str]]) -> dict[int, int]:
+    """The product whose shape each entity makes: itself, or the whole without a body that it is a part of."""
+    owners = {entity.id(): entity.id() for entity, _ in chosen}
+    for part in _by_type(model, "IfcBuildingElementPart"):
+        whole = ifcopenshell.util.element.get_aggregate(part)
+        while whole is not None and whole.id() not in owners:
+            whole = ifcopenshell.util.element.get_aggregate(whole)
+        if whole is not None and part.id() not in owners and not has_body(whole):
+            owners[part.id()] = whole.id()
+    return dict(sorted(owners.items()))
+
+
+def _without_repeated_parts(
+    chosen: list[tuple[Any, str]], made: dict[int, list[Made]]
+) -> dict[int, list[Made]]:
+    """Shapes by product, without the parts that the body of their whole encloses: a thing counts once."""
+    repeated = set()
+    for entity, role in chosen:
+        whole = ifcopenshell.util.element.get_aggregate(entity)
+        if role in COUNTED_APART or whole is None or entity.id() not in made:
+            continue
+        around = made.get(whole.id(), [])
+        if around and _is_within(made[entity.id()], around):
+            repeated.add(entity.id())
+    return {number: shapes for number, shapes in made.items() if number not in repeated}
+
+
+def _is_within(inner: list[Made], outer: list[Made]) -> bool:
+    """True if a box around shapes lies within the box around others."""
+    low, high = _box(inner)
+    around_low, around_high = _box(outer)
+    return bool((low >= around_low - SAME_BOX).all() and (high <= around_high + SAME_BOX).all())
+
+
+def _box(shapes: list[Made]) -> tuple[np.ndarray, np.ndarray]:
+    points = np.vstack([item.points for item in shapes])
+    return points.min(axis=0), points.max(axis=0)
 
 
 def _chosen(model: ifcopenshell.file) -> list[tuple[Any, str]]:
@@ -127,9 +195,18 @@ def _chosen(model: ifcopenshell.file) -> list[tuple[Any, str]]:
     found: dict[int, tuple[Any, str]] = {}
     for name, role in ROLES.items():
         for entity in _by_type(model, name):
-            if role != "openings" or _holds_a_door(entity):
+            if _is_of_role(entity, name, role):
                 found.setdefault(entity.id(), (entity, role))
     return [found[key] for key in sorted(found)]
+
+
+def _is_of_role(entity: Any, name: str, role: str) -> bool:
+    """True if an entity found by its class has the role of that class in a plan."""
+    if role == "openings":
+        return _holds_a_door(entity)
+    if name == "IfcElement" and any(is_a(entity, other) for other in NO_BODY):
+        return False
+    return str(getattr(entity, "PredefinedType", None)) not in NO_SOLID
 
 
 def _holds_a_door(opening: Any) -> bool:
@@ -146,76 +223,37 @@ def _by_type(model: ifcopenshell.file, name: str) -> list[Any]:
         return []
 
 
-def _settings() -> Any:
-    settings = ifcopenshell.geom.settings()
-    settings.set("use-world-coords", True)
-    return settings
+def _shaped_entities(model: ifcopenshell.file) -> list[Any]:
+    """Entities of which shapes are made, by their numbers."""
+    entities = map(model.by_id, _owners(model, _chosen(model)))
+    return [entity for entity in entities if entity.Representation]
 
 
-def _all_at_once(model: ifcopenshell.file) -> Iterator[Made]:
-    entities = [entity for entity, _ in _chosen(model) if entity.Representation]
-    if not entities:
-        return
-    iterator = ifcopenshell.geom.iterator(_settings(), model, 1, include=entities, geometry_library=KERNEL)
-    if not iterator.initialize():
-        return
-    while True:
-        _show_progress(iterator.progress())
-        shape = iterator.get()
-        yield shape.id, shape.geometry
-        if not iterator.next():
-            return
+Rows = tuple[int, int, int, int]
+"""First and last + 1 row of a product's vertices, and of its faces."""
 
 
-def _one_by_one(model: ifcopenshell.file, without: frozenset[str], at: Path) -> Iterator[Made]:
-    """Each shape alone; before each its GlobalId is written down, for whoever reads the crash."""
-    chosen = [entity for entity, _ in _chosen(model) if entity.Representation]
-    for number, entity in enumerate(chosen):
-        if entity.GlobalId in without:
-            continue
-        _show_progress(100 * number // len(chosen))
-        at.write_text(entity.GlobalId)
-        try:
-            made = ifcopenshell.geom.create_shape(_settings(), entity, geometry_library=KERNEL)
-        except RuntimeError:
-            continue  # reported as failed
-        yield entity.id(), cast(Any, made).geometry
-
-
-def _show_progress(percent: int) -> None:
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\033[Kmodel {percent} %" if percent < 100 else "\r\033[K")
-        sys.stderr.flush()
-
-
-def _arrays(
-    shapes: Iterable[Made],
-) -> tuple[np.ndarray, np.ndarray, dict[int, tuple[int, int, int, int]], dict[int, bool]]:
-    """All vertices and faces, the rows of each product in them, and which products are glass."""
+def _arrays(made: dict[int, list[Made]]) -> tuple[np.ndarray, np.ndarray, dict[int, Rows]]:
+    """All vertices and faces, and the rows of each product in them."""
     vertices: list[np.ndarray] = []
     faces: list[np.ndarray] = []
-    where: dict[int, tuple[int, int, int, int]] = {}
-    clear: dict[int, bool] = {}
+    where: dict[int, Rows] = {}
     first_vertex = first_face = 0
-    for number, geometry in shapes:
-        points = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3).copy()
-        corners = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3).astype(np.int64)
-        if not len(corners) or not np.isfinite(points).all() or np.abs(points).max() > LARGEST:
-            continue
-        where[number] = (first_vertex, first_vertex + len(points), first_face, first_face + len(corners))
-        clear[number] = bool(geometry.materials) and all(
-            item.transparency > CLEAR for item in geometry.materials
-        )
-        first_vertex, first_face = first_vertex + len(points), first_face + len(corners)
-        vertices.append(points)
-        faces.append(corners)
+    for number, shapes in made.items():
+        last_vertex, last_face = 0, first_face
+        for item in shapes:
+            vertices.append(item.points)
+            faces.append(item.corners + last_vertex)
+            last_vertex, last_face = last_vertex + len(item.points), last_face + len(item.corners)
+        where[number] = (first_vertex, first_vertex + last_vertex, first_face, last_face)
+        first_vertex, first_face = first_vertex + last_vertex, last_face
     if not faces:
-        return np.empty((0, 3)), np.empty((0, 3), np.int64), where, clear
-    return np.vstack(vertices), np.vstack(faces), where, clear
+        return np.empty((0, 3)), np.empty((0, 3), np.int64), where
+    return np.vstack(vertices), np.vstack(faces), where
 
 
 def _product(
-    entity: Any, role: str, unit: float, rows: tuple[int, int, int, int] | None, clear: bool, tasks: dict
+    entity: Any, role: str, unit: float, rows: Rows | None, shapes: Sequence[Made], tasks: dict
 ) -> Product:
     first, last, low, high = rows or (0, 0, 0, 0)
     container = ifcopenshell.util.element.get_container(entity, ifc_class="IfcBuildingStorey")
@@ -228,10 +266,10 @@ def _product(
         role=_role(entity, role),
         predefined=str(getattr(entity, "PredefinedType", None) or ""),
         storey=container.GlobalId if container is not None else None,
-        placement=_placement(entity, unit) if role == "doors" else None,
+        placement=placement_of(entity, unit) if role == "doors" else None,
         vertices=(first, last),
         faces=(low, high),
-        transparent=clear,
+        transparent=bool(shapes) and all(item.transparent for item in shapes),
         opening=opening.RelatingOpeningElement.GlobalId if opening else None,
         host=host.RelatingBuildingElement.GlobalId if host else None,
         parts=tuple(part.GlobalId for part in ifcopenshell.util.element.get_parts(entity)),
@@ -262,14 +300,6 @@ def _role(entity: Any, role: str) -> str:
     return "railings" if whole.is_a("IfcRailing") else role
 
 
-def _placement(entity: Any, unit: float) -> Placement | None:
-    if entity.ObjectPlacement is None:
-        return None
-    matrix = np.array(ifcopenshell.util.placement.get_local_placement(entity.ObjectPlacement), dtype=float)
-    matrix[:3, 3] *= unit
-    return tuple(matrix.ravel().tolist())
-
-
 def _metres(value: Any, unit: float) -> float | None:
     return float(value) * unit if isinstance(value, int | float) and value > 0 else None
 
@@ -288,15 +318,9 @@ def _lining(entity: Any, unit: float) -> float | None:
     return None
 
 
-def _has_body(entity: Any) -> bool:
-    """True if a product has a body, and not only a line or a symbol."""
-    kinds = {item.RepresentationIdentifier for item in entity.Representation.Representations}
-    return bool(kinds & {"Body", "Facetation", None, ""})
-
-
 def _storeys(model: ifcopenshell.file, unit: float) -> Iterator[Storey]:
     for entity in _by_type(model, "IfcBuildingStorey"):
-        placement = _placement(entity, unit)
+        placement = placement_of(entity, unit)
         elevation = placement[11] if placement else (_metres(entity.Elevation, unit) or 0.0)
         yield Storey(entity.GlobalId, entity.Name or entity.LongName or "", elevation)
 
@@ -307,18 +331,10 @@ def _application(model: ifcopenshell.file) -> str:
 
 
 def _left_out(model: ifcopenshell.file) -> dict[str, int]:
-    chosen = {entity.id() for entity, _ in _chosen(model)}
-    chosen |= {entity.id() for entity in _by_type(model, "IfcOpeningElement")}
+    chosen = {*_owners(model, _chosen(model)), *(item.id() for item in _by_type(model, "IfcOpeningElement"))}
     counts = Counter(
         entity.is_a()
         for entity in _by_type(model, "IfcProduct")
-        if entity.id() not in chosen and not any(_is(entity, name) for name in UNSEEN)
+        if entity.id() not in chosen and not any(is_a(entity, name) for name in UNSEEN)
     )
     return dict(sorted(counts.items()))
-
-
-def _is(entity: Any, name: str) -> bool:
-    try:
-        return bool(entity.is_a(name))
-    except RuntimeError:
-        return False

@@ -23,6 +23,8 @@ LEAST_SLAB = 1.0
 """Square metres of slab that make a level."""
 HEADROOM = 1.8
 """A floor that lies less than this above another is no storey over it."""
+LIKE_LEVEL = 0.3
+"""A level means the storey whose floor is as near as this, metres."""
 OPEN_ABOVE = 3.0
 """Height that is taken above the topmost floor."""
 
@@ -118,12 +120,17 @@ def chosen_level(
     Raises
     ------
     InputError
-        When none is named and there are several, or none has that name.
+        When none is named and there are several, none has that name, or storey and level differ.
     """
     if storey is not None:
-        return _named(levels, storey, path)
+        level = _named(levels, storey, path)
+        if z is not None and abs(level.z - z) > LIKE_LEVEL:
+            raise InputError(
+                f"{path}: --storey {storey} lies at {level.z:g} m, not at --level {z:g}; remove one of them"
+            )
+        return level
     if z is not None:
-        near = [level for level in levels if abs(level.z - z) <= 0.3]
+        near = [level for level in levels if abs(level.z - z) <= LIKE_LEVEL]
         return min(near, key=lambda level: abs(level.z - z)) if near else _bare(z, levels)
     if len(walked(levels)) == 1:
         return walked(levels)[0]

@@ -22,7 +22,7 @@ from stopgo.planner.floors.ifc.model import Model, unpacked
 from stopgo.planner.floors.ifc.model import packed as pack
 from stopgo.planner.floors.reader import FloorFile
 
-FORM = 5
+FORM = 6
 """Raised whenever what is kept of a model, or how it is read, changes."""
 MOST_KEPT = 2 * 1024**3
 """Bytes of models that are kept; the ones longest unused go first."""
@@ -188,7 +188,8 @@ def _with_crashed(packed: bytes, bad: Sequence[str]) -> bytes:
         return packed
 
     model = unpacked(packed)
-    named = [f"{model.products[item].ifc_class} {item} '{model.products[item].name}'" for item in bad]
-    failed = tuple(text for text in model.described.failed if not any(guid in text for guid in bad))
+    words = {text.split()[1]: text for text in model.described.failed}
+    named = [words.get(guid, guid) for guid in bad]
+    failed = tuple(text for guid, text in words.items() if guid not in bad)
     described = replace(model.described, crashed=tuple(named), failed=failed)
     return pack(Model(described, model.vertices, model.faces))

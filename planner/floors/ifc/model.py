@@ -104,6 +104,10 @@ class Described(msgspec.Struct, frozen=True, kw_only=True):
     """Products by class that no plan is made of, such as furniture."""
     failed: tuple[str, ...] = ()
     """Products whose geometry could not be made, in words."""
+    boxed: tuple[str, ...] = ()
+    """Products that are shown as the box around their points, in words."""
+    uncut: tuple[str, ...] = ()
+    """Products whose shape could be made only without the openings cut out of it, in words."""
     damage: tuple[str, ...] = ()
     """Parts of the file that could not be read, in the library's words."""
     crashed: tuple[str, ...] = ()

@@ -24,14 +24,16 @@ REACH = 0.3
 """So far on both sides of a passage the floor is free, metres."""
 TOUCH = 0.02
 """Rooms nearer than this share a border, metres."""
-STANDING = ("walls", "columns", "windows", "railings", "stairs", "other")
+STANDING = ("walls", "columns", "windows", "railings", "stairs", "objects", "other")
 
 
 def passages(
     floor: Region, rooms: Sequence[Space], solids: Sequence[Solid], doors: Sequence[Door]
 ) -> list[FloatArray]:
     """Lines (2, 2) across every passage, from side to side."""
-    standing = shapely.union_all([item.region for item in solids if item.kind in STANDING])
+    standing = shapely.union_all(
+        [item.region for item in solids if item.kind in STANDING and item.product.role != "furniture"]
+    )
     shut = shapely.union_all([standing, *(door.threshold.buffer(0.05) for door in doors)])
     free = floor.difference(shut)
     lines: list[FloatArray] = []

@@ -17,6 +17,8 @@ STRAIGHT = 2e-4
 """A corner nearer than this to the straight line is one of a triangulation."""
 MOST_FACES = 6000
 """Bodies of more triangles are shown as hulls where they are projected."""
+SHEET = 5e-3
+"""Half of the thickness at which a face without a body is shown, metres."""
 NOTHING = shapely.Polygon()
 
 
@@ -80,17 +82,19 @@ def tidy(region: Region) -> Region:
     return shapely.union_all(parts) if parts else NOTHING
 
 
-def footprint(mesh: Surface, low: float, high: float) -> Region:
+def footprint(mesh: Surface, low: float, high: float, *, is_closed: bool = True) -> Region:
     """The projection of what of a mesh lies between two heights.
 
     What looks up within the band, and the cuts at both its ends, throw the same shadow as the whole. Bodies
-    of very many faces are taken for the hulls of their pieces, which is never too little.
+    of very many faces are taken for the hulls of their pieces, which is never too little. Of a mesh that may
+    be open or inside out every face counts.
     """
     if len(mesh.faces) > MOST_FACES:
         return _hulls(mesh, low, high)
     a, b, c = (mesh.triangles[:, index, :2] for index in range(3))
     u, v = b - a, c - a
-    looks_up = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > GRID * GRID
+    facing = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    looks_up = (facing if is_closed else np.abs(facing)) > GRID * GRID
     up = mesh.triangles[looks_up]
     lowest, highest = up[..., 2].min(axis=1), up[..., 2].max(axis=1)
     within = (lowest >= low) & (highest <= high)
@@ -99,7 +103,18 @@ def footprint(mesh: Surface, low: float, high: float) -> Region:
     rings = [_as_ring(piece) for piece in pieces if len(piece) > 2]
     shapes = [*shapely.polygons(up[within][..., :2]), *map(shapely.Polygon, rings)]
     shadow = shapely.union_all([cut(mesh, low), cut(mesh, high), *shapely.make_valid(shapes)])
-    return _areas(shadow)
+    return _areas(shadow if is_closed else shapely.union_all([shadow, *_sheets(mesh, low, high, shadow)]))
+
+
+def _sheets(mesh: Surface, low: float, high: float, shadow: Region) -> list[Region]:
+    """Upright faces that enclose nothing, as strips."""
+    steps = np.linspace(low, high, 5)
+    segments = np.vstack([_segments(mesh.triangles, height) for height in steps])
+    if not len(segments):
+        return []
+    lines = shapely.linestrings(np.unique(segments, axis=0))
+    alone = lines[~shapely.covers(shadow.buffer(SHEET), lines)]
+    return [shapely.union_all(shapely.buffer(alone, SHEET))] if len(alone) else []
 
 
 def _areas(region: Region) -> Region:

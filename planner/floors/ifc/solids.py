@@ -35,10 +35,15 @@ AT_SCANNER = {
     "beams": "columns",
     "members": "columns",
     "windows": "windows",
-    "other": "other",
+    "other": "objects",
+    "furniture": "objects",
 }
 """The kind of what the scanner's plane cuts, by role."""
-GLASS = ("walls", "plates", "coverings", "other")
+OBJECTS = ("furniture", "other")
+"""Roles of what stands on a floor and is no part of the building's structure."""
+ON_FLOOR = 0.02
+"""An object lower than this above the floor is driven over, metres."""
+GLASS = ("walls", "plates", "coverings")
 """Roles that let the laser through where they are drawn transparent."""
 
 
@@ -69,7 +74,9 @@ def solids_on(level: Level, model: Model, heights: Heights) -> list[Solid]:
     plane = level.z + heights.scan + OFF_LEVEL
     found: list[Solid] = []
     for product, mesh in model.of_role(*AT_SCANNER, "stairs", "railings"):
-        if product.role == "stairs":
+        if product.role in OBJECTS:
+            found += _object(product, mesh, level, heights)
+        elif product.role == "stairs":
             found += _stairs(product, mesh, level)
         elif product.role == "railings":
             found += _low(product, mesh, level, heights)
@@ -114,13 +121,27 @@ def _stairs(product: Product, mesh: Surface, level: Level) -> list[Solid]:
     return _solid(product, "stairs", footprint(mesh, low, high))
 
 
+def _object(product: Product, mesh: Surface, level: Level, heights: Heights) -> list[Solid]:
+    """Outline of an object below the robot's height, and its cut where it reaches the scanner's plane."""
+    plane = level.z + heights.scan + OFF_LEVEL
+    low, high = level.z + ON_FLOOR, max(level.z + heights.top, plane)
+    if mesh.z[1] <= low or mesh.z[0] >= high:
+        return []
+    outline = footprint(mesh, low, high, is_closed=False)
+    hides = cut(mesh, plane) if mesh.z[0] < plane < mesh.z[1] and not product.transparent else NOTHING
+    if not hides.is_empty and outline.difference(hides).area <= LEAST:
+        return [Solid(product, "objects", shapely.union_all([outline, hides]))]
+    found = [Solid(product, kind, area) for kind, area in (("objects", hides), ("other", outline))]
+    return [item for item in found if not item.region.is_empty]
+
+
 def _low(product: Product, mesh: Surface, level: Level, heights: Heights) -> list[Solid]:
     """Obstacles for the robot that are below the scanner's plane."""
     top = max(heights.top, TREADS[1]) if product.role == "railings" else heights.top
     low, high = level.z + KERB, level.z + top
     if product.role == "roofs" or mesh.z[1] <= low or mesh.z[0] >= high:
         return []
-    kind = product.role if product.role in ("windows", "other") else "railings"
+    kind = "windows" if product.role == "windows" else "railings"
     return _solid(product, kind, footprint(mesh, low, high))
 
 

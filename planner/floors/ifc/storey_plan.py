@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +15,7 @@ from stopgo.mission.floor import Element, Finding, FloorPlan
 from stopgo.mission.geometry import frozen
 from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
+from stopgo.planner.floors.ifc.class_kinds import furniture_findings
 from stopgo.planner.floors.ifc.doors import doors_on
 from stopgo.planner.floors.ifc.georeference import georeference_of
 from stopgo.planner.floors.ifc.levels import Level
@@ -26,6 +29,8 @@ from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.rings import Region
 from stopgo.planner.floors.strokes import Stroke, Word
 
+MOST_NAMED = 20
+"""Products that one finding names."""
 BESIDE = 1.0
 """A solid farther than this from the floor is not part of its plan, metres."""
 
@@ -91,20 +96,45 @@ def odd_products(model: Model) -> list[Finding]:
     return [
         *(Finding("damaged_model", f"the file is damaged: {legible(text)}") for text in described.damage),
         *(Finding("no_geometry", f"{name} has no shape that can be made") for name in described.failed),
+        *_named("box_shape", described.boxed, "have no shape that can be made and are shown as boxes"),
+        *_named("uncut_shape", described.uncut, "are shown without the openings cut out of them"),
         *(Finding("kernel_crashed", f"{name} crashed the geometry kernel") for name in described.crashed),
     ]
 
 
+def _named(code: str, products: Sequence[str], problem: str) -> list[Finding]:
+    """One finding on several products, each by its class, GlobalId and name."""
+    if not products:
+        return []
+    named = legible(", ".join(products[:MOST_NAMED]))
+    more = f" and {len(products) - MOST_NAMED} more" if len(products) > MOST_NAMED else ""
+    return [Finding(code, f"{len(products)} elements {problem}: {named}{more}")]
+
+
 def _given_options(options: FloorOptions) -> dict[str, Any]:
-    names = ("scan_height", "robot_height", "in_progress")
-    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    names = ("scan_height", "robot_height", "in_progress", "furniture")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    return {**given, **({"layer_map": dict(sorted(options.layer_map.items()))} if options.layer_map else {})}
+
+
+def heights_of(options: FloorOptions) -> Heights:
+    """Heights of the scanner and of the robot above the floor."""
+    return Heights(options.scan_height or Heights.scan, options.robot_height)
+
+
+def as_on_day(
+    model: Model, level: Level, options: FloorOptions
+) -> tuple[Model, list[Finding], dict[str, int]]:
+    """The model as it stands on the day of the options, findings on that, and counts by status."""
+    found, _ = _statuses(model, options)
+    return on_day(model, found, level) if found else (model, [], {})
 
 
 def drawn_on(
     level: Level, model: Model, file: FloorFile, options: FloorOptions
 ) -> tuple[list[Stroke], list[Word], list[Finding]]:
     """A level as the strokes and words of a layered drawing, and what is odd about it."""
-    heights = Heights(options.scan_height or Heights.scan, options.robot_height)
+    heights = heights_of(options)
     solids = solids_on(level, model, heights)
     walls = {item.product.global_id: item.region for item in solids if item.kind == "walls"}
     doors = doors_on(level, model, walls)
@@ -123,6 +153,7 @@ def drawn_on(
         )
     solids, odd_solids = _near_the_floor(solids, floor)
     findings += [*odd_solids, *_unknown(solids)]
+    findings += furniture_findings(model, {item.product.global_id for item in solids})
     strokes = [
         *_rings("FLOOR", floor),
         *(ring for room in rooms for ring in _rings("ROOMS", room.region, room.global_id)),
@@ -135,9 +166,11 @@ def drawn_on(
 
 def _unknown(solids: list[Solid]) -> list[Finding]:
     """Products without a class of their own: their effect on the laser is unknown."""
-    count = sum(item.kind == "other" for item in solids)
-    text = f"{count} IfcBuildingElementProxy are obstacles, hide nothing and are not scanned"
-    return [Finding("proxies", text)] if count else []
+    products = {item.product.global_id: item.product for item in solids}
+    counts = Counter(item.ifc_class for item in products.values() if item.role == "other")
+    named = ", ".join(f"{count} {name}" for name, count in sorted(counts.items()))
+    text = f"{named} are obstacles, hide what is behind them and are not scanned"
+    return [Finding("proxies", text)] if counts else []
 
 
 def _near_the_floor(solids: list[Solid], floor: Region) -> tuple[list[Solid], list[Finding]]:

@@ -153,6 +153,13 @@ def test_a_storey_is_found_by_part_of_its_name_or_by_its_level(read: Read) -> No
     assert read(house, storey=None, level=0.1).source.storey == "EG"
 
 
+def test_a_level_that_is_not_the_storeys_is_refused(read: Read) -> None:
+    house = two_rooms()
+    with pytest.raises(InputError, match=r"--storey EG lies at 0 m, not at --level 5; remove one of them"):
+        read(house, level=5.0)
+    assert read(house, level=0.1).source.storey == "EG"
+
+
 def test_the_roof_is_no_floor_that_is_planned_unasked(read: Read, tmp_path: Path) -> None:
     house = two_rooms()
     assert read(house, storey=None).source.storey == "EG"

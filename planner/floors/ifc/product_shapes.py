@@ -1,0 +1,203 @@
+"""Shapes of a model's entities: by the fast kernel, else in other ways, else as a box."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final, Literal, cast
+
+import ifcopenshell
+import ifcopenshell.geom
+import ifcopenshell.util.placement
+import ifcopenshell.util.unit
+import numpy as np
+
+from stopgo.planner.floors.ifc.model import Placement
+
+Kernel = Literal["hybrid-cgal-simple-opencascade", "opencascade"]
+KERNEL: Final = "hybrid-cgal-simple-opencascade"
+CLEAR = 0.3
+"""A style that lets more than this share of light through is glass."""
+LARGEST = 1e7
+"""Metres from the origin beyond which nothing is built."""
+BODIES = ("Body", "Facetation", None, "")
+"""Identifiers of the representations that are bodies."""
+WAYS: Final[dict[str, tuple[Kernel, dict[str, bool]]]] = {
+    "other kernel": ("opencascade", {}),
+    "no openings": (KERNEL, {"with_openings": False}),
+    "no openings, other kernel": ("opencascade", {"with_openings": False}),
+    "no cuts": ("opencascade", {"with_openings": False, "with_cuts": False}),
+}
+"""Kernels and settings by which a shape is tried that the fast kernel cannot make, in this order."""
+UNCUT = tuple(name for name, (_, said) in WAYS.items() if said)
+BOX: Final = "box"
+POINTWISE = (
+    "IfcManifoldSolidBrep",
+    "IfcTessellatedItem",
+    "IfcShellBasedSurfaceModel",
+    "IfcFaceBasedSurfaceModel",
+)
+"""Items whose points the file gives in the coordinates of their product."""
+CORNERS = tuple((i, j, k) for k in (0, 1) for j in (0, 1) for i in (0, 1))
+BOX_FACES = (
+    *((0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4)),
+    *((2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)),
+)
+"""Triangles of a box by its CORNERS; they look outwards."""
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """The shape of one entity, in the world, metres."""
+
+    number: int
+    """The entity's number in the file."""
+    points: np.ndarray
+    corners: np.ndarray
+    transparent: bool = False
+    way: str = ""
+    """Empty if the kernel made it at once, else a key of WAYS or BOX."""
+
+
+def _settings(*, with_openings: bool = True, with_cuts: bool = True) -> Any:
+    settings = ifcopenshell.geom.settings()
+    settings.set("use-world-coords", True)
+    settings.set("disable-opening-subtractions", not with_openings)
+    settings.set("disable-boolean-result", not with_cuts)
+    return settings
+
+
+def all_at_once(model: ifcopenshell.file, entities: list[Any]) -> Iterator[Made]:
+    """Every shape by the fast kernel; the few that it cannot make, one by one in other ways."""
+    done = set()
+    if entities:
+        iterator = ifcopenshell.geom.iterator(
+            _settings(), model, 1, include=entities, geometry_library=KERNEL
+        )
+        there = bool(iterator.initialize())
+        while there:
+            _show_progress(iterator.progress())
+            shape = iterator.get()
+            made = _made(shape.id, shape.geometry)
+            if is_sound(made):
+                done.add(made.number)
+                yield made
+            there = bool(iterator.next())
+    for entity in entities:
+        other = None if entity.id() in done else _in_another_way(model, entity)
+        if other is not None:
+            yield other
+
+
+def one_by_one(
+    model: ifcopenshell.file, entities: list[Any], without: frozenset[str], at: Path
+) -> Iterator[Made]:
+    """Each shape alone; before each its GlobalId is written down, for whoever reads the crash."""
+    for number, entity in enumerate(entities):
+        if entity.GlobalId in without:
+            continue
+        _show_progress(100 * number // len(entities))
+        at.write_text(entity.GlobalId)
+        made = _created(entity, _settings(), KERNEL)
+        if made is None:
+            made = _in_another_way(model, entity)
+        if made is not None:
+            yield made
+
+
+def _in_another_way(model: ifcopenshell.file, entity: Any) -> Made | None:
+    """A shape that the fast kernel cannot make: by another kernel, without openings or cuts, as a box."""
+    if not has_body(entity):
+        return None
+    for way, (kernel, said) in WAYS.items():
+        made = _created(entity, _settings(**said), kernel)
+        if made is not None:
+            return replace(made, way=way)
+    return _as_box(model, entity)
+
+
+def _created(entity: Any, settings: Any, kernel: Kernel) -> Made | None:
+    try:
+        shape = ifcopenshell.geom.create_shape(settings, entity, geometry_library=kernel)
+    except RuntimeError:
+        return None
+    made = _made(entity.id(), cast(Any, shape).geometry)
+    return made if is_sound(made) else None
+
+
+def _made(number: int, geometry: Any) -> Made:
+    points = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3).copy()
+    corners = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3).astype(np.int64)
+    clear = bool(geometry.materials) and all(item.transparency > CLEAR for item in geometry.materials)
+    return Made(number, points, corners, transparent=clear)
+
+
+def _as_box(model: ifcopenshell.file, entity: Any) -> Made | None:
+    """The box around the points of a body that are given as they are; None without such points."""
+    unit = ifcopenshell.util.unit.calculate_unit_scale(model)
+    points = [point for item in _items(entity) for point in _points(item, model)]
+    placement = placement_of(entity, unit)
+    if len(points) < 2 or placement is None:
+        return None
+    local = np.array(points, dtype=float) * unit
+    low, high = local.min(axis=0), local.max(axis=0)
+    if (high - low).min() <= 0:
+        return None
+    corners = np.array([[(low, high)[k][axis] for axis, k in enumerate(ijk)] for ijk in CORNERS])
+    matrix = np.array(placement).reshape(4, 4)
+    made = Made(entity.id(), corners @ matrix[:3, :3].T + matrix[:3, 3], np.array(BOX_FACES), way=BOX)
+    return made if is_sound(made) else None
+
+
+def _items(entity: Any) -> Iterator[Any]:
+    for shape in entity.Representation.Representations:
+        if shape.RepresentationIdentifier in (*BODIES, "Box"):
+            yield from shape.Items
+
+
+def _points(item: Any, model: ifcopenshell.file) -> Iterator[tuple[float, ...]]:
+    """Points of an item in the coordinates of its entity, where the file gives them so."""
+    if item.is_a("IfcBoundingBox"):
+        corner = item.Corner.Coordinates
+        yield from (corner, tuple(np.add(corner, (item.XDim, item.YDim, item.ZDim))))
+    elif any(is_a(item, name) for name in POINTWISE):
+        for part in model.traverse(item):
+            if part.is_a("IfcCartesianPoint") and len(part.Coordinates) == 3:
+                yield part.Coordinates
+            elif is_a(part, "IfcCartesianPointList3D"):
+                yield from part.CoordList
+
+
+def _show_progress(percent: int) -> None:
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\033[Kmodel {percent} %" if percent < 100 else "\r\033[K")
+        sys.stderr.flush()
+
+
+def is_sound(made: Made) -> bool:
+    points = made.points
+    return bool(len(made.corners)) and bool(np.isfinite(points).all()) and np.abs(points).max() <= LARGEST
+
+
+def has_body(entity: Any) -> bool:
+    """True if a product has a body, and not only a line or a symbol."""
+    if entity.Representation is None:
+        return False
+    return any(item.RepresentationIdentifier in BODIES for item in entity.Representation.Representations)
+
+
+def placement_of(entity: Any, unit: float) -> Placement | None:
+    if entity.ObjectPlacement is None:
+        return None
+    matrix = np.array(ifcopenshell.util.placement.get_local_placement(entity.ObjectPlacement), dtype=float)
+    matrix[:3, 3] *= unit
+    return tuple(matrix.ravel().tolist())
+
+
+def is_a(entity: Any, name: str) -> bool:
+    try:
+        return bool(entity.is_a(name))
+    except RuntimeError:
+        return False

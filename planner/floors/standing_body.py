@@ -1,0 +1,33 @@
+"""A body of a building model in the robot's height, against which finished plans are checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from stopgo.mission.geometry import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class StandingBody:
+    """Faces of a body in plan, and its triangles."""
+
+    name: str
+    """Class, GlobalId and name."""
+    faces: tuple[shapely.Geometry, ...]
+    """Parts of its faces in the robot's height, in plan."""
+    triangles: FloatArray
+    """(n, 3, 3), metres."""
+    height: float
+    """Height in the middle of the robot, metres."""
+
+    def encloses(self, x: float, y: float) -> bool:
+        """True if the point at the robot's middle lies in the body: a ray upwards leaves it."""
+        a, b, c = (self.triangles[:, corner] - (x, y, self.height) for corner in range(3))
+        ab, bc, ca = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a)))
+        met = ((ab > 0) & (bc > 0) & (ca > 0)) | ((ab < 0) & (bc < 0) & (ca < 0))
+        area = np.where(met, ab + bc + ca, 1.0)
+        z = (bc * a[:, 2] + ca * b[:, 2] + ab * c[:, 2]) / area
+        return bool((met & (z > 0)).sum() % 2)
