@@ -7,8 +7,8 @@ from collections import deque
 import numpy as np
 
 from stopgo.mission.geometry import IntArray
-from stopgo.planner.selection.board import Board
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.swaps import SwapBoard
 
 SWAPS = 400
 """Most swaps in the search for a smaller selection; a count, so that no plan depends on speed."""
@@ -43,7 +43,7 @@ def _without_least(cover: Cover, chosen: IntArray) -> list[int]:
 
 def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
     """Swap rows by tabu search until every demand is met; None after the last swap."""
-    board = Board(cover, rows)
+    board = SwapBoard(cover, rows)
     tabu: deque[int] = deque(maxlen=TENURE)
     for _ in range(swaps):
         if not board.missing.any():
@@ -52,25 +52,10 @@ def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
             return None
         if len(set(rows) | set(tabu)) == cover.rows:
             tabu.clear()  # no other row is left to add
-        out, into = _best_swap(board, rows, tabu)
+        out, into = board.best_swap(rows, [*rows, *tabu])
         board.raise_penalties()
         board.drop(out)
         board.take(into)
         rows[rows.index(out)] = into
         tabu.append(out)
     return None
-
-
-def _best_swap(board: Board, rows: list[int], tabu: deque[int]) -> tuple[int, int]:
-    """The swap with the least shortfall; of equal ones, the one with the most coverage."""
-    best, swap = (np.inf, np.inf), (rows[0], rows[0])
-    blocked = np.array([*rows, *tabu], dtype=np.int64)
-    for out in sorted(rows):
-        missing, covered = board.after_swaps(out)
-        missing[blocked] = np.iinfo(np.int64).max
-        alike = np.flatnonzero(missing == missing.min())
-        into = int(alike[np.argmax(covered[alike])])
-        worth = (int(missing[into]), -int(covered[into]))
-        if worth < best:
-            best, swap = worth, (out, into)
-    return swap

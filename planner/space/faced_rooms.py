@@ -21,7 +21,7 @@ JAMB_DISTANCE = 0.3
 
 def faced_rooms(targets: Targets, rooms: Sequence[RoomSpace], ground: Ground) -> IntArray:
     """Index of the room in front of each unit (units,); -1 where there is none, as on a facade."""
-    faced = _PreparedRooms([to_shape(room.area, ground.origin) for room in rooms])
+    faced = _RoomEdges([to_shape(room.area, ground.origin) for room in rooms])
     middle, normal = targets.unit_xy - ground.origin, _normals(targets)
     found = np.full(targets.total, -1, dtype=np.int64)
     for ahead in AHEAD:
@@ -41,7 +41,7 @@ def _normals(targets: Targets) -> FloatArray:
     return np.where(targets.occluding[:, None], out, 0.0)[targets.unit_segment]
 
 
-class _PreparedRooms:
+class _RoomEdges:
     """Rooms, prepared for many points."""
 
     def __init__(self, shapes: Sequence[BaseGeometry]) -> None:
