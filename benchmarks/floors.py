@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.floor_source import FloorSource
 from stopgo.mission.geometry import Polygon, frozen
 from stopgo.mission.settings.element_kinds import KINDS
 

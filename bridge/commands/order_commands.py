@@ -115,7 +115,10 @@ def order_of(verb: Verb) -> Callable[..., None]:
         json_: Json = False,
     ) -> None:
         driving = connection.for_driving(arm=arm, disarm=disarm, any_origin=any_origin)
-        with refusals_printed(as_json=json_), in_time(driving) as station:
+        from stopgo.mission.run.orders import FREE_VERBS
+
+        at_once = verb in FREE_VERBS
+        with refusals_printed(as_json=json_), in_time(driving, at_once=at_once) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, station.keys.robot, json_)
 

@@ -11,7 +11,7 @@ from stopgo.mission import __version__
 from stopgo.mission.document import mission_id
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import read
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.floor_source import FloorSource
 from stopgo.mission.settings import Settings
 
 NAMES = {

@@ -15,7 +15,7 @@ from ezdxf.document import Drawing
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.floor_source import FloorSource
 from stopgo.mission.geometry import bounds
 from stopgo.planner.floors.drawing import METRES, open_drawing
 from stopgo.planner.floors.drawn_shapes import ignored_in

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any, Literal, Protocol, cast
 
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.floor_source import FloorSource
 from stopgo.planner.floors.survey import Survey
 
 

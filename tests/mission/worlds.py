@@ -20,7 +20,7 @@ from stopgo.mission.document import (
     sealed,
 )
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.floor_source import FloorSource
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import Polygon, frozen
 from stopgo.mission.settings import Settings

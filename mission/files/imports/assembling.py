@@ -32,7 +32,7 @@ from stopgo.mission.document.specs import (
 )
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.track import ImportedRoute, Visit
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.floor_source import FloorSource
 from stopgo.mission.settings import Settings
 
 
