@@ -8,8 +8,8 @@ from math import ceil, sqrt
 
 import numpy as np
 
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import FloatArray, Polygon, bounds, frozen
 from stopgo.mission.settings.element_kinds import KINDS
 

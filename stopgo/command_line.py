@@ -21,13 +21,23 @@ if TYPE_CHECKING:
     from typer.exceptions import TyperException
     from typer.models import CommandInfo
 
-COMMANDS = (
-    "plan_command", "floor_commands", "prove_command", "demo_command",
-    "bridge_commands", "review_command", "runs_command", "importer_command", "replay_command",
-    "document_commands",
-)  # fmt: skip
-"""The modules of `stopgo.commands`, in the order of the help; each has
-`add_commands(app)` and imports slow libraries where used."""
+COMMANDS = {
+    "plan_command": ("plan",),
+    "floor_commands": ("convert", "floors"),
+    "prove_command": ("prove",),
+    "demo_command": ("demo",),
+    "bridge_commands": (
+        "robot", "push", "fetch-mission", "clear", "doctor", "start", "pause", "resume", "skip", "retry",
+        "abort", "home", "status", "watch", "simulate", "keys", "conform", "tunnel",
+    ),
+    "review_command": ("review",),
+    "runs_command": ("runs",),
+    "importer_command": ("rerun-importer",),
+    "replay_command": ("replay",),
+    "document_commands": ("show", "check", "export", "import", "align"),
+}  # fmt: skip
+"""The modules of `stopgo.commands`, in the order of the help, and the words of each; each has
+`add_commands(app)` and imports slow libraries where used. A word loads its own module only."""
 
 INTERRUPTED = 130
 COMPLETING = "_STOPGO_COMPLETE"
@@ -76,8 +86,8 @@ def _with_signals(arguments: list[str], *, whole_process: bool) -> int:
         return INTERRUPTED
 
 
-def build_app() -> typer.Typer:
-    """The `stopgo` command with all its subcommands."""
+def build_app(verb: str = "") -> typer.Typer:
+    """The `stopgo` command with all its subcommands; with `verb`, with those of that word's module."""
     from importlib import import_module
 
     import typer
@@ -100,7 +110,7 @@ def build_app() -> typer.Typer:
             typer.echo(__version__)
             raise typer.Exit
 
-    for name in COMMANDS:
+    for name in [name for name, words in COMMANDS.items() if verb in words] or COMMANDS:
         import_module(f"stopgo.commands.{name}").add_commands(app)
     return app
 
@@ -113,7 +123,7 @@ def front_door(verb: str = "") -> Any:
     """
     from typer.main import get_command, get_command_name
 
-    app = build_app()
+    app = build_app(verb)
     commands = [made for made in app.registered_commands if _name_of(made, get_command_name) == verb]
     groups = [made for made in app.registered_groups if made.name == verb]
     if not commands and not groups:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.command_line import front_door, main
+from stopgo.command_line import COMMANDS, front_door, main
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("mission", "planner", "bridge", "recordings")
@@ -247,6 +247,16 @@ def test_the_front_door_opens_without_slow_libraries() -> None:
     assert not {"shapely", "scipy", "rerun", "numba", "ezdxf", "numpy", "msgspec"} & set(
         result.stderr.split()
     )
+
+
+def test_a_stop_loads_what_it_needs_and_no_other_command() -> None:
+    stop = "['pause', '--robot', 'r1', '--connect', 'tcp/127.0.0.1:1', '--timeout', '0.1']"
+    code = f"from stopgo.command_line import main; import sys; main({stop}); print(*sys.modules)"
+    loaded = set(run(sys.executable, "-c", code).split())
+    assert "stopgo.bridge.station.station" in loaded
+    assert not {"numpy", "pymavlink", "stopgo.planner", "stopgo.recordings", "stopgo.mission.floor"} & loaded
+    others = {f"stopgo.commands.{name}" for name in COMMANDS if name != "bridge_commands"}
+    assert not others & loaded
 
 
 def test_a_simulated_robot_loads_nothing_of_autopilots() -> None:

@@ -214,7 +214,7 @@ def test_an_installed_package_brings_variants_by_name(module: Write, monkeypatch
 
 READER = """
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.geometry import Polygon
 from stopgo.planner.floors.reader import Reader
 

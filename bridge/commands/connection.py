@@ -189,8 +189,11 @@ def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandB
     return called
 
 
-def reached(connection: Connection) -> AbstractContextManager[Station]:
-    """Connect to the robot or the vehicle; raises the errors of `connect` of either."""
+def reached(connection: Connection, *, at_once: bool = False) -> AbstractContextManager[Station]:
+    """Connect to the robot or the vehicle; raises the errors of `connect` of either.
+
+    `at_once` does not wait until the robot is found, for a command that needs nothing from it.
+    """
     if connection.mavlink is not None:
         return _vehicle(connection, connection.mavlink)
     from stopgo.bridge.station.station import connect
@@ -198,7 +201,7 @@ def reached(connection: Connection) -> AbstractContextManager[Station]:
     return connect(
         connection.endpoint, robot=connection.robot, site=connection.site, commander=connection.who,
         timeout_s=connection.timeout_s, patience_s=connection.patience_s, insecure=connection.insecure,
-        keys=connection.keys,
+        keys=connection.keys, at_once=at_once,
     )  # fmt: skip
 
 
@@ -217,13 +220,13 @@ def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager
 
 
 @contextmanager
-def in_time(connection: Connection) -> Iterator[Station]:
+def in_time(connection: Connection, *, at_once: bool = False) -> Iterator[Station]:
     """Connect to the robot; the time left of the timeout is for one query or command.
 
     A vehicle that was commanded to stop stands by then: noting that has the whole timeout again.
     """
     began = time.monotonic()
-    with reached(connection) as station:
+    with reached(connection, at_once=at_once) as station:
         if connection.mavlink is not None and connection.mavlink.stop is not None:
             began = time.monotonic()
         station.timeout_s = max(LEAST_S, connection.timeout_s - (time.monotonic() - began))

@@ -131,8 +131,11 @@ def order_of(verb: Verb) -> Callable[..., None]:
         json_: Json = False,
     ) -> None:
         driving = connection.for_driving(arm=arm, disarm=disarm, any_origin=any_origin)
+        from stopgo.mission.run.orders import FREE_VERBS
+
         driving = driving.for_stopping(verb) if stops(verb) else driving
-        with refusals_printed(as_json=json_), in_time(driving) as station:
+        at_once = verb in FREE_VERBS
+        with refusals_printed(as_json=json_), in_time(driving, at_once=at_once) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, station.keys.robot, json_)
 

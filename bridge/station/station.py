@@ -58,7 +58,7 @@ COMMIT_BYTES_PER_S = 1e6
 """Lowest rate at which a robot reads and stores a document."""
 LEAST_S = 0.5
 """Shortest time for a command itself, even if finding the robot took nearly all of the timeout."""
-PAUSE_S = 0.05
+PAUSE_S = 0.02
 """Pause between tries: a query just after a reconnect may return nothing at once."""
 COMMITS = 3
 """Largest number of commits of a push; each restart of the robot needs a new one."""
@@ -77,10 +77,12 @@ def connect(
     patience_s: float = PATIENCE_S,
     insecure: bool = False,
     keys: Path | None = None,
+    at_once: bool = False,
 ) -> Iterator[Station]:
     """Connect to a robot at `endpoint`, such as `tcp/127.0.0.1:7447`.
 
-    With `keys`, a folder made by `stopgo keys`, the commander is the holder of the keys.
+    With `keys`, a folder made by `stopgo keys`, the commander is the holder of the keys. `at_once` does not
+    wait for the robot: a stop command is sent as soon as the link is up.
 
     Raises
     ------
@@ -102,7 +104,8 @@ def connect(
             patience_s=patience_s,
             held=held,
         )
-        station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
+        begin = station.look_for if at_once else station.reach
+        begin(endpoint, why=lambda: why_no_link(endpoint, held))
         yield station
 
 
@@ -136,21 +139,37 @@ class Station:
         """Timeout of a query or a command."""
         self.patience_s = max(patience_s, timeout_s)
         """Timeout of each chunk of a mission."""
+        self._seen = threading.Event()
+        self._not_found: Callable[[], RobotUnreachable] | None = None
+        """Error for a robot that does not show its token; `None` if no token is looked for."""
+        self._may_be_sent = False
+        """True if a query was not answered at once with nothing: it may have reached the robot."""
 
-    def reach(self, endpoint: str, *, why: Callable[[], str] = lambda: "") -> None:
-        """Wait for the robot's liveliness token: a query sent before it returns nothing at once.
+    def look_for(
+        self, endpoint: str, *, why: Callable[[], str] = lambda: ""
+    ) -> Callable[[], RobotUnreachable]:
+        """Look for the robot's liveliness token; return the error of a robot that does not show it.
 
-        `why` returns the fault of the link; empty if it is unknown.
+        `why` returns the fault of the link, empty if it is unknown.
         """
-        seen = threading.Event()
-        self.link.watch_presence(self.keys.alive, lambda key, alive: seen.set() if alive else None)
-        if not seen.wait(self.timeout_s):
+
+        def not_found() -> RobotUnreachable:
             who = "no robot" if self.keys.every else f"robot {self.keys.robot} not"
             reason = why() or "is it running, under this name and site?"
-            raise RobotUnreachable(
+            return RobotUnreachable(
                 f"{endpoint}: {who} found within {self.timeout_s:g} s"
                 f" (key expression {self.keys.alive}); nothing was sent: {reason}"
             )
+
+        self._not_found = not_found
+        self.link.watch_presence(self.keys.alive, lambda key, alive: self._seen.set() if alive else None)
+        return not_found
+
+    def reach(self, endpoint: str, *, why: Callable[[], str] = lambda: "") -> None:
+        """Look for the robot's token and wait for it: a query sent before it returns nothing at once."""
+        not_found = self.look_for(endpoint, why=why)
+        if not self._seen.wait(self.timeout_s):
+            raise not_found()
 
     def info(self, *, within_s: float | None = None) -> Info:
         """Request the robot's info."""
@@ -354,6 +373,8 @@ class Station:
         """Send a command that was made before; sent twice, it still takes effect once."""
         within_s = self.timeout_s if within_s is None else within_s
         reply = self._ask_repeatedly(self.keys.command(order.verb), encode(order), within_s)
+        if reply is None and self._not_found is not None and not (self._seen.is_set() or self._may_be_sent):
+            raise self._not_found()
         if reply is None and order.verb not in FREE_VERBS and within_s >= order.valid_for_s:
             raise OutcomeUnknown(
                 f"{self.keys.robot}: no answer to {order.verb} in time, its outcome is unknown;"
@@ -447,9 +468,11 @@ class Station:
         """Repeat a query until it is answered or the time is up."""
         deadline = time.monotonic() + within_s
         while (left := deadline - time.monotonic()) > 0:
-            reply = self.link.ask(key, payload, timeout_s=min(try_s, left), parameters=parameters, bulk=bulk)
+            began, wait_s = time.monotonic(), min(try_s, left)
+            reply = self.link.ask(key, payload, timeout_s=wait_s, parameters=parameters, bulk=bulk)
             if reply is not None:
                 return reply
+            self._may_be_sent = self._may_be_sent or time.monotonic() - began >= wait_s / 2
             time.sleep(min(PAUSE_S, left))
         return None
 

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.frames.transform import Point, SiteOrigin, Transform
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, recorded_values
 

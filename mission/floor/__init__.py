@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from types import MappingProxyType
 
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.geometry import FloatArray, Polygon
 
 

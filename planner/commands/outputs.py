@@ -9,9 +9,9 @@ from pathlib import Path
 
 from stopgo.mission import __version__
 from stopgo.mission.document import mission_id
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import read
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.settings import Settings
 
 NAMES = {

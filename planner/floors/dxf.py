@@ -13,9 +13,9 @@ from pathlib import Path
 
 from ezdxf.document import Drawing
 
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import bounds
 from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawing import open_drawing

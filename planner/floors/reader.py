@@ -11,8 +11,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Protocol, cast
 
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.planner.floors.standing_body import StandingBody
 from stopgo.planner.floors.survey import Survey
 

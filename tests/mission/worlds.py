@@ -19,8 +19,8 @@ from stopgo.mission.document import (
     Stop,
     sealed,
 )
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import Polygon, frozen
 from stopgo.mission.settings import Settings

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from stopgo.mission.document import Mission
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import FloatArray, Polygon, frozen
 from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.settings.element_kinds import KINDS

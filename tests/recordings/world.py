@@ -18,9 +18,9 @@ from stopgo.mission.document import (
     Stop,
     sealed,
 )
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.document.schedule import Schedule
 from stopgo.mission.floor import Element, Finding, FloorPlan, Opening, Room
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import Polygon, frozen
 from stopgo.mission.run.events import Pose
 from stopgo.mission.settings import Settings

@@ -20,6 +20,7 @@ from stopgo.mission.document import (
     mission_id,
     sealed,
 )
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.document.specs import (
     origin_of,
@@ -32,7 +33,6 @@ from stopgo.mission.document.specs import (
 )
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.track import ImportedRoute, Visit
-from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.settings import Settings
 
 

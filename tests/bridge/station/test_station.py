@@ -175,3 +175,29 @@ def test_what_is_large_is_asked_for_so_that_it_gives_way() -> None:
     station.command("start")
     list(PoseHistory(link, field.keys).catch_up())
     assert link.bulky == {"mission": True, "cmd": False, "poses": True}
+
+
+def test_a_stop_is_sent_before_the_robot_was_found() -> None:
+    """Finding it takes a round trip; a pause needs nothing of what that tells."""
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    station = field.station_at_the_link("bob")
+    station.look_for("tcp/robot:7447")
+    assert not field.board.alive
+    assert station.command("pause").state == "PAUSED"
+
+
+def test_a_stop_that_nobody_could_receive_was_not_sent(time: StoppedTime) -> None:
+    station = Station(Switchboard().link(), KeyExpressions("r1"), commander="test", timeout_s=5.0)
+    station.look_for("tcp/robot:7447", why=lambda: "nothing listens there")
+    with pytest.raises(RobotUnreachable, match=r"tcp/robot:7447: robot r1 not found .*nothing listens there"):
+        station.command("pause")
+    assert time.now == pytest.approx(5.0, abs=0.1)
+
+
+def test_a_stop_that_may_have_arrived_is_unknown_though_the_robot_was_never_found(time: StoppedTime) -> None:
+    station, _ = deaf(Field(), time, "/cmd/")
+    station.look_for("tcp/robot:7447")
+    with pytest.raises(OutcomeUnknown, match="no answer to pause in time"):
+        station.command("pause")

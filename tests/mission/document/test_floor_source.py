@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from stopgo.mission.document import mission_id
-from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.settings import Settings
 
 DIGEST = "0" * 64
