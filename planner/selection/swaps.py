@@ -152,7 +152,7 @@ class SwapBoard(Board):
         return self.weight[unmet] @ short, int(self.weight @ missing)
 
     def _asked_of_wide(self, lost: IntArray) -> IntArray:
-        """What each wide demand lacks with these losses (wide, n); negative where it has more than enough."""
+        """Shortage of each wide demand with these losses (wide, n); negative if it has more than that."""
         return (self._cover.needed - self._reached)[self._wide][:, None] + lost
 
     def _exchanges(

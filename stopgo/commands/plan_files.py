@@ -19,7 +19,6 @@ from stopgo.mission.files.atomic import must_be_writable, replacing
 from stopgo.planner import plan
 
 if TYPE_CHECKING:
-    from stopgo.mission.document import Mission
     from stopgo.mission.floor import FloorPlan
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
@@ -111,8 +110,7 @@ def _write_part(
     from stopgo.planner.commands.plan_report import PlanReport
 
     files = names(folder, number)
-    part = plan.parts[number]
-    part = replace(part, mission=_revised(part.mission, files["mission"]))
+    part = _revised(plan.parts[number], files["mission"])
     recording = _recording(part.mission.id)
     if recording is None:
         del files["recording"]
@@ -140,14 +138,15 @@ def _write_part(
     return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near)
 
 
-def _revised(mission: Mission, path: Path) -> Mission:
-    """The mission with the revision that replaces the file at `path`."""
+def _revised(part: PartPlan, path: Path) -> PartPlan:
+    """The part's plan, its mission with the revision that replaces the file at `path`."""
     from msgspec.structs import replace as changed
 
     from stopgo.mission.document import sealed
     from stopgo.mission.files.mission_json import next_revision
 
-    return sealed(changed(mission, revision=next_revision(path, mission)))
+    revision = next_revision(path, part.mission)
+    return replace(part, mission=sealed(changed(part.mission, revision=revision)))
 
 
 def _recording(recording_id: str) -> PlanRecording | None:

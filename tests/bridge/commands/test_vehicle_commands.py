@@ -22,7 +22,7 @@ from tests.called import stopgo
 from tests.ports import free_port
 
 STOPGO = (sys.executable, "-m", "stopgo")
-KEYS = "robot boot_id state run_id mission_id revision stop done skipped outside battery"
+KEYS = "robot boot_id state run_id mission_id revision stop done skipped outside battery age_s"
 
 
 class Vehicle:
