@@ -214,7 +214,7 @@ def measured(case: Case, strategy: str) -> Ours:
 
 def _its_route(greedy: Selection, timed: Callable[[str, Callable[[], Any]], Any]) -> Route | None:
     """The paper's route over its selection; None where its grid does not connect the stops."""
-    space = greedy.visibility.candidates.space
+    space = greedy.space
     try:
         timed("its graph", lambda: GRAPHS[_its_way()["graph"]](space, greedy.xy))
         route_found: Route = timed(

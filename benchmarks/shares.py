@@ -78,7 +78,7 @@ def cost_row(name: str, path: Path, options: dict[str, float]) -> list[str]:
 
 def _selections(seen: Visibility) -> Iterator[Selection]:
     for share in SHARES:
-        space = seen.candidates.space
+        space = seen.space
         settings = replace(space.settings, room_coverage=share, kind_coverage=share)
         again = replace(seen, candidates=replace(seen.candidates, space=replace(space, settings=settings)))
         yield refined(select(again))
@@ -105,9 +105,9 @@ def _by_length(selection: Selection, figures: Figures) -> Figures:
     """The figures of a selection by length, for either rule."""
     from stopgo.planner.appraisal.figures_of_route import shares_of
 
-    space = selection.visibility.candidates.space
+    space = selection.space
     by_length = replace(space, settings=replace(space.settings, coverage_rule="length"))
-    found = replace(selection.visibility.candidates, space=by_length)
+    found = replace(selection.candidates, space=by_length)
     again = replace(selection, visibility=replace(selection.visibility, candidates=found))
     shares = shares_of(again)
     return replace(figures, whole=shares.whole, rooms=shares.rooms, kinds=shares.kinds)

@@ -10,12 +10,12 @@ from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.stages import NavigableSpace, OfVisibility, Route, Selection, Visibility
 from stopgo.mission.stages.figures import Figures, percent
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PartPlan:
+class PartPlan(OfVisibility):
     """The plan of one connected part of a floor."""
 
     route: Route
@@ -29,18 +29,6 @@ class PartPlan:
     @property
     def visibility(self) -> Visibility:
         return self.selection.visibility
-
-    @property
-    def candidates(self) -> Candidates:
-        return self.visibility.candidates
-
-    @property
-    def space(self) -> NavigableSpace:
-        return self.candidates.space
-
-    @property
-    def floor(self) -> FloorPlan:
-        return self.space.floor
 
     def stage_results(self) -> Iterator[Any]:
         """Yield every stage result from the floor to the figures, in the order in which they are made."""

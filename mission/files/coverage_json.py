@@ -113,7 +113,7 @@ def coverage_json(route: Route, mission: Mission, figures: Figures | None = None
     units (null where nothing is visible). Each segment runs from `a` to `b`, in metres; `seen` holds
     fractions from a to b.
     """
-    space = route.selection.visibility.candidates.space
+    space = route.space
     floor = space.floor
     counts = _Counts.of(route)
     targets = [index for index, element in enumerate(floor.elements) if element.target]
@@ -159,8 +159,8 @@ class _Counts:
 
     @classmethod
     def of(cls, route: Route) -> _Counts:
-        visibility = route.selection.visibility
-        space, targets = visibility.candidates.space, visibility.targets
+        visibility = route.visibility
+        space, targets = visibility.space, visibility.targets
         elements = targets.element[targets.unit_segment]
         size, length = len(space.floor.elements), targets.unit_length
         seen = visibility.visible & seen_units(route.selection)
@@ -197,7 +197,7 @@ def _named(element: Element) -> dict[str, Any]:
 
 
 def _segments_by_element(route: Route) -> dict[int, list[dict[str, Any]]]:
-    targets = route.selection.visibility.targets
+    targets = route.visibility.targets
     seen = _seen_by_segment(targets, route)
     segments: dict[int, list[dict[str, Any]]] = {}
     for index, element in enumerate(targets.element.tolist()):

@@ -57,7 +57,7 @@ def facts_of(
 ) -> list[tuple[str, str]]:
     """Lines of the title block; the sheet's own (scale, paper) are put in when it is chosen."""
     selection, robot = route.selection, mission.robot
-    settings = selection.visibility.candidates.space.settings
+    settings = selection.settings
     return [
         *_whose(mission, shared),
         ("Floor", mission.origin.floor),
@@ -145,7 +145,7 @@ def legend_height(entries: list[tuple[str, str]]) -> float:
 
 def legend_entries(route: Route, mission: Mission, shared: Sequence[Mission] = ()) -> list[tuple[str, str]]:
     """(symbol, words) for everything that is on this plan, and nothing else."""
-    space = route.selection.visibility.candidates.space
+    space = route.space
     openings = {state.passable for state in space.openings}
     any_view = not limits_in_words(mission.limits)
     some: list[tuple[str, str, bool]] = [

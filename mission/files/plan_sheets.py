@@ -77,7 +77,7 @@ def sheets_of(
     made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
 ) -> tuple[list[PdfPage], dict[str, str]]:
     """The sheets, and the drawings that several of them show."""
-    floor = made.selection.visibility.candidates.space.floor
+    floor = made.floor
     content, whole = overview(made, mission, date=date, with_range=with_range, with_table=False)
     pages = [PdfPage(whole.width, whole.height, content, "Overview", whole.drawing)]
     tiles = tiles_of(made, mission) if whole.scale > READABLE else []
@@ -135,9 +135,7 @@ def _places(made: Route, mission: Mission) -> FloatArray:
         np.array(leg).reshape(-1, 2)
         for leg in (*(stop.approach for stop in mission.stops), mission.return_ or ())
     ]
-    return np.concatenate(
-        [made.selection.visibility.targets.unit_xy, *legs, [(mission.start.x, mission.start.y)]]
-    )
+    return np.concatenate([made.visibility.targets.unit_xy, *legs, [(mission.start.x, mission.start.y)]])
 
 
 def _site_sheet(made: Route, mission: Mission) -> PaperSheet:

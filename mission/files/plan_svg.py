@@ -87,7 +87,7 @@ def drawing_of(
 ) -> tuple[str, ...]:
     """Yield everything to scale, from the floor up to the numbers."""
     missions = shared or (mission,)
-    space = made.selection.visibility.candidates.space
+    space = made.space
     parts = chain(
         building(space, sheet),
         targets(made.selection, sheet),
@@ -127,7 +127,7 @@ def _legs(missions: Sequence[Mission]) -> list[FloatArray]:
 
 def extent_of(made: Route, *missions: Mission) -> tuple[float, float, float, float]:
     """Bounds in metres of everything that is drawn to scale."""
-    floor = made.selection.visibility.candidates.space.floor
+    floor = made.floor
     solids = [solid.exterior for item in floor.elements for solid in item.solids]
     lines = [line for item in floor.elements for line in item.lines]
     rooms = [part.exterior for room in floor.rooms for part in room.polygons]

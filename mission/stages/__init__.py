@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -122,6 +123,48 @@ class NavigableSpace:
     findings: tuple[Finding, ...] = ()
 
 
+class HasSpace(Protocol):
+    """A result that was made in a navigable space."""
+
+    @property
+    def space(self) -> NavigableSpace: ...
+
+
+class InSpace:
+    """Floor, parameters and targets of a result, from its navigable space."""
+
+    @property
+    def floor(self: HasSpace) -> FloorPlan:
+        return self.space.floor
+
+    @property
+    def settings(self: HasSpace) -> Settings:
+        return self.space.settings
+
+    @property
+    def targets(self: HasSpace) -> Targets:
+        return self.space.targets
+
+
+class HasVisibility(Protocol):
+    """A result that was made from a visibility."""
+
+    @property
+    def visibility(self) -> Visibility: ...
+
+
+class OfVisibility(InSpace):
+    """Candidates and navigable space of a result, from its visibility."""
+
+    @property
+    def candidates(self: HasVisibility) -> Candidates:
+        return self.visibility.candidates
+
+    @property
+    def space(self: HasVisibility) -> NavigableSpace:
+        return self.visibility.space
+
+
 def weights_of(targets: Targets, settings: Settings) -> IntArray:
     """Return each unit's weight in a coverage (n,): its length in micrometres, or 1 by the paper's rule."""
     if settings.coverage_rule == "paper":
@@ -148,7 +191,7 @@ KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART, AVOIDED, TO
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(InSpace):
     """Possible scan positions, with the dropped ones, each with the reason."""
 
     space: NavigableSpace
@@ -210,7 +253,7 @@ class Candidates:
 
 
 @dataclass(frozen=True, eq=False)
-class Visibility:
+class Visibility(InSpace):
     """Units that each reachable candidate sees, as runs of units on segments.
 
     Run k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, means that units `first[k]` to `last[k]`
@@ -227,8 +270,8 @@ class Visibility:
     """Line of sight alone, without the limits; None if that is the same."""
 
     @property
-    def targets(self) -> Targets:
-        return self.candidates.space.targets
+    def space(self) -> NavigableSpace:
+        return self.candidates.space
 
     @property
     def rows(self) -> int:
@@ -288,13 +331,13 @@ class Visibility:
         It is the required number of views. If fewer candidates see a unit, it is their number, so that
         a stricter requirement never makes a floor impossible.
         """
-        most = self.candidates.space.settings.least_views
+        most = self.settings.least_views
         views = np.ones(self.targets.total) if most == 1 else self.views_from(self._pattern)
         return frozen(np.clip(views, 1, most), np.int64)
 
     def seen_from(self, rows: IntArray) -> BoolArray:
         """Return True for units that enough of the candidates in `rows` see (n,)."""
-        if self.candidates.space.settings.least_views == 1:
+        if self.settings.least_views == 1:
             return self._seen_by_any(rows)
         return frozen(self.views_from(rows) >= self.asked, np.bool_)
 
@@ -320,7 +363,7 @@ class Visibility:
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
+class Selection(OfVisibility):
     """The chosen candidates, in the order they were chosen."""
 
     visibility: Visibility
@@ -348,7 +391,7 @@ class Selection:
     @cached_property
     def xy(self) -> FloatArray:
         """Positions of the chosen candidates (k, 2)."""
-        candidates = self.visibility.candidates
+        candidates = self.candidates
         return frozen(candidates.xy[candidates.kept[self.chosen]].reshape(-1, 2))
 
 
@@ -372,7 +415,7 @@ class LeastTime:
 
 
 @dataclass(frozen=True, eq=False)
-class Route:
+class Route(OfVisibility):
     """The order of the stops, and the legs between them."""
 
     selection: Selection
@@ -392,6 +435,10 @@ class Route:
     method: str
     time: LeastTime | None = None
     """None if the plan minimises the number of stops."""
+
+    @property
+    def visibility(self) -> Visibility:
+        return self.selection.visibility
 
     @cached_property
     def length(self) -> float:
@@ -428,6 +475,7 @@ __all__ = [
     "Candidates",
     "LeastTime",
     "NavigableSpace",
+    "OfVisibility",
     "OpeningState",
     "Room",
     "RoomSpace",

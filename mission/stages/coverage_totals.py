@@ -127,7 +127,7 @@ class CoverageTotals:
 
 def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> CoverageTotals:
     """Return the totals of a plan; `why` has the reason by room where the robot does not go."""
-    space, targets = visibility.candidates.space, visibility.targets
+    space, targets = visibility.space, visibility.targets
     settings, reasons, asked = space.settings, why or {}, space.settings.least_of_room
     return CoverageTotals(
         rule=settings.coverage_rule,

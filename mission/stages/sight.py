@@ -107,7 +107,7 @@ class Sight:
 
 def sight_of(route: Route, mission: Mission, figures: Figures) -> Sight:
     """Return the visibility of a plan's stops, in the order of driving."""
-    visibility = route.selection.visibility
+    visibility = route.visibility
     rows = route.selection.chosen[route.order].tolist()
     runs = [slice(int(visibility.pointer[row]), int(visibility.pointer[row + 1])) for row in rows]
     counts = [run.stop - run.start for run in runs]

@@ -151,8 +151,8 @@ def stop_reasons(route: Route, stops: Sequence[str]) -> tuple[StopReason, ...]:
 
 def driven_coverage(route: Route) -> FloatArray:
     """Return the fraction of all visible seen after each stop, in the order of driving (k,)."""
-    visibility = route.selection.visibility
-    weight = weights_of(visibility.targets, visibility.candidates.space.settings)
+    visibility = route.visibility
+    weight = weights_of(visibility.targets, visibility.settings)
     counts = np.where(visibility.visible, weight, 0)
     lacking, gained = visibility.asked.copy(), []
     for row in route.selection.chosen[route.order].tolist():

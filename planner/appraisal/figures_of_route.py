@@ -21,8 +21,8 @@ from stopgo.planner.space.reach import reach_of
 def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figures:
     """Return the figures of a plan; `planned` are the parts of the floor that any plan enters."""
     selection = route.selection
-    candidates = selection.visibility.candidates
-    space, settings = candidates.space, candidates.space.settings
+    candidates = selection.candidates
+    space, settings = candidates.space, candidates.settings
     parts = planned or frozenset([candidates.chosen_part])
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
@@ -45,7 +45,7 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
 def figures_of_share(route: Route, whole: Figures) -> Figures:
     """Return the figures of one of several missions; the required coverage applies to all together."""
     shares = shares_of(route.selection, why={item.room: item.why for item in whole.unreached})
-    space = route.selection.visibility.candidates.space
+    space = route.space
     doubts = plausibility_findings(route, reached_m2=whole.reached_m2)
     of_all = (item for item in whole.findings if item.code in (NOT_MET, *SCANS_APART))
     findings = (*space.findings, *doubts, *of_all)

@@ -35,7 +35,7 @@ NEAR_LEG = 0.15
 
 def plausibility_findings(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
     """Return the findings about a plan as a whole."""
-    space = route.selection.visibility.candidates.space
+    space = route.space
     return (
         *over_ignored(space.floor, legs_of(route), stops=len(route.approaches), radius=space.settings.radius),
         *_little_reached(space, reached_m2),
@@ -47,7 +47,7 @@ def plausibility_findings(route: Route, *, reached_m2: float) -> tuple[Finding, 
 
 def near_legs(findings: Sequence[Finding], route: Route) -> set[int]:
     """Indices in `findings` of those on the strip that the robot drives over, or close to it."""
-    space = route.selection.visibility.candidates.space
+    space = route.space
     origin, legs = local_origin(space.floor), shapely.union_all(legs_of(route))
     reach = space.settings.radius + NEAR_LEG
     near = set()
@@ -60,7 +60,7 @@ def near_legs(findings: Sequence[Finding], route: Route) -> set[int]:
 
 def legs_of(route: Route) -> tuple[BaseGeometry, ...]:
     """Every leg in the local frame, the return leg last."""
-    origin = local_origin(route.selection.visibility.candidates.space.floor)
+    origin = local_origin(route.floor)
     legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
     lines = (leg - origin for leg in legs)
     return tuple(shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0]) for line in lines)

@@ -30,7 +30,7 @@ def quality_of(selection: Selection) -> Quality | None:
     The plans without a limit use a fast selection on the known visibility, so the cost is approximate.
     """
     seen = selection.visibility
-    settings = seen.candidates.space.settings
+    settings = seen.settings
     limits = limits_in_words(limits_spec_of(settings))
     if not limits:
         return None
@@ -56,14 +56,14 @@ def _under(in_sight: Visibility, settings: Settings) -> Visibility:
 
 def _possible(seen: Visibility) -> BoolArray:
     """True for each unit that enough candidates see within the limits."""
-    required = seen.candidates.space.settings.least_views
+    required = seen.settings.least_views
     return frozen(seen.visible & (seen.asked >= required), np.bool_)
 
 
 def not_met(selection: Selection) -> Iterator[Finding]:
     """A finding if no stops can reach the required coverage within the limits."""
     seen = selection.visibility
-    limits = limits_in_words(limits_spec_of(seen.candidates.space.settings))
+    limits = limits_in_words(limits_spec_of(seen.settings))
     if not limits:
         return
     ledger = replace(ledger_of(seen), visible=_in_sight(seen).visible)

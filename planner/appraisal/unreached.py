@@ -56,7 +56,7 @@ def _cut_off(candidates: Candidates, index: int, parts: frozenset[int]) -> Itera
 def _middle(candidates: Candidates, part: int, room: shapely.Geometry) -> tuple[float, float]:
     """A point of a part within a room, in the drawing's metres."""
     found = reach_of(candidates.space).parts
-    origin = local_origin(candidates.space.floor)
+    origin = local_origin(candidates.floor)
     pieces = [piece for piece, number in zip(found.pieces, found.part, strict=True) if number == part]
     inside = max((piece.intersection(room) for piece in pieces), key=lambda shape: shape.area)
     point = inside.representative_point()
@@ -64,7 +64,7 @@ def _middle(candidates: Candidates, part: int, room: shapely.Geometry) -> tuple[
 
 
 def _why(candidates: Candidates, index: int, reasons: set[int], parts: frozenset[int]) -> str:
-    settings = candidates.space.settings
+    settings = candidates.settings
     closed = _barriers(candidates, index, parts)
     if OTHER_PART in reasons:
         where = f"in another part of the floor ({closed})" if closed else "in another part of the floor"

@@ -62,7 +62,7 @@ def _driven(route: Route, problem: TourProblem, line: PointLine) -> Route:
     first = [ends.first] if ends.first is not None and ends.first >= len(order) else []
     last = [ends.last] if ends.last is not None else []
     sequence = [*first, *order, *last]
-    legs = legs_between(selection.visibility.candidates.space, points)
+    legs = legs_between(selection.space, points)
     bound = tour_bound(legs.lengths, sequence, ends)
     return assembled(selection, points, legs, sequence, ends, bound, METHOD)
 

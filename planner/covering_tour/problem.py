@@ -89,11 +89,11 @@ class TourProblem:
 
     @property
     def candidates(self) -> Candidates:
-        return self.route.selection.visibility.candidates
+        return self.route.candidates
 
     @property
     def settings(self) -> Settings:
-        return self.candidates.space.settings
+        return self.route.settings
 
     @property
     def closed(self) -> bool:
@@ -125,7 +125,7 @@ class TourProblem:
 
     @cached_property
     def legs(self) -> Legs:
-        return legs_between(self.candidates.space, np.concatenate([self._xy, self._ends]))
+        return legs_between(self.route.space, np.concatenate([self._xy, self._ends]))
 
     @cached_property
     def line(self) -> PointLine:
@@ -242,10 +242,10 @@ class TourProblem:
 
 def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
     """The covering tour problem of a route's selection; rows `done` were scanned before."""
-    visibility, chosen = route.selection.visibility, np.unique(route.selection.chosen)
+    visibility, chosen = route.visibility, np.unique(route.selection.chosen)
     stays: IntArray = np.empty(0, dtype=np.int64)
     connected: ConnectionTest = _any_rows
-    joins = visibility.candidates.space.settings.least_overlap > 0
+    joins = visibility.settings.least_overlap > 0
     if done is not None:
         whole, cover = remaining_cover(visibility, done)
         if joins:

@@ -33,7 +33,7 @@ def registers(pairs: Pairs, *, share: float) -> IntArray:
 
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
-    overlaps, share = overlaps_of(candidates), candidates.space.settings.least_overlap
+    overlaps, share = overlaps_of(candidates), candidates.settings.least_overlap
     every = (overlaps.after(row) for row in range(overlaps.rows))
     near = [pairs.other[registers(pairs, share=share)] for pairs in every]
     pointer = np.cumsum([0, *map(len, near)])

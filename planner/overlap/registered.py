@@ -42,11 +42,11 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
 def _overlaps_of_stops(route: Route) -> Overlaps:
     """The boundary that stops see in common; row k is the k-th stop in driving order."""
     selection = route.selection
-    return Overlaps(shown(selection.visibility.candidates, selection.chosen[route.order]))
+    return Overlaps(shown(selection.candidates, selection.chosen[route.order]))
 
 
 def _settings(route: Route) -> Settings:
-    return route.selection.visibility.candidates.space.settings
+    return route.settings
 
 
 SCANS_APART = ("scans_apart", "scans_not_joined")
@@ -88,7 +88,7 @@ def _remedy(
     route: Route, here: IntArray, there: IntArray, names: list[str]
 ) -> tuple[str, tuple[float, float] | None]:
     """A remedy that connects two sets of stops, and its position: target spheres, else an opening."""
-    space = route.selection.visibility.candidates.space
+    space = route.space
     overlaps = _overlaps_of_stops(route)
     best = None
     for k in here.tolist():

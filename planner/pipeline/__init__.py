@@ -130,7 +130,7 @@ def _divided(selection: Selection) -> tuple[Route, DividedRoute]:
     from stopgo.planner.task_allocation.dividing import divided, division_cost
 
     driven = route(selection)
-    if selection.visibility.candidates.space.settings.minimise == "stops":
+    if selection.settings.minimise == "stops":
         return driven, divided(driven)
     quicker = _in_least_time(driven)
     both = [(one, divided(one)) for one in (with_known_time(driven, quicker), quicker)]

@@ -50,7 +50,7 @@ def route(selection: Selection) -> Route:
     The bound holds for the paths of the graph. The paper's grid has detours, so exact paths may be
     shorter; the method says so.
     """
-    space = selection.visibility.candidates.space
+    space = selection.space
     settings = space.settings
     router = variant("router", settings.router, ROUTERS)
     points, ends = points_and_ends(selection)
@@ -70,13 +70,13 @@ def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
 
 def points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
     """The stops, then the start and the end if they are given."""
-    settings = selection.visibility.candidates.space.settings
+    settings = selection.settings
     points, first, last = [*selection.xy], None, None
     if settings.start is not None:
         first = len(points)
         points.append(np.array(settings.start[:2]))
     if settings.end is not None:
-        check_position(selection.visibility.candidates, "end", settings.end)
+        check_position(selection.candidates, "end", settings.end)
         last = len(points)
         points.append(np.array(settings.end))
     closed = settings.tour == "closed" or (
@@ -100,7 +100,7 @@ def check_position(candidates: Candidates, name: str, position: tuple[float, ...
 
 def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
     """The stop nearest the widest exterior door of the planned rooms, if there is one."""
-    rank, reason = rank_at_door(selection.visibility.candidates, selection.chosen)
+    rank, reason = rank_at_door(selection.candidates, selection.chosen)
     return (None if rank is None else int(np.argmin(rank))), reason
 
 
@@ -208,7 +208,7 @@ def assembled(
     back = reached[0] if ends.closed else ends.last
     return_leg = None if back is None or back == reached[-1] else legs.path(reached[-1], back)
     driven = sum(polyline_length(leg) for leg in (*approaches, *([] if return_leg is None else [return_leg])))
-    space = selection.visibility.candidates.space
+    space = selection.space
     return Route(
         selection=selection,
         order=frozen(visited, np.int64),

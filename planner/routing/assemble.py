@@ -53,7 +53,7 @@ def assemble(
 
     `share` identifies it among several missions that together reach the coverage of the floor's plan.
     """
-    space = route.selection.visibility.candidates.space
+    space = route.space
     settings, floor = space.settings, space.floor
     check_legs(route)
     return sealed(
@@ -97,7 +97,7 @@ def _georeference(space: NavigableSpace) -> SiteOrigin | None:
 
 
 def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
-    visibility = route.selection.visibility
+    visibility = route.visibility
     rows = route.selection.chosen[route.order]
     doorways = set(visibility.candidates.doorway_rows.tolist())
     views = np.zeros(visibility.targets.total, dtype=np.int64)
@@ -166,7 +166,7 @@ def check_legs(route: Route) -> None:
     StopgoError
         If a leg comes too close; no mission is made then.
     """
-    space = route.selection.visibility.candidates.space
+    space = route.space
     origin = local_origin(space.floor)
     graph = space.settings.graph
     source = space.floor.name if graph in GRAPHS else f"--graph {graph}"

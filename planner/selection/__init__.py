@@ -70,7 +70,7 @@ def select(visibility: Visibility) -> Selection:
     Required stops, and doorways added for registration, are chosen first and count. Where scans must
     register with one another, doorways are offered too.
     """
-    settings = visibility.candidates.space.settings
+    settings = visibility.settings
     method = variant("selector", settings.selector, METHODS)
     whole, fixed, problem = cover_problem(visibility)
     if settings.least_overlap > 0:
@@ -84,7 +84,7 @@ def select(visibility: Visibility) -> Selection:
 def quick_estimate(visibility: Visibility) -> tuple[int, int]:
     """Estimated number of stops, from greedy and a few swaps, and a lower bound on it."""
     _, fixed, problem = cover_problem(visibility)
-    start, bound = _greedy(problem, visibility.candidates.space.settings)
+    start, bound = _greedy(problem, visibility.settings)
     rows = improved(problem, start, at_least=bound, swaps=QUICK_SWAPS)
     return len(fixed) + len(rows), len(fixed) + bound
 
@@ -92,7 +92,7 @@ def quick_estimate(visibility: Visibility) -> tuple[int, int]:
 def cover_problem(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
     """The whole problem, the required rows, and the problem that remains after them."""
     candidates = visibility.candidates
-    settings = candidates.space.settings
+    settings = candidates.settings
     whole = cover_of(visibility, demands_of(visibility))
     fixed = np.union1d(candidates.must_rows, candidates.doorway_rows if settings.door_scan else [])
     fixed = fixed.astype(np.int64)
@@ -109,7 +109,7 @@ def _connected(
 
     Rows `fixed` come first and are among the rows `offered`.
     """
-    settings = visibility.candidates.space.settings
+    settings = visibility.settings
     cover = whole.with_one_of_each([np.array([row]) for row in fixed])
     task = ConnectedCover(cover, links_of(visibility.candidates), offered)
     if method.name == "exact":
@@ -158,7 +158,7 @@ def select_follow_up(visibility: Visibility, done: IntArray) -> Selection:
     NegativeResult
         If the required coverage cannot be reached.
     """
-    settings = visibility.candidates.space.settings
+    settings = visibility.settings
     method = variant("selector", settings.selector, METHODS)
     if settings.least_overlap > 0:
         whole = cover_of(visibility, demands_of(visibility))
@@ -206,10 +206,10 @@ def _solved(method: Variant[Selector], problem: Cover, settings: Settings) -> tu
 def _selection(
     visibility: Visibility, whole: Cover, chosen: IntArray, bound: int, method: Variant[Selector]
 ) -> Selection:
-    settings = visibility.candidates.space.settings
+    settings = visibility.settings
     steps = coverage_steps(whole, chosen)
     if whole.missing(whole.covered_by(chosen))[0] > 0:
-        name, reached = visibility.candidates.space.floor.name, steps[-1] if len(steps) else 0.0
+        name, reached = visibility.floor.name, steps[-1] if len(steps) else 0.0
         raise NegativeResult(
             f"{name}: coverage reaches {reached:.3f}, not {settings.coverage:g}; "
             "lower --coverage or offer more candidates"

@@ -32,7 +32,7 @@ def demands_of(visibility: Visibility) -> Demands:
     The paper requires a fraction of all units together and nothing else. By length, every room and
     every kind has its own required fraction.
     """
-    space = visibility.candidates.space
+    space = visibility.space
     settings, targets = space.settings, visibility.targets
     weight = np.where(visibility.visible, weights_of(targets, settings), 0)
     whole = np.zeros(targets.total, dtype=np.int64)

@@ -30,7 +30,7 @@ MOST = 25
 
 def refined(selection: Selection) -> Selection:
     """A selection with fewer stops, some of them off the pattern; the given one where none is saved."""
-    settings = selection.visibility.candidates.space.settings
+    settings = selection.settings
     if settings.coverage_rule == "paper" or settings.fov < 360:
         return selection
     if not (len(selection.chosen) <= MOST if settings.refine is None else settings.refine):
@@ -44,7 +44,7 @@ def refined(selection: Selection) -> Selection:
 
 def _nearby_candidates(selection: Selection) -> Candidates | None:
     """Allowed positions around the chosen stops that are not candidates yet; None if there are none."""
-    candidates = selection.visibility.candidates
+    candidates = selection.candidates
     free = np.setdiff1d(selection.chosen, np.union1d(candidates.must_rows, candidates.doorway_rows))
     chosen = candidates.kept[free]
     around = [_positions_around(candidates, int(index)) for index in chosen]

@@ -45,7 +45,7 @@ def divided(route: Route) -> DividedRoute:
     InputError
         If there are more robots than stops, or the robot does not fit at a start.
     """
-    settings = route.selection.visibility.candidates.space.settings
+    settings = route.settings
     return _fleet(route, settings) if settings.robots is not None else _shifts(route, settings)
 
 
@@ -64,7 +64,7 @@ def _fleet(route: Route, settings: Settings) -> DividedRoute:
         )
     starts = settings.starts
     for start in starts[1:]:
-        check_position(selection.visibility.candidates, "start", start)
+        check_position(selection.candidates, "start", start)
     closed = settings.tour != "open"
     clock = tour_times(
         selection,

@@ -142,8 +142,8 @@ def tour_times(
     selection: Selection, starts: FloatArray, headings: tuple[float, ...], *, closed: bool
 ) -> TourTimes:
     """Times of tours over the chosen stops from starts (n, 2)."""
-    candidates = selection.visibility.candidates
-    settings = candidates.space.settings
+    candidates = selection.candidates
+    settings = candidates.settings
     points = np.concatenate([selection.xy, starts])
     rows = candidates.kept[selection.chosen]
     heading = candidates.heading[rows] if len(candidates.heading) else np.empty(0)

@@ -28,12 +28,12 @@ def visibility(candidates: Candidates) -> Visibility:
     Units outside the settings' limits on views count as not seen, with any method. With a field of
     view below 360° the candidates of the result are positions with headings.
     """
-    settings = candidates.space.settings
+    settings = candidates.settings
     method = variant("visibility", settings.visibility, METHODS)
     found = _checked(method, method.called(candidates), candidates)
     if not len(found.first):
         raise NegativeResult(
-            f"{candidates.space.floor.name}: no target is visible within {settings.range:g} m of a "
+            f"{candidates.floor.name}: no target is visible within {settings.range:g} m of a "
             "candidate; raise --range or lower --grid"
         )
     return within_all_limits(found)
@@ -48,7 +48,7 @@ def within_all_limits(visible: Visibility) -> Visibility:
         If the limits leave nothing.
     """
     seen = within_limits(visible)
-    return with_headings(seen) if visible.candidates.space.settings.fov < 360 else seen
+    return with_headings(seen) if visible.settings.fov < 360 else seen
 
 
 def _checked(method: Variant[VisibilityMethod], given: object, candidates: Candidates) -> Visibility:
@@ -56,7 +56,7 @@ def _checked(method: Variant[VisibilityMethod], given: object, candidates: Candi
     found: Visibility = method.of_kind(given, Visibility)
     if found.candidates is not candidates:
         raise method.wrong("is of other candidates than those it was given")
-    targets = candidates.space.targets
+    targets = candidates.targets
     runs = len(found.first)
     pointer = method.indices(found.pointer, "pointer", length=len(candidates.kept) + 1, below=runs + 1)
     segment = method.indices(found.segment, "segment", length=runs, below=len(targets.units))

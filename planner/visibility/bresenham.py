@@ -42,8 +42,8 @@ def bresenham(candidates: Candidates, *, aligned: bool = True) -> Visibility:
 
 def _seen_by_each(candidates: Candidates, raster: Raster) -> Iterator[IntArray]:
     """Units that each kept candidate sees, ascending."""
-    targets, reach = candidates.space.targets, candidates.space.settings.range
-    origin = local_origin(candidates.space.floor)
+    targets, reach = candidates.targets, candidates.settings.range
+    origin = local_origin(candidates.floor)
     units, viewpoints = targets.unit_xy - origin, candidates.xy[candidates.kept] - origin
     unit_cells, own = raster.cells_of(units), targets.occluding[targets.unit_segment]
     walk = _walk(raster, steps=len(units) * len(viewpoints) * reach / raster.cell)

@@ -20,7 +20,7 @@ MARGIN = 1.0
 
 def exact(candidates: Candidates) -> Visibility:
     """Units in range whose midpoint is visible; the rule for corners is that of `sight.kernel`."""
-    space, targets = candidates.space, candidates.space.targets
+    space, targets = candidates.space, candidates.targets
     origin = local_origin(space.floor)
     places, row = viewpoints_of(candidates)
     scene = scene_of(
@@ -46,7 +46,7 @@ def viewpoints_of(candidates: Candidates) -> tuple[FloatArray, IntArray]:
     """
     xy = candidates.xy[candidates.kept]
     row = np.arange(len(xy))
-    if candidates.space.settings.doors == "open" or not len(candidates.doorway_rows):
+    if candidates.settings.doors == "open" or not len(candidates.doorway_rows):
         return xy, row
     twice = np.repeat(row, np.where(np.isin(row, candidates.doorway_rows), 2, 1))
     places = xy[twice].copy()

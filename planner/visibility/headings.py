@@ -33,13 +33,13 @@ def with_headings(seen: Visibility) -> Visibility:
     test of a unit's midpoint against heading ± fov / 2 is in floating point.
     """
     candidates = seen.candidates
-    fov = math.radians(candidates.space.settings.fov)
+    fov = math.radians(candidates.settings.fov)
     headings = headings_of(candidates, fov=fov)
     once = set(candidates.must_rows.tolist()) | set(candidates.doorway_rows.tolist())
     views = [list(_views(seen, row, headings, fov=fov, once=row in once)) for row in range(seen.rows)]
     turned = _turned(candidates, [[heading for heading, _ in view] for view in views])
     units = (units for view in views for _, units in view)
-    name = f"{seen.method}, field of view {candidates.space.settings.fov:g}°"
+    name = f"{seen.method}, field of view {candidates.settings.fov:g}°"
     return replace(visibility_of(turned, units, method=name), in_sight=seen.in_sight)
 
 
@@ -48,7 +48,7 @@ def headings_of(candidates: Candidates, *, fov: float) -> FloatArray:
 
     Their number is a multiple of four, so that a floor turned by 90° or mirrored has the same ones.
     """
-    floor = candidates.space.floor
+    floor = candidates.floor
     axis = main_axes(to_shape(floor.outline, local_origin(floor)))[0]
     number = 4 * math.ceil(max(FEWEST, 2 * math.tau / fov - 1e-9) / 4)
     first = math.atan2(axis[1], axis[0])

@@ -26,13 +26,13 @@ def within_limits(in_sight: Visibility) -> Visibility:
     NegativeResult
         If the limits leave nothing; the message names them.
     """
-    settings = in_sight.candidates.space.settings
+    settings = in_sight.settings
     limits = limits_of(settings)
     if limits.none:
         return in_sight
     seen = _clipped(in_sight, limits)
     if not len(seen.first):
-        name = in_sight.candidates.space.floor.name
+        name = in_sight.floor.name
         raise NegativeResult(
             f"{name}: no visible target is within the limits: {_empty_reason(in_sight, settings)}"
         )
@@ -41,7 +41,7 @@ def within_limits(in_sight: Visibility) -> Visibility:
 
 def _clipped(in_sight: Visibility, limits: ViewLimits) -> Visibility:
     candidates, targets = in_sight.candidates, in_sight.targets
-    origin = local_origin(candidates.space.floor)
+    origin = local_origin(candidates.floor)
     row = np.repeat(np.arange(in_sight.rows), np.diff(in_sight.pointer))
     place = to_grid(candidates.xy[candidates.kept] - origin)[row]
     a, b = (to_grid(end - origin)[in_sight.segment] - place for end in (targets.a, targets.b))

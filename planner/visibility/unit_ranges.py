@@ -12,7 +12,7 @@ from stopgo.mission.stages import Candidates, Visibility
 
 def visibility_of(candidates: Candidates, seen: Iterable[IntArray], *, method: str) -> Visibility:
     """The visibility in which each kept candidate sees the units given for it, ascending."""
-    segments = candidates.space.targets.unit_segment
+    segments = candidates.targets.unit_segment
     runs = [runs_of(units, segments) for units in seen]
     first = np.concatenate([np.empty(0, np.int64), *(first for first, _ in runs)])
     last = np.concatenate([np.empty(0, np.int64), *(last for _, last in runs)])

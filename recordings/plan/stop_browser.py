@@ -33,7 +33,7 @@ def describe_stops(
     canvas: Canvas, route: Route, mission: Mission, reasons: Sequence[StopReason], drive: Drive
 ) -> None:
     """Describe each choice and the route by planning step, and each stop by its number."""
-    visibility = route.selection.visibility
+    visibility = route.visibility
     seen = [sight_of_row(visibility, item.candidate) for item in reasons]
     eyes = route.xy
     outlines = [sight_outline(eye, lines) for eye, lines in zip(eyes, seen, strict=True)]

@@ -165,7 +165,7 @@ def room_targets(floor: FloorPlan) -> Targets:
 
 def halves_seen(candidates: Candidates) -> Visibility:
     """Candidate 0 sees the units left of x = 4, candidate 1 the others, candidate 2 all but the last."""
-    targets = candidates.space.targets
+    targets = candidates.targets
     left = targets.unit_xy[:, 0] < 4
     rows = [left, ~left, np.arange(targets.total) < targets.total - 1]
     runs = [run for row in rows for run in unit_runs(row, targets)]

@@ -158,7 +158,7 @@ def check_bounds(mission: Mission, nouns: dict[type, Any], settings: Settings) -
 def check_coverage(mission: Mission, selection: Selection, settings: Settings) -> None:
     """Recompute by brute force what candidates see, the chosen ones among them."""
     seen = matrix_by_force(selection.visibility, selection.chosen)
-    pattern = np.setdiff1d(np.arange(len(seen)), selection.visibility.candidates.extra_rows)
+    pattern = np.setdiff1d(np.arange(len(seen)), selection.candidates.extra_rows)
     visible = seen[pattern].any(axis=0)
     assert np.array_equal(visible, selection.visibility.visible), "another set of units is visible"
     covered = seen[selection.chosen].any(axis=0)
@@ -171,7 +171,7 @@ def check_coverage(mission: Mission, selection: Selection, settings: Settings) -
 
 def check_shares(selection: Selection, visible: np.ndarray, covered: np.ndarray, settings: Settings) -> None:
     """The shares of the whole, and of every room and kind unless the paper's rule is asked."""
-    space = selection.visibility.candidates.space
+    space = selection.space
     targets = space.targets
     length = np.hypot(*(targets.b - targets.a).T) / targets.units
     weight = np.repeat(length if settings.coverage_rule == "length" else np.ones(len(length)), targets.units)

@@ -49,7 +49,7 @@ def anywhere(selection: Selection) -> Selection:
         If the settings use a parameter for which the bound does not hold.
     """
     seen = selection.visibility
-    _check(seen.candidates.space.settings)
+    _check(seen.settings)
     search = _CellSearch(seen)
     search.run()
     found = _best_of(selection, search.offered())
@@ -93,7 +93,7 @@ class _CellSearch:
         self._seen, self._known = seen, seen
         self._asked, self.fixed = _asked(seen)
         self._cell_visibility = CellVisibility(seen.candidates)
-        self._place = StopFeasibility(seen.candidates.space)
+        self._place = StopFeasibility(seen.space)
         self._cells = self._cell_visibility.all_cells()
         self._prices: Prices | None = None
         self.bound = 0
@@ -141,7 +141,7 @@ class _CellSearch:
 
     def _take(self, local: FloatArray, prices: Prices) -> None:
         """Add those of these positions (n, 2) that are allowed and whose worth exceeds one stop."""
-        space = self._seen.candidates.space
+        space = self._seen.space
         xy = local + local_origin(space.floor)
         tree = shapely.STRtree(self._place.rooms)
         room = tree.nearest(shapely.points(local)) if len(local) else np.empty(0, np.int64)

@@ -47,14 +47,14 @@ def planned() -> tuple[Mission, Sight]:
     """Two stops: of 14 visible units of 0.1 m, S1 sees 8 and S2 three more; 70 % is asked."""
     *nouns, mission = world.nouns_at()
     route = next(noun for noun in nouns if isinstance(noun, Route))
-    space = route.selection.visibility.candidates.space
+    space = route.space
     settings = replace(space.settings, coverage=0.7, room_coverage=0.5, kind_coverage=0.5)
     object.__setattr__(space, "settings", settings)
     return mission, sight_of(route, mission, figures(route))
 
 
 def figures(route: Route) -> Figures:
-    shares = ledger_of(route.selection.visibility).shares(np.zeros(32, dtype=bool))
+    shares = ledger_of(route.visibility).shares(np.zeros(32, dtype=bool))
     return Figures("length", shares.whole, shares.rooms, worst_first(shares.kinds), 24.0, 24.0, (), ())
 
 

@@ -62,7 +62,7 @@ def test_every_place_of_the_plan_is_on_a_sheet() -> None:
     tiles = tiles_of(route, mission)
     assert len(tiles) > 1
     assert len({tile.name for tile in tiles}) == len(tiles)
-    places = [*route.selection.visibility.targets.unit_xy.tolist(), *((s.x, s.y) for s in mission.stops)]
+    places = [*route.visibility.targets.unit_xy.tolist(), *((s.x, s.y) for s in mission.stops)]
     assert all(any(tile.holds(x, y) for tile in tiles) for x, y in places)
 
 
@@ -86,7 +86,7 @@ def test_every_stop_is_listed_once_with_its_room_sheet_and_a_box_to_tick() -> No
     (listed,) = [page for page in pages if page.name == "Stops"]
     for stop, room in zip(
         room_mission().stops,
-        rooms_of(room_mission(), room_route().selection.visibility.candidates.space.floor),
+        rooms_of(room_mission(), room_route().floor),
         strict=True,
     ):
         assert words(listed).count(stop.id) == 1

@@ -140,10 +140,10 @@ def test_coordinates_of_a_national_grid_are_written_in_full() -> None:
 
 def test_a_bare_floor_without_stops_is_drawn() -> None:
     route = room_route()
-    candidates = route.selection.visibility.candidates
-    floor = replace(candidates.space.floor, rooms=(), openings=())
+    candidates = route.candidates
+    floor = replace(candidates.floor, rooms=(), openings=())
     space = replace(candidates.space, floor=floor, rooms=(), openings=())
-    visibility = replace(route.selection.visibility, candidates=replace(candidates, space=space))
+    visibility = replace(route.visibility, candidates=replace(candidates, space=space))
     none = np.empty(0, dtype=np.int64)
     selection = replace(route.selection, visibility=visibility, chosen=none, coverage_steps=none)
     bare = replace(route, selection=selection, order=none, approaches=(), return_leg=None)

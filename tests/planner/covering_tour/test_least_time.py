@@ -100,8 +100,8 @@ class EveryTour:
 
     def __post_init__(self) -> None:
         selection = self.driven.selection
-        candidates = selection.visibility.candidates
-        settings = candidates.space.settings
+        candidates = selection.candidates
+        settings = candidates.settings
         self.cover, fixed, _ = cover_problem(selection.visibility)
         self.must = set(fixed.tolist())
         everywhere = replace(selection, chosen=np.arange(self.cover.rows))
@@ -217,7 +217,7 @@ def test_a_plan_is_never_slower_and_sees_what_is_asked_for(world: str, case: int
     driven, made = two_step(world, case), joint(world, case)
     assert made.time is not None
     assert made.time.bound <= made.time.seconds <= made.time.two_step_s == pytest.approx(seconds_of(driven))
-    whole, fixed, _ = cover_problem(made.selection.visibility)
+    whole, fixed, _ = cover_problem(made.visibility)
     assert not whole.missing(whole.covered_by(made.selection.chosen)).any()
     assert set(fixed.tolist()) <= set(made.selection.chosen.tolist())
     assert sorted(made.order.tolist()) == list(range(len(made.selection.chosen)))
@@ -269,7 +269,7 @@ def test_a_zone_is_left_by_no_selection_that_sees_enough() -> None:
 def test_scans_that_are_to_register_still_do() -> None:
     driven = two_step("rooms", 0, overlap=0.1)
     made = least_time_route(driven)
-    links = links_of(made.selection.visibility.candidates)
+    links = links_of(made.candidates)
     pieces = [len(components_of(links, one.selection.chosen)) for one in (driven, made)]
     assert pieces[1] <= pieces[0]
     assert made.time is not None and made.time.seconds <= made.time.two_step_s

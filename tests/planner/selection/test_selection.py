@@ -142,7 +142,7 @@ def test_units_that_look_alike_are_merged_without_loss() -> None:
     _, nouns = planned(floor, Settings(range=4))
     visibility = nouns[Selection].visibility
     cover = cover_of(visibility, demands_of(visibility))
-    weight = weights_of(visibility.targets, visibility.candidates.space.settings)
+    weight = weights_of(visibility.targets, visibility.settings)
     seen = np.zeros((visibility.rows, visibility.targets.total), dtype=bool)
     for row in range(visibility.rows):
         seen[row, visibility.seen_by(row)] = True

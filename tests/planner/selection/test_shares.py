@@ -62,7 +62,7 @@ def test_how_finely_a_column_is_drawn_changes_no_share() -> None:
         for corners in (48, 480)
     )
     drawn = [nouns[Selection] for _, nouns in (one, other)]
-    walls = [share(found, units_of(found.visibility.candidates.space, "walls")) for found in drawn]
+    walls = [share(found, units_of(found.space, "walls")) for found in drawn]
     assert drawn[1].visibility.targets.total > drawn[0].visibility.targets.total + 1200
     assert walls[1] == pytest.approx(walls[0], abs=0.01)
     assert len(drawn[0].chosen) == len(drawn[1].chosen)
@@ -95,7 +95,7 @@ def test_no_room_is_given_up_for_the_whole() -> None:
         settings = Settings(range=20, coverage=0.8, room_coverage=share_of_room, kind_coverage=0)
         _, nouns = planned(closet_beside_a_hall(), settings)
         found = nouns[Selection]
-        rooms = found.visibility.candidates.space.unit_room
+        rooms = found.space.unit_room
         assert share(found, rooms == 1) >= share_of_room
         assert share(found, np.ones(len(rooms), dtype=bool)) >= 0.8
     assert len(found.chosen) == 2
@@ -107,7 +107,7 @@ def test_no_kind_is_given_up_for_the_whole() -> None:
     for least in (0.0, 0.95):
         _, nouns = planned(floor, Settings(range=10, coverage=0.7, kind_coverage=least, room_coverage=0))
         found = nouns[Selection]
-        assert share(found, units_of(found.visibility.candidates.space, "columns")) >= least
+        assert share(found, units_of(found.space, "columns")) >= least
     assert len(found.chosen) >= 2
 
 
@@ -161,7 +161,7 @@ def fewest_beside(found: Selection, fixed: int) -> int:
     doorways = visibility.candidates.doorway_rows.tolist()
     assert len(doorways) == fixed
     others = [row for row in range(visibility.rows) if row not in doorways]
-    space, settings = visibility.candidates.space, visibility.candidates.space.settings
+    space, settings = visibility.space, visibility.settings
     members = [(np.ones(len(space.unit_room), dtype=bool), settings.coverage)]
     members += [(space.unit_room == k, settings.least_of_room) for k in range(len(space.rooms))]
     for more in range(4):
@@ -185,7 +185,7 @@ def test_places_beside_the_pattern_may_save_a_stop_and_never_cost_one() -> None:
 
 def test_the_papers_rule_offers_nothing_beside_the_pattern() -> None:
     _, nouns = planned(hall(7, 4), Settings(coverage_rule="paper"))
-    assert not len(nouns[Selection].visibility.candidates.extra_rows)
+    assert not len(nouns[Selection].candidates.extra_rows)
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,7 @@ def test_no_set_of_candidates_is_smaller_than_the_bound(views: int) -> None:
 
 def enough(counts: np.ndarray, seen: Visibility, settings: Settings) -> bool:
     """True if the required fractions of the whole, of the room and of every kind are met."""
-    space, targets = seen.candidates.space, seen.targets
+    space, targets = seen.space, seen.targets
     kinds = np.array([item.kind for item in space.floor.elements])[targets.element][targets.unit_segment]
     groups = [(np.ones(targets.total, bool), settings.coverage), (space.unit_room == 0, 0.7)]
     groups += [(kinds == kind, 0.7) for kind in sorted(set(kinds))]

@@ -187,7 +187,7 @@ def test_a_beam_is_seen_from_both_sides_and_hides_nothing() -> None:
 def test_stairs_hide_but_are_no_target() -> None:
     stair = element("stair", "stairs", box(2.0, 1.0, 4.0, 3.0))
     seen = at(hall(6, 4, stair), np.array([(1.0, 2.0)]))
-    assert "stairs" not in seen.targets.by_kind(seen.candidates.space.floor.elements)
+    assert "stairs" not in seen.targets.by_kind(seen.floor.elements)
     assert len(seen.seen_by(0)) < (6 + 4) * 2 * 20
 
 

@@ -37,7 +37,7 @@ def lengths(stretches: np.ndarray) -> float:
 
 def test_seen_and_unseen_make_the_whole_boundary(written: tuple[Path, Mission]) -> None:
     stretches = read_stretches(*written)
-    targets = room_route().selection.visibility.targets
+    targets = room_route().visibility.targets
     whole = float(np.hypot(*(targets.b - targets.a).T).sum())
     assert lengths(stretches.seen) + lengths(stretches.unseen) == pytest.approx(whole, abs=1e-4)
     assert lengths(stretches.seen) > 0

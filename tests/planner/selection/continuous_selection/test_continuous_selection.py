@@ -51,7 +51,7 @@ def places_in(found: Candidates, count: int, seed: int) -> Candidates:
 def holding(cells: PositionCells, seen: Visibility, row: int) -> IntArray:
     """The cells that contain the position of this row."""
     candidates = seen.candidates
-    at = to_grid(candidates.xy[candidates.kept[row]] - local_origin(candidates.space.floor))
+    at = to_grid(candidates.xy[candidates.kept[row]] - local_origin(candidates.floor))
     inside = (cells.corner <= at) & (at <= cells.corner + cells.side[:, None])
     return np.flatnonzero(inside.all(axis=1))
 
