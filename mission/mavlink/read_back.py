@@ -40,12 +40,6 @@ def upload_of(sent: ItemList) -> tuple[Item, ...]:
     return (*home, *sent.items)
 
 
-def placed_at(sent: ItemList, sequence: int) -> Placed | None:
-    """Return the item with a sequence number on the vehicle, as in MISSION_CURRENT; None for home."""
-    index = autopilot_named(sent.autopilot).index(sequence)
-    return sent.placed[index] if 0 <= index < len(sent.placed) else None
-
-
 def differences(sent: ItemList, read: Sequence[Item], autopilot: Autopilot | None = None) -> tuple[str, ...]:
     """Return the differences between a vehicle's items and the expected ones, a line each; empty if none.
 

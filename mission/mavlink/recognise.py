@@ -93,12 +93,6 @@ def stops_of(items: Sequence[Item], mission: Mission) -> tuple[str | None, ...]:
     return tuple(one.stop for one in recognise(items, mission=mission))
 
 
-def stop_of_trigger(item: Item, mission: Mission) -> str | None:
-    """Return the id of the stop whose number a trigger, or a wait for a script, carries."""
-    number = number_carried(item)
-    return None if number is None else stop_numbered(mission, number)
-
-
 def number_carried(item: Item) -> int | None:
     """Return the stop's number that an item carries; None if it carries none."""
     carried = {

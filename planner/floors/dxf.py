@@ -199,10 +199,6 @@ def _messages(floor: FloorPlan | None, code: str) -> tuple[str, ...]:
     return tuple(item.message for item in findings if item.code.startswith(code))
 
 
-def _other_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    return tuple(item for item in findings if not item.code.startswith(_REPORTED_ELSEWHERE))
-
-
 def _choices(sheet: DxfSheet, floor: FloorPlan | None) -> Iterable[FloorChoice]:
     """The drawings side by side, or the only floor."""
     if floor is not None and len(sheet.drawings) < 2:

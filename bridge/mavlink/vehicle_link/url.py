@@ -29,10 +29,6 @@ class Url:
         return f"{self.kind}:{f'[{self.host}]' if v6 else self.host}:{self.number}"
 
     @property
-    def listens(self) -> bool:
-        return self.kind in ("udpin", "tcpin")
-
-    @property
     def stays_here(self) -> bool:
         """True if nothing leaves this machine over a network."""
         from stopgo.bridge.link.zenoh_link import is_loopback

@@ -35,13 +35,6 @@ SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
 MARK = b"ISO-10303-21"
 
 
-def is_model(data: bytes) -> bool:
-    """True if bytes look like an IFC file, or a zip file of one."""
-    if data.startswith(b"PK\x03\x04"):
-        return bool(re.search(rb"\.ifc(?:PK|[^\w]|$)", data[:4096], re.IGNORECASE))
-    return MARK in data[:1024] and b"IFC" in data[:65536].upper()
-
-
 def load(file: FloorFile) -> Model:
     """The model in a file.
 

@@ -13,7 +13,7 @@ from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from stopgo.mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
 from stopgo.mission.mavlink.autopilots.px4 import keeps as px4_keeps
 from stopgo.mission.mavlink.items import NAN, Command, Item, MavFrame
-from stopgo.mission.mavlink.read_back import differences, placed_at, upload_of
+from stopgo.mission.mavlink.read_back import differences, upload_of
 from stopgo.mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import NAMES, corner_tour, first_scan, narrow_view, read_back
 from tests.mission.worlds import square_tour
@@ -99,15 +99,6 @@ def test_home_is_put_in_front_for_ardupilot_only():
     assert len(upload_of(translate(square_tour()))) == 11
     assert upload_of(translate(square_tour()))[0].x == 515_000_000
     assert len(upload_of(translate(square_tour(), "px4"))) == 10
-
-
-@pytest.mark.parametrize(("name", "first"), [("ardupilot", 1), ("px4", 0), ("generic", 0)])
-def test_sequence_numbers_count_home_where_it_is_an_item(name, first):
-    sent = translate(square_tour(), name)
-    assert placed_at(sent, first) is sent.placed[0]
-    assert placed_at(sent, first + 9) is sent.placed[9]
-    assert placed_at(sent, first + 10) is None
-    assert placed_at(sent, first - 1) is None
 
 
 def waypoint(*params: float, frame: int = MavFrame.GLOBAL_RELATIVE_ALT_INT, z: float = 0.0) -> Item:

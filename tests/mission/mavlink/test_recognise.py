@@ -10,7 +10,7 @@ import pytest
 from stopgo.mission.errors import InputError
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
-from stopgo.mission.mavlink.recognise import recognise, stop_of_trigger, stops_of
+from stopgo.mission.mavlink.recognise import recognise, stops_of
 from stopgo.mission.mavlink.recognised_tour import RecognisedTour, recognised_tour
 from stopgo.mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import NAMES, corner_tour, read_back
@@ -92,9 +92,6 @@ def test_items_are_given_to_the_missions_stops_by_number():
     )  # fmt: skip
     sent = translate(mission)
     assert stops_of(sent.items, mission) == (None, *["S7"] * 4, *["S12"] * 5, None)
-    triggers = [one.item for one in sent.placed if one.role == "trigger"]
-    assert [stop_of_trigger(item, mission) for item in triggers] == ["S7", "S12"]
-    assert stop_of_trigger(replace(triggers[0], params=(100.0, 8.0, 0.0, 0.0)), mission) is None
 
 
 @pytest.mark.parametrize("name", NAMES)
