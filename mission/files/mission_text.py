@@ -8,27 +8,19 @@ from typing import Any
 import msgspec
 
 from stopgo.mission.console.table import duration, printable, table
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission
 from stopgo.mission.document.limits import limits_in_words
 from stopgo.mission.document.schedule import Schedule
+from stopgo.mission.document.stop_list import COLUMNS, stop_list
 from stopgo.mission.geometry import frozen, polyline_length
 
 
 def mission_report(mission: Mission, times: Schedule) -> dict[str, Any]:
     """Return the output of `show` for a program."""
-    stops = [
-        {
-            **{"number": number, "id": stop.id, "x": stop.x, "y": stop.y},
-            **{"heading_deg": math.degrees(stop.heading), "doorway": stop.doorway},
-            **{"approach_m": _length(stop.approach), "units": stop.sees.units},
-            **{"new_units": stop.sees.new_units, "arrival_s": float(arrival)},
-        }
-        for number, (stop, arrival) in enumerate(zip(mission.stops, times.arrival_s, strict=True), 1)
-    ]
     return {
         **{"id": mission.id, "revision": mission.revision, "digest": mission.digest, "name": mission.name},
         **{"floor": mission.origin.floor, "robot": mission.robot, "scanner": mission.scanner},
-        **{"start": mission.start, "stops": stops},
+        **{"start": mission.start, "stops": [stop.as_json() for stop in stop_list(mission, times)]},
         **{"route": {"length_m": route_length(mission), "returns": mission.return_ is not None}},
         "schedule": {
             **{"drive_s": times.drive_s, "turn_s": times.turn_s, "settle_s": times.settle_s},
@@ -39,12 +31,8 @@ def mission_report(mission: Mission, times: Schedule) -> dict[str, Any]:
 
 def mission_text(mission: Mission, times: Schedule) -> str:
     """Return the mission as text: its head, the table of stops, and the totals."""
-    header = ("no", "stop", "x m", "y m", "heading °", "doorway", "approach m", "units", "new", "arrives")
-    rows = [
-        _row(number, stop, arrival)
-        for number, (stop, arrival) in enumerate(zip(mission.stops, times.arrival_s, strict=True), 1)
-    ]
-    return "\n\n".join((_head(mission), table(header, rows), _totals(mission, times)))
+    stops = table(COLUMNS, [list(stop.cells.values()) for stop in stop_list(mission, times)])
+    return "\n\n".join((_head(mission), stops, _totals(mission, times)))
 
 
 def _head(mission: Mission) -> str:
@@ -65,14 +53,6 @@ def _head(mission: Mission) -> str:
 
 def identity(mission: Mission) -> str:
     return f"id {mission.id} revision {mission.revision}"
-
-
-def _row(number: int, stop: Stop, arrival: float) -> tuple[str, ...]:
-    return (
-        *(str(number), stop.id, f"{stop.x:.3f}", f"{stop.y:.3f}", f"{math.degrees(stop.heading):.1f}"),
-        *("yes" if stop.doorway else "", f"{_length(stop.approach):.2f}"),
-        *(str(stop.sees.units), str(stop.sees.new_units), duration(arrival)),
-    )
 
 
 def _totals(mission: Mission, times: Schedule) -> str:

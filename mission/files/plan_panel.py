@@ -13,6 +13,7 @@ from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission
 from stopgo.mission.document.limits import limits_in_words
 from stopgo.mission.document.schedule import schedule
+from stopgo.mission.document.stop_list import stop_list
 from stopgo.mission.files import floor_drawing as floor_look
 from stopgo.mission.files import route_drawing as route_look
 from stopgo.mission.files.shared_drawing import back, letter, line_of
@@ -20,7 +21,7 @@ from stopgo.mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, Pap
 from stopgo.mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
 from stopgo.mission.geometry import polyline_length
 from stopgo.mission.stages import Route, Selection
-from stopgo.mission.stages.figures import Figures, Share, percent
+from stopgo.mission.stages.figures import Figures, Share
 from stopgo.mission.stages.network import network_of
 
 BODY = 2.5
@@ -284,7 +285,8 @@ class Row:
 
 STOP_EDGES = (8.0, 25.0, 42.0, 58.0, 70.0, 81.0, 98.0)
 SHARE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
-STOP_HEAD = Row(("no", "x m", "y m", "heading °", "units", "new", "time"), STOP_EDGES, bold=True)
+STOP_COLUMNS = ("x m", "y m", "heading °", "units", "new", "arrives")
+STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 
 SHARE_HEAD = Row(("coverage", "all", "visible", "seen", "seen %"), SHARE_EDGES, bold=True, to_left=True)
 
@@ -301,14 +303,9 @@ def shared_rows(missions: Sequence[Mission]) -> list[Row]:
 
 def stop_rows(mission: Mission, *, before: str = "") -> list[Row]:
     """A row per stop, as the robot meets them; a doorway stop has a `d` after its number."""
-    arrivals = schedule(mission).arrival_s.tolist()
     cells: list[tuple[str, ...]] = [
-        (
-            *(f"{before}{number}{'d' if stop.doorway else ''}", f"{stop.x:.3f}", f"{stop.y:.3f}"),
-            *(f"{math.degrees(stop.heading):.1f}", str(stop.sees.units), str(stop.sees.new_units)),
-            duration(arrival),
-        )
-        for number, (stop, arrival) in enumerate(zip(mission.stops, arrivals, strict=True), 1)
+        (f"{before}{row['no']}{row['doorway'] and 'd'}", *(row[name] for name in STOP_COLUMNS))
+        for row in (stop.cells for stop in stop_list(mission))
     ]
     more = len(cells) - MOST_ROWS
     if more > 0:
@@ -325,7 +322,7 @@ def figure_rows(figures: Figures) -> list[Row]:
     ]
     if figures.unreached:
         rows.append(_words("not reached", bold=True))
-        rows += [_words(f"{item.room} ({item.area_m2:.1f} m²): {item.why}") for item in figures.unreached]
+        rows += [_words(item.text) for item in figures.unreached]
     if figures.grave:
         rows.append(_words("to be checked before driving", bold=True))
         rows += [_words(item.message) for item in figures.grave]
@@ -333,8 +330,7 @@ def figure_rows(figures: Figures) -> list[Row]:
 
 
 def _share_row(share: Share) -> Row:
-    numbers = (f"{share.total:.1f}", f"{share.visible:.1f}", f"{share.seen:.1f}", percent(share.coverage))
-    return Row((shortened(share.name, size=BODY, width=42), *numbers), SHARE_EDGES, to_left=True)
+    return Row((shortened(share.name, size=BODY, width=42), *share.cells), SHARE_EDGES, to_left=True)
 
 
 def _words(content: str, *, bold: bool = False) -> Row:

@@ -13,9 +13,8 @@ from itertools import product
 
 import numpy as np
 
-from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission
-from stopgo.mission.document.schedule import schedule
+from stopgo.mission.document.stop_list import stop_list
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import outline
 from stopgo.mission.files.pdf import PdfPage, pdf_of
@@ -26,7 +25,7 @@ from stopgo.mission.files.svg import group, line, rect, shortened, text
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages import Route
-from stopgo.mission.stages.figures import Figures, percent
+from stopgo.mission.stages.figures import Figures
 
 READABLE = 100
 """Scale 1:N at which stops and walls are distinct; a floor on one such sheet needs no further ones."""
@@ -236,28 +235,18 @@ ListLine = tuple[tuple[float, str, bool], ...]
 
 
 def _stop_lines(mission: Mission, floor: FloorPlan, tiles: Sequence[Tile]) -> Iterator[ListLine]:
-    arrivals = schedule(mission).arrival_s.tolist()
-    rooms = rooms_of(mission, floor)
-    begins = [begin for _, begin in COLUMNS]
-    for number, (stop, room, arrival) in enumerate(zip(mission.stops, rooms, arrivals, strict=True), 1):
-        sheet = next((tile.name for tile in tiles if tile.holds(stop.x, stop.y)), "1")
-        cells = (
-            *(
-                "☐",
-                str(number),
-                shortened(stop.id, size=LIST_SIZE, width=18),
-                shortened(room, size=LIST_SIZE, width=48),
-            ),
-            *(
-                f"{stop.x:.3f}",
-                f"{stop.y:.3f}",
-                f"{math.degrees(stop.heading):.1f}",
-                duration(arrival),
-                sheet,
-            ),
-            "doorway" if stop.doorway else "",
-        )
-        yield tuple((begin, cell, False) for begin, cell in zip(begins, cells, strict=True))
+    for listed, room in zip(stop_list(mission), rooms_of(mission, floor), strict=True):
+        stop, row = listed.stop, listed.cells
+        cells = {
+            **row,
+            "": "☐",
+            "stop": shortened(stop.id, size=LIST_SIZE, width=18),
+            "room": shortened(room, size=LIST_SIZE, width=48),
+            "at": row["arrives"],
+            "sheet": next((tile.name for tile in tiles if tile.holds(stop.x, stop.y)), "1"),
+            "note": "doorway" if stop.doorway else "",
+        }
+        yield tuple((begin, cells[name], False) for name, begin in COLUMNS)
 
 
 def rooms_of(mission: Mission, floor: FloorPlan) -> list[str]:
@@ -282,14 +271,10 @@ FIGURE_COLUMNS = (("", 0.0), ("all", 90.0), ("visible", 112.0), ("seen", 134.0),
 def _figure_lines(figures: Figures) -> Iterator[ListLine]:
     begins = [begin for _, begin in FIGURE_COLUMNS]
     for share in (figures.whole, *figures.kinds, *figures.rooms):
-        numbers = (f"{share.total:.1f}", f"{share.visible:.1f}", f"{share.seen:.1f}", percent(share.coverage))
-        cells = (shortened(share.name, size=LIST_SIZE, width=86), *numbers)
+        cells = (shortened(share.name, size=LIST_SIZE, width=86), *share.cells)
         yield tuple((begin, cell, share is figures.whole) for begin, cell in zip(begins, cells, strict=True))
     parts = (
-        (
-            "Rooms left out",
-            [f"{item.room} ({item.area_m2:.1f} m²): {item.why}" for item in figures.unreached],
-        ),
+        ("Rooms left out", [item.text for item in figures.unreached]),
         ("To be checked before driving", [item.message for item in figures.grave]),
         ("Notes", [item.message for item in figures.findings if item not in figures.grave]),
     )

@@ -459,6 +459,11 @@ class Unreached:
     why: str
     area_m2: float
 
+    @property
+    def text(self) -> str:
+        """The room, its area and the reason in one line."""
+        return f"{self.room} ({self.area_m2:.1f} m²): {self.why}"
+
 
 __all__ = [
     "AT_EDGE",

@@ -41,6 +41,11 @@ class Share:
         return self.visible / self.total if self.total else 0.0
 
     @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Total, visible and seen part, and the coverage, as tables print them."""
+        return f"{self.total:.1f}", f"{self.visible:.1f}", f"{self.seen:.1f}", percent(self.coverage)
+
+    @property
     def met(self) -> bool:
         """True if the required fraction is seen; rounding alone never decides."""
         return self.required is None or self.seen >= (self.required - 1e-9) * self.visible

@@ -138,10 +138,7 @@ class PlanReport:
             *network_lines(self.network),
             *coverage_lines(figures),
         ]
-        lines += [
-            f"  unreached   {printable(u.room)} ({u.area_m2:.1f} m²): {printable(u.why)}"
-            for u in figures.unreached
-        ]
+        lines += [f"  unreached   {printable(room.text)}" for room in figures.unreached]
         lines += finding_lines(figures.findings)
         lines += [f"  too near    {printable(item.message)}" for item in self.too_near]
         return "\n".join([*lines, *self._file_lines()])

@@ -9,9 +9,10 @@ import msgspec
 from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import Schedule
+from stopgo.mission.document.stop_list import stop_list
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
-from stopgo.mission.stages.figures import Figures, percent
+from stopgo.mission.stages.figures import Figures
 from stopgo.recordings.drawing.canvas import LocalOrigin
 
 StageResults = dict[type, Any]
@@ -168,11 +169,9 @@ def _stop_table(mission: Mission | None) -> list[str]:
     if mission is None or not mission.stops:
         return []
     lines = ["## Stops", "", "| stop | x m | y m | units seen | new |", "|---|---|---|---|---|"]
-    for stop in mission.stops:
-        lines.append(
-            f"| {stop.id} | {stop.x:.3f} | {stop.y:.3f} | {stop.sees.units} | {stop.sees.new_units} |"
-        )
-    return [*lines, ""]
+    names = ("stop", "x m", "y m", "units", "new")
+    rows = (stop.cells for stop in stop_list(mission))
+    return [*lines, *(f"| {' | '.join(row[name] for name in names)} |" for row in rows), ""]
 
 
 def _coverage_table(figures: Figures | None) -> list[str]:
@@ -182,16 +181,13 @@ def _coverage_table(figures: Figures | None) -> list[str]:
     unit = figures.unit
     lines = ["## Coverage", "", f"| | all, {unit} | visible | seen | share |", "|---|---|---|---|---|"]
     for share in (figures.whole, *figures.kinds, *figures.rooms):
-        numbers = f"{share.total:.1f} | {share.visible:.1f} | {share.seen:.1f} | {percent(share.coverage)}"
-        lines.append(f"| {plain(share.name)} | {numbers} |")
+        lines.append(f"| {' | '.join((plain(share.name), *share.cells))} |")
     if figures.quality is not None:
         lines += ["", f"{figures.quality.text(unit)}:", ""]
         lines += [f"- {item.words}: {item.text}" for item in figures.quality.costs]
     if figures.unreached:
         lines += ["", "Not reached:", ""]
-        lines += [
-            f"- {plain(item.room)} ({item.area_m2:.1f} m²): {plain(item.why)}" for item in figures.unreached
-        ]
+        lines += [f"- {plain(item.text)}" for item in figures.unreached]
     return [*lines, ""]
 
 
