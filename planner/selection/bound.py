@@ -9,8 +9,8 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
 
-LARGEST = 150_000
-"""Entries of the covering matrix above which the relaxation is not solved: it would take seconds."""
+LARGEST = 400_000
+"""Entries of the covering matrix above which the relaxation is not solved: it takes 1 s at this size."""
 STEPS = 1000
 """Most steps of the multiplier bound; a count, so that no bound depends on speed."""
 WORK = 200_000_000
