@@ -36,32 +36,52 @@ StepOption = Annotated[
         "--angular-step",
         min=0.005,
         max=2.0,
+        rich_help_panel="Simulation",
         help="Angle between neighbouring rays, degrees.",
         show_default="the scanner's, else 0.1",
     ),
 ]
-NoiseOption = Annotated[float, typer.Option(min=0.0, max=100.0, help="Of a distance, mm rms.")]
+NoiseOption = Annotated[
+    float, typer.Option(min=0.0, max=100.0, rich_help_panel="Simulation", help="Of a distance, mm rms.")
+]
 HeightOption = Annotated[
     float | None,
     typer.Option(
         "--scanner-height",
         min=0.1,
         max=10.0,
+        rich_help_panel="Simulation",
         help="Height of the scanner above the floor, m.",
         show_default="the scanner's, else 1.3",
     ),
 ]
 CeilingOption = Annotated[
     float | None,
-    typer.Option(min=0.5, max=50.0, help="Height of the walls, m.", show_default="the model's, else 2.7"),
+    typer.Option(
+        min=0.5,
+        max=50.0,
+        rich_help_panel="Simulation",
+        help="Height of the walls, m.",
+        show_default="the model's, else 2.7",
+    ),
 ]
 SlantOption = Annotated[
-    bool, typer.Option("--slant", help="The range counts along the rays, not along the floor.")
+    bool,
+    typer.Option(
+        "--slant", rich_help_panel="Simulation", help="The range counts along the rays, not along the floor."
+    ),
 ]
 WithoutPosesOption = Annotated[
-    bool, typer.Option("--without-poses", help="Register without the robot's poses to start from.")
+    bool,
+    typer.Option(
+        "--without-poses",
+        rich_help_panel="Simulation",
+        help="Register without the robot's poses to start from.",
+    ),
 ]
-SeedOption = Annotated[int, typer.Option(min=0, help="Of noise and pose errors.")]
+SeedOption = Annotated[
+    int, typer.Option(min=0, rich_help_panel="Simulation", help="Of noise and pose errors.")
+]
 ProofStrictOption = Annotated[bool, typer.Option(help="Exit 1 also if the scans are not all connected.")]
 
 

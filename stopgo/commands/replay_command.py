@@ -32,21 +32,48 @@ ReplayLogs = Annotated[
 ReplayMission = Annotated[
     Path | None, typer.Option(help="Planned mission; without it the MAVLink mission in the log.")
 ]
-ReplayOut = Annotated[Path | None, typer.Option("-o", "--out", help="Recording to write (.rrd).")]
+ReplayOut = Annotated[
+    Path | None, typer.Option("-o", "--out", rich_help_panel="Output", help="Recording to write (.rrd).")
+]
 ReplayList = Annotated[bool, typer.Option("--list", help="Only list the content of each log.")]
 ReplayMap = Annotated[
-    str | None, typer.Option("--map", help="X,Y,HEADING (m, degrees) of the site in the log's frame.")
+    str | None,
+    typer.Option(
+        "--map",
+        rich_help_panel="Position of the log",
+        help="X,Y,HEADING (m, degrees) of the site in the log's frame.",
+    ),
 ]
 ReplayAlign = Annotated[
-    str | None, typer.Option(help="first: the log begins at the start; stops: fit standstills to stops.")
+    str | None,
+    typer.Option(
+        rich_help_panel="Position of the log",
+        help="first: the log begins at the start; stops: fit standstills to stops.",
+    ),
 ]
-ReplayTimeOffset = Annotated[float, typer.Option(help="Seconds to add to the log's times.")]
-ReplayPoses = Annotated[str | None, typer.Option(help="Source of the poses, as --list names it.")]
-ReplayRobot = Annotated[str | None, typer.Option(help="Robot to replay, where a log has several.")]
+ReplayTimeOffset = Annotated[
+    float, typer.Option(rich_help_panel="Position of the log", help="Seconds to add to the log's times.")
+]
+ReplayPoses = Annotated[
+    str | None,
+    typer.Option(rich_help_panel="Poses in the log", help="Source of the poses, as --list names it."),
+]
+ReplayRobot = Annotated[
+    str | None,
+    typer.Option(rich_help_panel="Poses in the log", help="Robot to replay, where a log has several."),
+]
 ReplayStamps = Annotated[
-    str, typer.Option(help="header: time stamps in the messages; log: times of logging.")
+    str,
+    typer.Option(
+        rich_help_panel="Poses in the log", help="header: time stamps in the messages; log: times of logging."
+    ),
 ]
-ReplayFrame = Annotated[str | None, typer.Option(help="Take the poses in this frame from transforms (tf).")]
+ReplayFrame = Annotated[
+    str | None,
+    typer.Option(
+        rich_help_panel="Poses in the log", help="Take the poses in this frame from transforms (tf)."
+    ),
+]
 ReplayFloor = Annotated[
     Path | None, typer.Option(help="Floor file of the plan; reports what the robot saw of it.")
 ]
@@ -54,16 +81,25 @@ ReplayClouds = Annotated[
     Path | None, typer.Option(help="With --floor: folder of clouds (.e57 .las .laz .ply) in its metres.")
 ]
 ReplayTopUp = Annotated[
-    Path | None, typer.Option(help="With --floor: follow-up mission to write that covers the rest (.json).")
+    Path | None,
+    typer.Option(
+        rich_help_panel="Output",
+        help="With --floor: follow-up mission to write that covers the rest (.json).",
+    ),
 ]
-ReplayCsv = Annotated[Path | None, typer.Option(help="Table of stops to write (.csv).")]
+ReplayCsv = Annotated[
+    Path | None, typer.Option(rich_help_panel="Output", help="Table of stops to write (.csv).")
+]
 ReplayHtml = Annotated[
-    Path | None, typer.Option(metavar="REPORT.html", help="Report to write, as one HTML file.")
+    Path | None,
+    typer.Option(metavar="REPORT.html", rich_help_panel="Output", help="Report to write, as one HTML file."),
 ]
 ReplayPlan = Annotated[
     Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording: its floor, for the report.")
 ]
-ReplayAsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
+ReplayAsJson = Annotated[
+    bool, typer.Option("--json", rich_help_panel="Output", help="One JSON object on stdout.")
+]
 
 
 def add_commands(app: typer.Typer) -> None:
