@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.commands.align_command import align
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.atomic import must_not_replace, write_checked
@@ -121,9 +121,8 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
     try:
         from stopgo.planner.checking.verdict import verdict
 
-        if sys.stderr.isatty():
-            typer.echo(f"checking the mission against {floor} …", err=True)
-        found = verdict(mission, floor, claims)
+        with running(f"checking the mission against {floor}"):
+            found = verdict(mission, floor, claims)
     except ModuleNotFoundError as error:
         if not _is_library(error):
             raise

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from stopgo.commands.result_files import JsonOption, report_missing_rerun, result_folder
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable
 from stopgo.mission.files.atomic import must_be_writable, replacing
 
@@ -124,7 +124,9 @@ def prove_command(
     given = {"step_deg": step, "height_m": height, "ceiling_m": ceiling}
     assumed |= {key: value for key, value in given.items() if value is not None}
     proof, on_floor = _simulated(mission, floor, coverage, assumed)
-    _print_proof(proof, _write_proof(proof, on_floor, files), as_json=as_json)
+    with running("writing the proof"):
+        written = _write_proof(proof, on_floor, files)
+    _print_proof(proof, written, as_json=as_json)
     return 0 if proof.met and (proof.network.closed or not strict) else 1
 
 
@@ -135,17 +137,11 @@ def _simulated(
     from stopgo.planner.scan_simulation.verification_files import verify_file
 
     warnings: list[str] = []
-    proof, planned = verify_file(mission, floor, coverage, assumed, say=_show_progress, warn=warnings.append)
-    _show_progress("")
+    with running(f"reading {floor}") as step:
+        proof, planned = verify_file(mission, floor, coverage, assumed, say=step.begin, warn=warnings.append)
     for warning in warnings:
         typer.echo(f"stopgo: {printable(warning)}", err=True)
     return proof, planned.floor
-
-
-def _show_progress(line: str) -> None:
-    """Replace the progress line on a terminal's stderr."""
-    if sys.stderr.isatty():
-        typer.echo(f"\r\033[K{line}", err=True, nl=False)
 
 
 def _write_proof(proof: PlanProof, floor: FloorPlan, files: dict[str, Path]) -> dict[str, Path]:
