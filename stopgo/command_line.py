@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from stopgo.mission.console.json_answer import answering
 from stopgo.mission.console.notice import notice
+from stopgo.mission.console.plain_output import have_plain_output
 from stopgo.mission.console.process import PIPE_CLOSED, Signals, drop_output, have_output, output_is_closed
 from stopgo.mission.errors import InputError, MissingExtra, StopgoError
 from stopgo.renamed_options import with_new_names
@@ -63,6 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     if arguments is not None:
         return _with_signals(arguments, whole_process=False)
     have_output()
+    have_plain_output(as_json="--json" in sys.argv)
     code = _with_signals(sys.argv[1:], whole_process=True)
     try:
         sys.stdout.flush()
