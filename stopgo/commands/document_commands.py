@@ -190,7 +190,8 @@ ScanWaitOption = Annotated[
     str | None, typer.Option(metavar="delay|script_time", help="How the vehicle waits for a scan.")
 ]
 SettleOption = Annotated[
-    str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
+    str | None,
+    typer.Option("--settle-item", metavar="delay|hold", help="Settle in an item of its own, or as a hold."),
 ]
 MapOption = Annotated[
     str | None,
