@@ -64,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     if arguments is not None:
         return _with_signals(arguments, whole_process=False)
     have_output()
-    have_plain_output(as_json="--json" in sys.argv)
+    have_plain_output(escaped=not {"--json", "--print-config"}.isdisjoint(sys.argv))
     code = _with_signals(sys.argv[1:], whole_process=True)
     try:
         sys.stdout.flush()

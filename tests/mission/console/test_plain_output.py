@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -24,20 +25,20 @@ from stopgo.mission.console.plain_output import PlainOutput, plain
     ],
 )
 def test_a_character_that_is_lacking_has_a_plain_one(text: str, encoding: str, shown: str) -> None:
-    assert plain(text, encoding, as_json=False) == shown
+    assert plain(text, encoding, escaped=False) == shown
 
 
 def test_json_stays_the_same_document() -> None:
     document = {"name": "Größe 屋 😀", "path": "a\\b"}
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding="ascii")
-    PlainOutput(stream, as_json=True).write(json.dumps(document, ensure_ascii=False))
+    PlainOutput(stream, escaped=True).write(json.dumps(document, ensure_ascii=False))
     stream.flush()
     assert json.loads(raw.getvalue()) == document
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
-@pytest.mark.parametrize("arguments", [("conform", "station", "--help"), ("plan", "--print-config"), ()])
+@pytest.mark.parametrize("arguments", [("conform", "station", "--help"), ()])
 def test_a_command_prints_in_any_encoding(encoding: str, arguments: tuple[str, ...]) -> None:
     """Its bytes are of the encoding, and its lines are those of UTF-8."""
 
@@ -48,7 +49,15 @@ def test_a_command_prints_in_any_encoding(encoding: str, arguments: tuple[str, .
         assert done.stderr == b""
         return done.stdout.decode(encoding)
 
-    assert printed(encoding) == plain(printed("utf-8"), encoding, as_json=False)
+    assert printed(encoding) == plain(printed("utf-8"), encoding, escaped=False)
+
+
+def test_a_printed_configuration_can_be_read_again() -> None:
+    """A shell redirects it to plan.toml, which is read as UTF-8."""
+    environment = os.environ | {"PYTHONIOENCODING": "cp1252"}
+    command = [sys.executable, "-m", "stopgo", "plan", "--print-config", "--storey", "Größe"]
+    done = subprocess.run(command, capture_output=True, env=environment, check=True, timeout=120)
+    assert tomllib.loads(done.stdout.decode("utf-8"))["floor"]["storey"] == "Größe"
 
 
 def test_an_error_prints_in_any_encoding() -> None:
