@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from copy import copy
 from difflib import get_close_matches
+from inspect import cleandoc
 from typing import Any
 
 import typer
@@ -22,7 +23,22 @@ NARROW = 70
 OptionGroup = tuple[str, list[TyperOption]]
 
 
-class GroupedCommand(TyperCommand):
+class UnbrokenText:
+    """Help text whose words are not broken at hyphens: a person copies options and paths from it."""
+
+    help: str | None
+    epilog: str | None
+
+    def format_help_text(self, ctx: Any, formatter: Any) -> None:
+        """Write what the command does."""
+        _write_paragraphs(self.help, formatter)
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Write the example."""
+        _write_paragraphs(self.epilog, formatter)
+
+
+class GroupedCommand(UnbrokenText, TyperCommand):
     """A command whose help shows its options in groups; `--help-all` describes every option."""
 
     _help_all: Any = None
@@ -54,7 +70,7 @@ class GroupedCommand(TyperCommand):
                     _write_names(title, options, formatter)
 
 
-class GroupedCommands(TyperGroup):
+class GroupedCommands(UnbrokenText, TyperGroup):
     """A command with subcommands, whose help shows the first sentence of each."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -115,6 +131,16 @@ def _write_records(title: str, params: list[Any], ctx: Any, formatter: Any) -> N
     if records:
         with formatter.section(title):
             formatter.write_dl(records, col_max=30 if formatter.width >= NARROW - 2 else 20)
+
+
+def _write_paragraphs(text: str | None, formatter: Any) -> None:
+    for paragraph in cleandoc(text or "").split("\n\n"):
+        if paragraph:
+            filled = textwrap.fill(
+                " ".join(paragraph.split()), formatter.width, initial_indent="  ", subsequent_indent="  ",
+                break_on_hyphens=False, break_long_words=False,
+            )  # fmt: skip
+            formatter.write(f"\n{filled}\n")
 
 
 def _write_names(title: str, options: list[TyperOption], formatter: Any) -> None:

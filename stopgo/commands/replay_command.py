@@ -40,13 +40,15 @@ ReplayMap = Annotated[
     str | None,
     typer.Option(
         "--map",
+        metavar="X,Y,HEADING",
         rich_help_panel="Position of the log",
-        help="X,Y,HEADING (m, degrees) of the site in the log's frame.",
+        help="Pose of the site in the log's frame, m and degrees.",
     ),
 ]
 ReplayAlign = Annotated[
     str | None,
     typer.Option(
+        metavar="first|stops",
         rich_help_panel="Position of the log",
         help="first: the log begins at the start; stops: fit standstills to stops.",
     ),
@@ -65,7 +67,9 @@ ReplayRobot = Annotated[
 ReplayStamps = Annotated[
     str,
     typer.Option(
-        rich_help_panel="Poses in the log", help="header: time stamps in the messages; log: times of logging."
+        metavar="header|log",
+        rich_help_panel="Poses in the log",
+        help="header: time stamps in the messages; log: times of logging.",
     ),
 ]
 ReplayFrame = Annotated[
