@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from stopgo.mission.settings.parameter import FIRST, GROUPS
+from stopgo.renamed_options import RENAMED, NewName
 from stopgo.root_help import root_help
 
 LONGEST = 30
@@ -174,6 +175,9 @@ def wrong_option(name: str, context: Any, every: TyperGroup) -> str:
 
 
 def _near_elsewhere(line: str, name: str, every: TyperGroup) -> str:
+    for word, olds in RENAMED.items():
+        if isinstance(new := olds.get(name), NewName):
+            return f"{line}; it is now {new.option} of stopgo {word}"
     elsewhere = {
         option: path for path, options in reversed([*_options_of(every, "stopgo")]) for option in options
     }

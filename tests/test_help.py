@@ -101,6 +101,10 @@ def test_plan_shows_twelve_options_first_and_the_papers_last(
         (("watch", "--stop", "s1"), "it belongs to stopgo skip, stopgo retry"),
         (("status", "--coverag", "1"), "the nearest is --coverage of stopgo plan"),
         (("keys", "issue", "--dayz", "3"), "stopgo keys issue has no option --dayz; the nearest is --days"),
+        (
+            ("check", "--d-sec", "1"),
+            "stopgo check has no option --d-sec; it is now --clearance of stopgo plan",
+        ),
         (("keys", "isue"), "No such command 'isue'. Did you mean 'issue'?"),
         (("--vresion",), "stopgo has no option --vresion; the nearest is --version"),
         (("status", "--qqqq"), "stopgo status has no option --qqqq (see --help)"),
