@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from stopgo.mission.console.json_answer import answering
 from stopgo.mission.console.notice import notice
+from stopgo.mission.console.plain_output import have_plain_output
 from stopgo.mission.console.process import PIPE_CLOSED, Signals, drop_output, have_output, output_is_closed
 from stopgo.mission.errors import InputError, MissingExtra, StopgoError
 from stopgo.renamed_options import with_new_names
+from stopgo.root_help import must_be_command, root_help
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,6 +42,7 @@ COMMANDS = {
 `add_commands(app)` and imports slow libraries where used. A word loads its own module only."""
 
 INTERRUPTED = 130
+HELP = (["--help"], ["-h"], ["--help-all"])
 COMPLETING = "_STOPGO_COMPLETE"
 """Set by the shell's completion that `--install-completion` sets up."""
 
@@ -61,6 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     if arguments is not None:
         return _with_signals(arguments, whole_process=False)
     have_output()
+    have_plain_output(escaped=not {"--json", "--print-config"}.isdisjoint(sys.argv))
     code = _with_signals(sys.argv[1:], whole_process=True)
     try:
         sys.stdout.flush()
@@ -92,9 +96,11 @@ def build_app(verb: str = "") -> typer.Typer:
 
     import typer
 
+    from stopgo.option_help import GroupedCommand, GroupedCommands, RootCommand
+
     app = typer.Typer(
         name="stopgo",
-        help="Plan where a laser scanner must stand, and drive a robot through those stops.",
+        cls=RootCommand,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
         context_settings={"help_option_names": ["-h", "--help"]},
@@ -112,6 +118,11 @@ def build_app(verb: str = "") -> typer.Typer:
 
     for name in [name for name, words in COMMANDS.items() if verb in words] or COMMANDS:
         import_module(f"stopgo.commands.{name}").add_commands(app)
+    for group in app.registered_groups:
+        group.cls = GroupedCommands
+    groups = [group.typer_instance for group in app.registered_groups if group.typer_instance is not None]
+    for made in [made for holder in (app, *groups) for made in holder.registered_commands]:
+        made.cls = GroupedCommand
     return app
 
 
@@ -146,8 +157,12 @@ def _run(arguments: list[str]) -> int:
         notice(line)
     if COMPLETING in os.environ:  # a shell asks what the words typed so far may become
         front_door().main(list(arguments), prog_name="stopgo")
-    command = front_door(arguments[0] if arguments else "")
-    with command.make_context("stopgo", list(arguments) or ["--help"]) as context:
+    if arguments in ([], *HELP):
+        print(root_help())  # noqa: T201
+        return 0
+    must_be_command(arguments[0], sum(COMMANDS.values(), ()))
+    command = front_door(arguments[0])
+    with command.make_context("stopgo", list(arguments)) as context:
         result = command.invoke(context)
     return result if isinstance(result, int) else 0
 
@@ -199,7 +214,12 @@ def _raised_by_typer(error: BaseException) -> tuple[str, int]:
 
 def _misused(error: TyperException) -> str:
     """The usage error in words; after a group such as `stopgo keys`, with its subcommands."""
+    unknown = getattr(error, "option_name", "") if hasattr(error, "possibilities") else ""
     context = getattr(error, "ctx", None)
+    if unknown.startswith("--"):
+        from stopgo.option_help import wrong_option
+
+        return wrong_option(unknown, context, front_door())
     verbs = () if context is None or context.parent is None else getattr(context.command, "commands", ())
     known = f" {context.command_path} has: {', '.join(verbs)}" if context and verbs else ""
     return f"{error.format_message()}{known}"

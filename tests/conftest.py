@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import signal
 import tempfile
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from stopgo.mission.console import running_step
 from tests.alone import first_alone
 from tests.faults.sizes import FULL, size
 
@@ -31,9 +33,11 @@ def pytest_configure() -> None:
 
     A shell without job control starts background programs with SIGINT ignored, and children inherit that.
     What commands remember of robots and vehicles goes to a folder of the tests' own.
+    A command that takes long on a busy machine prints no further line for that.
     pymavlink asks this variable for its version, at its import and again later; the bridge sets it.
     """
     os.environ["MAVLINK20"] = "1"
+    running_step.PATIENCE_S = math.inf
     if "PYTEST_XDIST_WORKER" not in os.environ:  # workers have their parent's
         os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

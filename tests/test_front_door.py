@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import stopgo
-from stopgo.command_line import main
+from stopgo.command_line import front_door, main
 from stopgo.mission.errors import InputError
 from stopgo.mission.plan import Plan
-from stopgo.renamed_options import with_new_names
+from stopgo.renamed_options import RENAMED, NewName, with_new_names
 
 ROOT = Path(__file__).parents[1]
 OFFICE = ROOT / "recordings" / "samples" / "office.dxf"
@@ -101,3 +101,13 @@ def test_an_old_option_is_taken_with_a_line(given: tuple[str, ...], today: list[
     assert words == today
     assert [text for text in lines if line not in text] == []
     assert bool(lines) == bool(line)
+
+
+@pytest.mark.parametrize(("command", "old"), [(word, old) for word, olds in RENAMED.items() for old in olds])
+def test_a_command_has_the_new_option_and_not_the_old_one(command: str, old: str) -> None:
+    made = front_door().commands[command]
+    subcommands = getattr(made, "commands", {command: made}).values()
+    options = {name for item in subcommands for param in item.params for name in param.opts}
+    assert old not in options
+    new = RENAMED[command][old]
+    assert not isinstance(new, NewName) or new.option in options

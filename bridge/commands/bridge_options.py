@@ -8,31 +8,59 @@ from typing import Annotated
 import typer
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+CONNECTION, VEHICLE, SIMULATION = "Connection", "MAVLink vehicle", "Simulation"
+"""Groups of the options in the help."""
 
 # The connection to a robot or a vehicle
 
-RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
-AnyRobot = Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
-RobotOrAll = Annotated[
-    str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot; all if not given.")
+RobotName = Annotated[
+    str, typer.Option("--robot", metavar="NAME", rich_help_panel=CONNECTION, help="Name of the robot.")
 ]
-AllRobots = Annotated[bool, typer.Option("--all", help="All robots, even if one is preset.")]
+AnyRobot = Annotated[
+    str | None, typer.Option("--robot", metavar="NAME", rich_help_panel=CONNECTION, help="Name of the robot.")
+]
+RobotOrAll = Annotated[
+    str | None,
+    typer.Option(
+        "--robot", metavar="NAME", rich_help_panel=CONNECTION, help="Name of the robot; all if not given."
+    ),
+]
+AllRobots = Annotated[
+    bool, typer.Option("--all", rich_help_panel=CONNECTION, help="All robots, even if one is preset.")
+]
 Connect = Annotated[
     str,
     typer.Option(
         "--connect",
         metavar="ENDPOINT",
+        rich_help_panel=CONNECTION,
         help="Endpoint of the robot or router, as tcp/127.0.0.1:7447; several: A,B.",
     ),
 ]
 SiteName = Annotated[
-    str | None, typer.Option("--site", metavar="NAME", help="Key-expression prefix of the site.")
+    str | None,
+    typer.Option(
+        "--site", metavar="NAME", rich_help_panel=CONNECTION, help="Key-expression prefix of the site."
+    ),
 ]
 As = Annotated[
-    str | None, typer.Option("--as", metavar="WHO", help="Name of the operator; user@host if not given.")
+    str | None,
+    typer.Option(
+        "--as",
+        metavar="WHO",
+        rich_help_panel=CONNECTION,
+        help="Name of the operator; user@host if not given.",
+    ),
 ]
 Timeout = Annotated[
-    float, typer.Option("--timeout", min=0.1, metavar="S", help="Longest wait for an answer, in seconds.")
+    float,
+    typer.Option(
+        "--timeout",
+        min=0.1,
+        metavar="S",
+        rich_help_panel=CONNECTION,
+        help="Longest wait for an answer, in seconds.",
+    ),
 ]
 PushTimeout = Annotated[
     float | None,
@@ -40,47 +68,80 @@ PushTimeout = Annotated[
         "--timeout",
         min=0.1,
         metavar="S",
+        rich_help_panel=CONNECTION,
         help="Longest wait without an answer, in seconds; if not given, 5 to find the robot and 20 for each"
         " chunk.",
     ),
 ]
 Insecure = Annotated[
-    bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys or signing.")
+    bool,
+    typer.Option(
+        "--insecure",
+        rich_help_panel=CONNECTION,
+        help="Allow addresses beyond this machine without keys or signing.",
+    ),
 ]
 KeyFolder = Annotated[
-    Path | None, typer.Option("--keys", metavar="DIR", help="Folder of the keys that stopgo keys issued.")
+    Path | None,
+    typer.Option(
+        "--keys",
+        metavar="DIR",
+        rich_help_panel=CONNECTION,
+        help="Folder of the keys that stopgo keys issued.",
+    ),
 ]
 OtherKeyFolder = Annotated[
     Path | None,
     typer.Option(
-        "--other-keys", metavar="DIR", help="Keys of a second station, to test the commander's lease."
+        "--other-keys",
+        metavar="DIR",
+        rich_help_panel=CONNECTION,
+        help="Keys of a second station, to test the commander's lease.",
     ),
 ]
 MavlinkUrl = Annotated[
     str | None,
-    typer.Option("--mavlink", metavar="URL", help="A vehicle instead, such as udpout:127.0.0.1:14550."),
+    typer.Option(
+        "--mavlink",
+        metavar="URL",
+        rich_help_panel=VEHICLE,
+        help="A vehicle instead, such as udpout:127.0.0.1:14550.",
+    ),
 ]
 RequiredMavlinkUrl = Annotated[
     str,
     typer.Option(
-        "--mavlink", metavar="URL", help="A vehicle, such as tcp:127.0.0.1:5760 or serial:/dev/ttyUSB0:57600."
+        "--mavlink",
+        metavar="URL",
+        rich_help_panel=CONNECTION,
+        help="A vehicle, such as tcp:127.0.0.1:5760 or serial:/dev/ttyUSB0:57600.",
     ),
 ]
 VehicleId = Annotated[
     int | None,
-    typer.Option("--vehicle", metavar="ID", min=1, max=255, help="Its system id, if there are several."),
+    typer.Option(
+        "--vehicle",
+        metavar="ID",
+        min=1,
+        max=255,
+        rich_help_panel=VEHICLE,
+        help="Its system id, if there are several.",
+    ),
 ]
 SigningKey = Annotated[
     Path | None,
     typer.Option(
         "--signing-key",
         metavar="FILE",
+        rich_help_panel=VEHICLE,
         help="Sign MAVLink messages; FILE: 64 hex digits or a passphrase of at least 8 characters.",
     ),
 ]
 StateFolder = Annotated[
     Path | None,
-    typer.Option("--state", metavar="DIR", help="The station's state folder; one per vehicle."),
+    typer.Option(
+        "--state", metavar="DIR", rich_help_panel=VEHICLE, help="The station's state folder; one per vehicle."
+    ),
 ]
 
 # Output
@@ -95,11 +156,17 @@ StopId = Annotated[
 ]
 Again = Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")]
 FromHere = Annotated[bool, typer.Option("--from-here", help="Start at the nearest point of the route.")]
-Arm = Annotated[bool, typer.Option("--arm", help="Arm a vehicle that is disarmed.")]
-Disarm = Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle at standstill.")]
+Arm = Annotated[bool, typer.Option("--arm", rich_help_panel=VEHICLE, help="Arm a vehicle that is disarmed.")]
+Disarm = Annotated[
+    bool, typer.Option("--disarm", rich_help_panel=VEHICLE, help="Disarm a vehicle at standstill.")
+]
 AnyOrigin = Annotated[
     bool,
-    typer.Option("--skip-origin-check", help="Skip the origin check: the vehicle has satellite positions."),
+    typer.Option(
+        "--skip-origin-check",
+        rich_help_panel=VEHICLE,
+        help="Skip the origin check: the vehicle has satellite positions.",
+    ),
 ]
 Roster = Annotated[
     Path | None,
@@ -124,32 +191,49 @@ AutopilotKind = Annotated[
     typer.Option(
         "--autopilot",
         metavar="ardupilot|px4|generic",
+        rich_help_panel=VEHICLE,
         help="Kind of autopilot, if not that of its heartbeat.",
     ),
 ]
 ItemTrigger = Annotated[
     str | None,
-    typer.Option("--trigger", metavar="auto|script|camera|none", help="Item that makes the vehicle scan."),
+    typer.Option(
+        "--trigger",
+        metavar="auto|script|camera|none",
+        rich_help_panel=VEHICLE,
+        help="Item that makes the vehicle scan.",
+    ),
 ]
 ScanWaiting = Annotated[
     str | None,
     typer.Option(
-        "--scan-wait", metavar="delay|script_time", help="Wait the planned time, or until a script reports."
+        "--scan-wait",
+        metavar="delay|script_time",
+        rich_help_panel=VEHICLE,
+        help="Wait the planned time, or until a script reports.",
     ),
 ]
 Settling = Annotated[
     str | None,
     typer.Option(
-        "--settle-item", metavar="delay|hold", help="Settle in a delay item, or as the hold of a waypoint."
+        "--settle-item",
+        metavar="delay|hold",
+        rich_help_panel=VEHICLE,
+        help="Settle in a delay item, or as the hold of a waypoint.",
     ),
 ]
 SetOrigin = Annotated[
-    bool, typer.Option("--set-origin", help="Give a vehicle without an origin the mission's.")
+    bool,
+    typer.Option(
+        "--set-origin", rich_help_panel=VEHICLE, help="Give a vehicle without an origin the mission's."
+    ),
 ]
 WhileRunning = Annotated[
     bool,
     typer.Option(
-        "--while-running", help="Allow it while the vehicle follows its mission, or its run is not over."
+        "--while-running",
+        rich_help_panel=VEHICLE,
+        help="Allow it while the vehicle follows its mission, or its run is not over.",
     ),
 ]
 
@@ -199,35 +283,70 @@ ControllerKind = Annotated[
 ]
 SimulatedPose = Annotated[
     str | None,
-    typer.Option("--at", metavar="X,Y,HEADING", help="sim: initial pose; default: the mission's start."),
+    typer.Option(
+        "--at",
+        metavar="X,Y,HEADING",
+        rich_help_panel=SIMULATION,
+        help="sim: initial pose; default: the mission's start.",
+    ),
 ]
 SiteToMap = Annotated[
     str | None,
-    typer.Option("--map", metavar="X,Y,HEADING", help="sim: site to map; rotate by HEADING, then shift."),
+    typer.Option(
+        "--map",
+        metavar="X,Y,HEADING",
+        rich_help_panel=SIMULATION,
+        help="sim: site to map; rotate by HEADING, then shift.",
+    ),
 ]
 FaultsOfRobot = Annotated[
     list[str] | None,
-    typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="sim: fault to simulate, as slip@2=0.2."),
+    typer.Option(
+        "--fault",
+        metavar="KIND@N[=AMOUNT]",
+        rich_help_panel=SIMULATION,
+        help="sim: fault to simulate, as slip@2=0.2.",
+    ),
 ]
 SpeedUp = Annotated[
     float,
-    typer.Option("--speed-up", min=0.01, max=1000, help="Simulation: its time runs faster by this factor."),
+    typer.Option(
+        "--speed-up",
+        min=0.01,
+        max=1000,
+        rich_help_panel=SIMULATION,
+        help="Simulation: its time runs faster by this factor.",
+    ),
 ]
 BatteryLife = Annotated[
     str,
     typer.Option(
         "--battery-life",
         metavar="DURATION",
+        rich_help_panel=SIMULATION,
         help="sim: runtime per charge, such as 90min or 6h; 0: the battery does not run down.",
     ),
 ]
 AutopilotId = Annotated[
     int | None,
-    typer.Option("--vehicle", metavar="ID", help="mavlink: its system id, if there are several."),
+    typer.Option(
+        "--vehicle",
+        metavar="ID",
+        rich_help_panel=VEHICLE,
+        help="mavlink: its system id, if there are several.",
+    ),
 ]
-ArmInRun = Annotated[bool, typer.Option("--arm", help="mavlink: arm it when a run needs that.")]
+ArmInRun = Annotated[
+    bool, typer.Option("--arm", rich_help_panel=VEHICLE, help="mavlink: arm it when a run needs that.")
+]
 ScannerTrigger = Annotated[
-    str, typer.Option("--trigger", metavar="camera|script", help="mavlink: what triggers the scanner.")
+    str,
+    typer.Option(
+        "--trigger",
+        metavar="camera|script",
+        rich_help_panel=VEHICLE,
+        help="mavlink: what triggers the scanner.",
+    ),
 ]
 
 # A simulated vehicle

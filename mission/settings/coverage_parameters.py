@@ -13,7 +13,7 @@ LEAST_SHARE = 0.7
 OVERLAP_RANGE_M = 20.0
 """Scanners reach much farther than the range within which targets are seen well enough."""
 
-_plan = partial(Parameter, "plan")
+_plan = partial(Parameter, "plan", group="Quality")
 _share = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_SHARE:g}; none by units")
 _limit = partial(_plan, quiet=True)
 
@@ -30,7 +30,8 @@ class CoverageParameters:
         ),
     ] = "stops"
     coverage: Annotated[
-        float, _plan("Minimum fraction of all that is visible", above=0, most=1, why="0.9 is 90 %")
+        float,
+        _plan("Minimum fraction of all that is visible", first=True, above=0, most=1, why="0.9 is 90 %"),
     ] = 0.9
     room_coverage: Annotated[float | None, _share("Minimum fraction in each room")] = None
     kind_coverage: Annotated[float | None, _share("Minimum fraction of each kind of element")] = None
@@ -41,16 +42,19 @@ class CoverageParameters:
         ),
     ] = None
     max_incidence: Annotated[
-        float | None, _limit("Maximum angle from the surface normal", "degrees", above=0, below=90)
+        float | None,
+        _limit("Maximum angle from the surface normal", "degrees", group="Scanner", above=0, below=90),
     ] = None
     density: Annotated[
-        float | None, _limit("Maximum point spacing on a target, by angular_step", "mm", above=0)
+        float | None,
+        _limit("Maximum point spacing on a target, by angular_step", "mm", group="Scanner", above=0),
     ] = None
     wall_height: Annotated[
         float | None,
         _limit(
             "Height up to which these limits hold",
             "m",
+            group="Scanner",
             above=0,
             below=50,
             undecided="scanner_height only",
@@ -58,7 +62,10 @@ class CoverageParameters:
     ] = None
     coverage_rule: Annotated[
         Literal["length", "paper"],
-        _plan("Coverage by metres of each room and kind; or by units of the whole, as in the paper"),
+        _plan(
+            "Coverage by metres of each room and kind; or by units of the whole, as in the paper",
+            group="Paper",
+        ),
     ] = "length"
     overlap: Annotated[
         float | None,

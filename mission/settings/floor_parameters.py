@@ -9,14 +9,16 @@ from typing import Annotated, Literal
 from stopgo.mission.settings.layer_kinds import entries_in
 from stopgo.mission.settings.parameter import Parameter
 
-_floor = partial(Parameter, "floor")
+_floor = partial(Parameter, "floor", group="Floor")
 
 
 @dataclass(frozen=True, kw_only=True)
 class FloorParameters:
     """Table `floor` of plan.toml. What stands here makes a floor another floor."""
 
-    storey: Annotated[str | None, _floor("The model's storey, by name", undecided="its only one")] = None
+    storey: Annotated[
+        str | None, _floor("The model's storey, by name", first=True, undecided="its only one")
+    ] = None
     level: Annotated[float | None, _floor("Level of the floor in a model", "m", undecided="storey's")] = None
     scan_height: Annotated[
         float | None,

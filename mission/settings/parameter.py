@@ -10,6 +10,11 @@ from typing import Any, Literal, get_args, get_origin
 
 from stopgo.mission.errors import InputError
 
+FIRST = "Used first"
+"""The group of the options that people use first, whatever they concern."""
+GROUPS = ("Floor", "Scanner", "Robot", "Quality", "Route", "Fleet", "Output", "Paper")
+"""The other groups of options, in the order of the help: the parameters of the paper come last."""
+
 LARGEST = 1e6
 FARTHEST = 1e9
 """Coordinates of a site may be this large, in metres."""
@@ -45,6 +50,10 @@ class Parameter:
     """The table of plan.toml it stands in."""
     help: str
     unit: str = ""
+    group: str = ""
+    """The heading above its option in the help, one of GROUPS."""
+    first: bool = False
+    """True if people use it first: the help then shows it before the groups."""
     above: float | None = None
     least: float | None = None
     below: float | None = None
@@ -82,6 +91,11 @@ class Parameter:
     def key(self) -> str:
         """Its key in plan.toml."""
         return self.word or self.name
+
+    @property
+    def panel(self) -> str:
+        """The heading above its option in the help."""
+        return FIRST if self.first else self.group
 
     @property
     def flag(self) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from stopgo.mission.settings.parameter import Parameter
 
-_policy = partial(Parameter, "policy")
+_policy = partial(Parameter, "policy", group="Robot")
 
 
 @dataclass(frozen=True, kw_only=True)

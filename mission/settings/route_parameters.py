@@ -11,7 +11,7 @@ from stopgo.mission.settings.parameter import Parameter, seconds
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
-_plan = partial(Parameter, "plan")
+_plan = partial(Parameter, "plan", group="Route")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +27,7 @@ class RouteParameters:
         _plan(
             "Start pose of the robot; with robots, once for all or once for each",
             "m and degrees counter-clockwise from +x",
+            first=True,
             form="X,Y,HEADING",
             example="2.5,3.0,90",
             further="further_starts",
@@ -37,6 +38,7 @@ class RouteParameters:
         _plan(
             "Start poses of the second robot and those after it",
             "m and degrees",
+            group="Fleet",
             form="X,Y,HEADING",
             example="2.5,3.0,90",
             option="start",
@@ -47,6 +49,8 @@ class RouteParameters:
         int | None,
         _plan(
             "Number of robots that share the floor, a mission each",
+            group="Fleet",
+            first=True,
             least=1,
             most=50,
             undecided="1",
@@ -58,6 +62,7 @@ class RouteParameters:
         _plan(
             "Maximum duration of a tour until it is back at its start",
             "s",
+            group="Fleet",
             above=0,
             form="DURATION",
             example="1800, 30min or 1h30min",

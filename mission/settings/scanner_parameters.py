@@ -9,7 +9,7 @@ from typing import Annotated
 from stopgo.mission.settings.parameter import Parameter
 from stopgo.mission.settings.scanners import ScannerName
 
-_scanner = partial(Parameter, "scanner")
+_scanner = partial(Parameter, "scanner", group="Scanner")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +18,7 @@ class ScannerParameters:
 
     scanner: Annotated[
         ScannerName | None,
-        _scanner("Scanner by name; it gives the parameters that are not given", quiet=True),
+        _scanner("Scanner by name; it gives the parameters that are not given", first=True, quiet=True),
     ] = None
     near: Annotated[
         float | None,
@@ -49,7 +49,7 @@ class ScannerParameters:
             quiet=True,
         ),
     ] = None
-    range: Annotated[float, _scanner("Maximum scanner range", "m", above=0)] = 5.0
+    range: Annotated[float, _scanner("Maximum scanner range", "m", first=True, above=0)] = 5.0
     fov: Annotated[
         float, _scanner("Horizontal field of view of the scanner", "degrees", least=10, most=360)
     ] = 360.0

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from stopgo.mission.settings.parameter import Parameter
 
-_plan = partial(Parameter, "plan")
+_plan = partial(Parameter, "plan", group="Quality")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +29,7 @@ class SearchParameters:
         _plan(
             "Position of the drawing's origin on Earth, and the bearing of its +y axis",
             "degrees and m",
+            group="Floor",
             form="LAT,LON,ALT,HEADING",
             example="47.3769,8.5417,408,0",
         ),

@@ -14,14 +14,17 @@ from stopgo.mission.settings.parameter import Parameter
 
 
 def with_options(command: Callable[..., int], names: Iterable[str] = PARAMETERS) -> Callable[..., int]:
-    """The command with an option for each parameter in place of its `**given`, after its positional ones."""
+    """The command with an option for each parameter in place of its `**given`, after its positional ones.
+
+    With all parameters, those that people use first have a heading of their own in the help.
+    """
     *own, _ = inspect.signature(command, eval_str=True).parameters.values()
     first, last = [[p for p in own if (p.kind == p.KEYWORD_ONLY) is late] for late in (False, True)]
-    whole: Any = functools.wraps(command)(functools.partial(command))
-    whole.__signature__ = inspect.Signature(
-        [*first, *(_option(PARAMETERS[name]) for name in names if _own(PARAMETERS[name])), *last]
-    )
-    return cast(Callable[..., int], whole)
+    made: Any = functools.wraps(command)(functools.partial(command))
+    own_names = [name for name in names if _own(PARAMETERS[name])]
+    options = [_option(PARAMETERS[name], whole=names is PARAMETERS) for name in own_names]
+    made.__signature__ = inspect.Signature([*first, *options, *last])
+    return cast(Callable[..., int], made)
 
 
 def values_of(options: dict[str, Any]) -> dict[str, Any]:
@@ -47,14 +50,15 @@ def _key(parameter: Parameter) -> str:
     return parameter.option or parameter.key
 
 
-def _option(parameter: Parameter) -> inspect.Parameter:
+def _option(parameter: Parameter, *, whole: bool) -> inspect.Parameter:
     kind = list[str] if parameter.repeatable or parameter.further else _plain(parameter)
     name = parameter.flag
     declared = typer.Option(
         *([f"{name}/--no-{name[2:]}"] if parameter.default is None and kind is bool else [name]),
-        metavar=parameter.form.upper() or "|".join(parameter.choices) or None,
+        metavar=parameter.form.upper() or _words(parameter) or None,
         help=f"{_help(parameter)}  [default: {_default(parameter)}]",
         show_default=False,
+        rich_help_panel=parameter.panel if whole else parameter.group,
     )
     return inspect.Parameter(
         _key(parameter),
@@ -64,6 +68,15 @@ def _option(parameter: Parameter) -> inspect.Parameter:
     )
 
 
+LONGEST_WORDS = 40
+"""Of the words of an option, in its left column of the help; longer ones stand in its text."""
+
+
+def _words(parameter: Parameter) -> str:
+    words = "|".join(parameter.choices)
+    return words if len(words) <= LONGEST_WORDS else "NAME"
+
+
 def _plain(parameter: Parameter) -> type:
     """Type on the command line; a parameter with its own form reads a text."""
     return str if parameter.form else parameter.plain
@@ -71,7 +84,8 @@ def _plain(parameter: Parameter) -> type:
 
 def _help(parameter: Parameter) -> str:
     unit = f", {parameter.unit}" if parameter.unit else ""
-    return f"{parameter.help}{unit}{'; repeatable' * parameter.repeatable}."
+    named = f": {', '.join(parameter.choices)}" if _words(parameter) == "NAME" else ""
+    return f"{parameter.help}{unit}{'; repeatable' * parameter.repeatable}{named}."
 
 
 def _default(parameter: Parameter) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 
 import typer
 
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable_lines, table
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import Settings
@@ -35,14 +36,16 @@ def plan_storeys(floor: Path, out: Path, settings: Settings, plan_one: PlanOne, 
     """
     if settings.storey is not None or settings.level is not None:
         raise InputError("--all-storeys and a storey are both given; remove one of them")
-    found = survey_floor(floor, options_of(settings))
+    with running(f"reading {floor}"):
+        found = survey_floor(floor, options_of(settings))
     storeys = [item for item in found.floors if not item.aside and item.option]
     if not storeys:
         raise InputError(f"{floor}: contains no storeys; remove --all-storeys")
     names = [item.name for item in storeys]
     folders = [out / name for name in folder_names(names)]
     each = [_of_storey(settings, item, unique=names.count(item.name) == 1) for item in storeys]
-    with ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn"))
+    with running(f"planning {len(storeys)} storeys"), pool:
         planned = list(pool.map(plan_one, [floor] * len(storeys), folders, each))
     _print_storeys(list(zip(storeys, folders, planned, strict=True)), as_json=as_json)
     return max(code for code, _, _ in planned)

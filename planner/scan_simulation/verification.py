@@ -84,9 +84,10 @@ def verify(
     names = [stop.id for stop in mission.stops]
     positions = frozen([pose.position for pose in poses])
     pairs = []
+    say("registering pairs of scans")
     for pair in registered(names, positions, surfaces, simulation):
         pairs.append(pair)
-        say(f"{pair.pair.a} and {pair.pair.b} registered")
+        say(f"registering pairs of scans, {len(pairs)} done")
     promise = _PromisedCoverage.of(mission, space, coverage)
     return _proof(mission, site, tally, promise, network_of(names, positions, pairs), clouds)
 
@@ -125,14 +126,15 @@ def _scans(
     mission: Mission, site: _ScanSite, poses: Sequence[ScannerPose], tally: _PointTally, say: Say
 ) -> tuple[list[OrientedCloud], list[ScanCloud]]:
     """Scan from every pose into the tally; of each scan only a thinned cloud and a drawing remain."""
-    surfaces, clouds = [], []
+    surfaces: list[OrientedCloud] = []
+    clouds: list[ScanCloud] = []
     ceiling, origin = site.simulation.ceiling_m, site.solids.origin
     for stop, pose in zip(mission.stops, poses, strict=True):
+        say(f"scanning from {stop.id}, {len(clouds) + 1} of {len(poses)}")
         scan = scanned(site.solids, site.strips, pose, site.simulation)
         tally.take(scan, _sighted(site.space, site.solids, pose, ceiling))
         surfaces.append(surface_of(scan.cloud))
         clouds.append(ScanCloud(stop.id, _drawn(pose, scan, MOST_DRAWN // len(poses), ceiling, origin)))
-        say(f"{stop.id} scanned, {len(clouds)} of {len(poses)}")
     return surfaces, clouds
 
 

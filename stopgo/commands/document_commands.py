@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.commands.align_command import align
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.atomic import must_not_replace, write_checked
@@ -121,9 +121,8 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
     try:
         from stopgo.planner.checking.verdict import verdict
 
-        if sys.stderr.isatty():
-            typer.echo(f"checking the mission against {floor} …", err=True)
-        found = verdict(mission, floor, claims)
+        with running(f"checking the mission against {floor}"):
+            found = verdict(mission, floor, claims)
     except ModuleNotFoundError as error:
         if not _is_library(error):
             raise
@@ -177,21 +176,42 @@ def _verdict(path: Path, mission: Mission, found: _Checked) -> dict[str, Any]:
 
 
 OriginOption = Annotated[
-    str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Where on earth the drawing's origin is.")
+    str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Position of the drawing's origin on Earth.")
 ]
 FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, mcap, vda5050 or vda5050-2.1, whatever the suffix."
-AutopilotOption = Annotated[str | None, typer.Option(help="ardupilot, px4 or generic")]
+AutopilotOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ardupilot|px4|generic", rich_help_panel="MAVLink vehicle", help="Kind of autopilot."
+    ),
+]
 
 
 FormatOption = Annotated[str | None, typer.Option(metavar="FORMAT", help=FORMAT_NAMES)]
 TriggerOption = Annotated[
-    str | None, typer.Option(metavar="auto|script|camera|none", help="What makes the vehicle scan.")
+    str | None,
+    typer.Option(
+        metavar="auto|script|camera|none",
+        rich_help_panel="MAVLink vehicle",
+        help="Item that makes the vehicle scan.",
+    ),
 ]
 ScanWaitOption = Annotated[
-    str | None, typer.Option(metavar="delay|script_time", help="How the vehicle waits for a scan.")
+    str | None,
+    typer.Option(
+        metavar="delay|script_time",
+        rich_help_panel="MAVLink vehicle",
+        help="Wait the planned time, or until a script reports.",
+    ),
 ]
 SettleOption = Annotated[
-    str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
+    str | None,
+    typer.Option(
+        "--settle-item",
+        metavar="delay|hold",
+        rich_help_panel="MAVLink vehicle",
+        help="Settle in a delay item, or as the hold of a waypoint.",
+    ),
 ]
 MapOption = Annotated[
     str | None,
@@ -316,11 +336,12 @@ def import_command(
     ] = None,
     origin: OriginOption = None,
     start: Annotated[
-        str | None, typer.Option(metavar="X,Y,HEADING", help="Where the robot starts, m and degrees.")
+        str | None, typer.Option(metavar="X,Y,HEADING", help="Start pose of the robot, m and degrees.")
     ] = None,
     autopilot: AutopilotOption = None,
     kind: Annotated[
-        str | None, typer.Option("--from", metavar="FORMAT", help="plan, waypoints or csv")
+        str | None,
+        typer.Option("--from", metavar="plan|waypoints|csv", help="Format of the file, whatever its suffix."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import must_not_replace, write_atomic
@@ -52,7 +53,8 @@ def floors_command(
     for out in (svg, write_map):
         must_not_replace(out, file)
     options = options_of(read_settings(None, values_of(given)))
-    found = survey_floor(file, options)
+    with running(f"reading {file}"):
+        found = survey_floor(file, options)
     if svg is not None:
         _draw(svg, file, found, options)
     if write_map is not None:
@@ -78,7 +80,9 @@ def convert_command(
     if out.suffix.lower() != ".dxf":
         raise InputError(f"{out}: does not end in .dxf; give a name that ends in .dxf")
     must_not_replace(out, file)
-    floor = read_floor(file, options_of(read_settings(None, values_of(given))))
+    options = options_of(read_settings(None, values_of(given)))
+    with running(f"reading {file}"):
+        floor = read_floor(file, options)
     write_atomic(out, layered_dxf(floor))
     lost = list(_lost_in_drawing(floor))
     for text in lost:

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.commands.plan_files import PrintOptions, plan_files
-from stopgo.commands.result_files import JsonOption, result_folder
+from stopgo.commands.result_files import result_folder
 from stopgo.mission.console.notice import notice
 from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files.plan_toml import read_settings, settings_json, settings_toml
+from stopgo.mission.settings.parameter import FIRST
 from stopgo.planner.commands.options import values_of, with_options
 
 if TYPE_CHECKING:
@@ -29,24 +30,40 @@ FloorArgument = Annotated[
         help="The floor: a .dxf, layered or as drawn; an .ifc or .ifczip; a map.yaml.", show_default=False
     ),
 ]
-PlanFolderOption = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")]
+PlanFolderOption = Annotated[
+    Path, typer.Option("-o", "--out", rich_help_panel=FIRST, help="Folder for the results.")
+]
 ParametersOption = Annotated[
-    Path | None, typer.Option("-p", "--parameters", help="plan.toml; options override it.")
+    Path | None,
+    typer.Option("-p", "--parameters", rich_help_panel=FIRST, help="plan.toml; options override it."),
 ]
-AllPartsOption = Annotated[bool, typer.Option(help="Also plan parts not connected with the first.")]
+AllPartsOption = Annotated[
+    bool, typer.Option(rich_help_panel="Floor", help="Also plan parts not connected with the first.")
+]
 AllStoreysOption = Annotated[
-    bool, typer.Option(help="Plan every storey of a model that people walk on, each into its folder.")
+    bool,
+    typer.Option(
+        rich_help_panel="Floor",
+        help="Plan every storey of a model that people walk on, each into its folder.",
+    ),
 ]
-PlanStrictOption = Annotated[bool, typer.Option(help="Exit 1 if floor is left out or the plan is doubtful.")]
+PlanStrictOption = Annotated[
+    bool, typer.Option(rich_help_panel="Output", help="Exit 1 if floor is left out or the plan is doubtful.")
+]
 SheetsOption = Annotated[
     bool | None,
     typer.Option(
         "--sheets/--no-sheets",
+        rich_help_panel="Output",
         help="plan.pdf: sheets and lists to print; by default where 1:100 needs several sheets.",
     ),
 ]
-RingsOption = Annotated[bool, typer.Option(help="Draw the scanner's range round each stop.")]
-PrintConfigOption = Annotated[bool, typer.Option(help="Print plan.toml with these options and leave.")]
+RingsOption = Annotated[
+    bool, typer.Option(rich_help_panel="Output", help="Draw the scanner's range round each stop.")
+]
+PrintConfigOption = Annotated[
+    bool, typer.Option(rich_help_panel="Output", help="Print plan.toml with these options and leave.")
+]
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -66,7 +83,9 @@ def plan_command(
     sheets: SheetsOption = None,
     rings: RingsOption = False,
     print_config: PrintConfigOption = False,
-    as_json: JsonOption = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", rich_help_panel=FIRST, help="One JSON object on stdout.")
+    ] = False,
     **given: Any,
 ) -> int:
     """Plan where the scanner must stand on a floor, and the route that visits those stops.

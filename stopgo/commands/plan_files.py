@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from stopgo.commands.result_files import is_missing, report_missing_rerun, result_folder
+from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
 from stopgo.planner import plan
@@ -46,17 +46,22 @@ def plan_files(
     print_options: PrintOptions | None = None,
 ) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first."""
+    with running(f"reading {floor}") as step:
+        return _planned(floor, out, settings, Stopwatch(step), all_parts, print_options or PrintOptions())
+
+
+def _planned(
+    floor: Path, out: Path, settings: Settings, watch: Stopwatch, all_parts: bool, options: PrintOptions
+) -> list[PlanReport]:
     from stopgo.planner.commands.outputs import names
     from stopgo.planner.floors import options_of, read_floor, standing_bodies
 
-    watch = Stopwatch()
     read = read_floor(floor, options_of(settings))
     folder = result_folder(out)
     for path in names(folder, 0).values():
         must_be_writable(path)
     with _print_findings_on_error(read):
         made = plan(read, settings, observe=watch.observe, all_parts=all_parts)
-    options = print_options or PrintOptions()
     bodies = standing_bodies(floor, options_of(settings))
     reports = [_write_part(made, number, folder, options, watch, bodies) for number in range(len(made.parts))]
     _set_aside_old(folder, len(reports), read, settings)
@@ -224,36 +229,37 @@ class _PartContents:
 
 
 STAGES = {
-    "FloorPlan": "read",
-    "NavigableSpace": "navigable",
-    "Candidates": "candidates",
-    "Visibility": "visibility",
-    "Selection": "selection",
-    "Route": "route",
-    "Figures": "figures",
-    "Mission": "route",
+    "FloorPlan": ("read", "navigable space"),
+    "NavigableSpace": ("navigable", "candidates"),
+    "Candidates": ("candidates", "visibility"),
+    "Visibility": ("visibility", "selection"),
+    "Selection": ("selection", "route"),
+    "Route": ("route", "figures"),
+    "Figures": ("figures", "mission"),
+    "Mission": ("route", "files"),
 }
-"""The stage that ends with each stage result, by the result's class name."""
+"""By the class name of each stage result: the stage that ends with it, and the step that begins."""
 
 
 class Stopwatch:
-    """Seconds per stage; prints on a terminal's stderr each stage that has ended."""
+    """Seconds per stage; names the running step."""
 
-    def __init__(self) -> None:
+    def __init__(self, step: RunningStep) -> None:
         self._laps: dict[str, float] = {}
         self._begin = self._last = time.perf_counter()
+        self._step = step
 
     def observe(self, result: object) -> None:
         """Count the time since the last result to the stage that ends with this one."""
-        self.lap(STAGES.get(type(result).__name__, "other"))
+        ended, begins = STAGES.get(type(result).__name__, ("other", "files"))
+        self.lap(ended)
+        self._step.begin(begins)
 
     def lap(self, stage: str) -> None:
         """Count the time since the last lap to a stage."""
         now = time.perf_counter()
         self._laps[stage] = self._laps.get(stage, 0.0) + now - self._last
         self._last = now
-        if sys.stderr.isatty():
-            typer.echo(f"\r\033[K{stage} done, {now - self._begin:.1f} s", err=True, nl=stage == "files")
 
     def times(self) -> dict[str, float]:
         """Seconds per stage and in total."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from stopgo.commands.result_files import JsonOption, report_missing_rerun, result_folder
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable
 from stopgo.mission.files.atomic import must_be_writable, replacing
 
@@ -36,32 +36,52 @@ StepOption = Annotated[
         "--angular-step",
         min=0.005,
         max=2.0,
+        rich_help_panel="Simulation",
         help="Angle between neighbouring rays, degrees.",
         show_default="the scanner's, else 0.1",
     ),
 ]
-NoiseOption = Annotated[float, typer.Option(min=0.0, max=100.0, help="Of a distance, mm rms.")]
+NoiseOption = Annotated[
+    float, typer.Option(min=0.0, max=100.0, rich_help_panel="Simulation", help="Of a distance, mm rms.")
+]
 HeightOption = Annotated[
     float | None,
     typer.Option(
         "--scanner-height",
         min=0.1,
         max=10.0,
+        rich_help_panel="Simulation",
         help="Height of the scanner above the floor, m.",
         show_default="the scanner's, else 1.3",
     ),
 ]
 CeilingOption = Annotated[
     float | None,
-    typer.Option(min=0.5, max=50.0, help="Height of the walls, m.", show_default="the model's, else 2.7"),
+    typer.Option(
+        min=0.5,
+        max=50.0,
+        rich_help_panel="Simulation",
+        help="Height of the walls, m.",
+        show_default="the model's, else 2.7",
+    ),
 ]
 SlantOption = Annotated[
-    bool, typer.Option("--slant", help="The range counts along the rays, not along the floor.")
+    bool,
+    typer.Option(
+        "--slant", rich_help_panel="Simulation", help="The range counts along the rays, not along the floor."
+    ),
 ]
 WithoutPosesOption = Annotated[
-    bool, typer.Option("--without-poses", help="Register without the robot's poses to start from.")
+    bool,
+    typer.Option(
+        "--without-poses",
+        rich_help_panel="Simulation",
+        help="Register without the robot's poses to start from.",
+    ),
 ]
-SeedOption = Annotated[int, typer.Option(min=0, help="Of noise and pose errors.")]
+SeedOption = Annotated[
+    int, typer.Option(min=0, rich_help_panel="Simulation", help="Of noise and pose errors.")
+]
 ProofStrictOption = Annotated[bool, typer.Option(help="Exit 1 also if the scans are not all connected.")]
 
 
@@ -104,7 +124,9 @@ def prove_command(
     given = {"step_deg": step, "height_m": height, "ceiling_m": ceiling}
     assumed |= {key: value for key, value in given.items() if value is not None}
     proof, on_floor = _simulated(mission, floor, coverage, assumed)
-    _print_proof(proof, _write_proof(proof, on_floor, files), as_json=as_json)
+    with running("writing the proof"):
+        written = _write_proof(proof, on_floor, files)
+    _print_proof(proof, written, as_json=as_json)
     return 0 if proof.met and (proof.network.closed or not strict) else 1
 
 
@@ -115,17 +137,11 @@ def _simulated(
     from stopgo.planner.scan_simulation.verification_files import verify_file
 
     warnings: list[str] = []
-    proof, planned = verify_file(mission, floor, coverage, assumed, say=_show_progress, warn=warnings.append)
-    _show_progress("")
+    with running(f"reading {floor}") as step:
+        proof, planned = verify_file(mission, floor, coverage, assumed, say=step.begin, warn=warnings.append)
     for warning in warnings:
         typer.echo(f"stopgo: {printable(warning)}", err=True)
     return proof, planned.floor
-
-
-def _show_progress(line: str) -> None:
-    """Replace the progress line on a terminal's stderr."""
-    if sys.stderr.isatty():
-        typer.echo(f"\r\033[K{line}", err=True, nl=False)
 
 
 def _write_proof(proof: PlanProof, floor: FloorPlan, files: dict[str, Path]) -> dict[str, Path]:

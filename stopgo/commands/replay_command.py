@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.commands.replay_on_floor import follow_up_of, on_floor, write_follow_up
+from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import must_be_writable, must_not_replace, write_atomic
@@ -32,21 +32,52 @@ ReplayLogs = Annotated[
 ReplayMission = Annotated[
     Path | None, typer.Option(help="Planned mission; without it the MAVLink mission in the log.")
 ]
-ReplayOut = Annotated[Path | None, typer.Option("-o", "--out", help="Recording to write (.rrd).")]
+ReplayOut = Annotated[
+    Path | None, typer.Option("-o", "--out", rich_help_panel="Output", help="Recording to write (.rrd).")
+]
 ReplayList = Annotated[bool, typer.Option("--list", help="Only list the content of each log.")]
 ReplayMap = Annotated[
-    str | None, typer.Option("--map", help="X,Y,HEADING (m, degrees) of the site in the log's frame.")
+    str | None,
+    typer.Option(
+        "--map",
+        metavar="X,Y,HEADING",
+        rich_help_panel="Position of the log",
+        help="Pose of the site in the log's frame, m and degrees.",
+    ),
 ]
 ReplayAlign = Annotated[
-    str | None, typer.Option(help="first: the log begins at the start; stops: fit standstills to stops.")
+    str | None,
+    typer.Option(
+        metavar="first|stops",
+        rich_help_panel="Position of the log",
+        help="first: the log begins at the start; stops: fit standstills to stops.",
+    ),
 ]
-ReplayTimeOffset = Annotated[float, typer.Option(help="Seconds to add to the log's times.")]
-ReplayPoses = Annotated[str | None, typer.Option(help="Source of the poses, as --list names it.")]
-ReplayRobot = Annotated[str | None, typer.Option(help="Robot to replay, where a log has several.")]
+ReplayTimeOffset = Annotated[
+    float, typer.Option(rich_help_panel="Position of the log", help="Seconds to add to the log's times.")
+]
+ReplayPoses = Annotated[
+    str | None,
+    typer.Option(rich_help_panel="Poses in the log", help="Source of the poses, as --list names it."),
+]
+ReplayRobot = Annotated[
+    str | None,
+    typer.Option(rich_help_panel="Poses in the log", help="Robot to replay, where a log has several."),
+]
 ReplayStamps = Annotated[
-    str, typer.Option(help="header: time stamps in the messages; log: times of logging.")
+    str,
+    typer.Option(
+        metavar="header|log",
+        rich_help_panel="Poses in the log",
+        help="header: time stamps in the messages; log: times of logging.",
+    ),
 ]
-ReplayFrame = Annotated[str | None, typer.Option(help="Take the poses in this frame from transforms (tf).")]
+ReplayFrame = Annotated[
+    str | None,
+    typer.Option(
+        rich_help_panel="Poses in the log", help="Take the poses in this frame from transforms (tf)."
+    ),
+]
 ReplayFloor = Annotated[
     Path | None, typer.Option(help="Floor file of the plan; reports what the robot saw of it.")
 ]
@@ -54,16 +85,25 @@ ReplayClouds = Annotated[
     Path | None, typer.Option(help="With --floor: folder of clouds (.e57 .las .laz .ply) in its metres.")
 ]
 ReplayTopUp = Annotated[
-    Path | None, typer.Option(help="With --floor: follow-up mission to write that covers the rest (.json).")
+    Path | None,
+    typer.Option(
+        rich_help_panel="Output",
+        help="With --floor: follow-up mission to write that covers the rest (.json).",
+    ),
 ]
-ReplayCsv = Annotated[Path | None, typer.Option(help="Table of stops to write (.csv).")]
+ReplayCsv = Annotated[
+    Path | None, typer.Option(rich_help_panel="Output", help="Table of stops to write (.csv).")
+]
 ReplayHtml = Annotated[
-    Path | None, typer.Option(metavar="REPORT.html", help="Report to write, as one HTML file.")
+    Path | None,
+    typer.Option(metavar="REPORT.html", rich_help_panel="Output", help="Report to write, as one HTML file."),
 ]
 ReplayPlan = Annotated[
     Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording: its floor, for the report.")
 ]
-ReplayAsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
+ReplayAsJson = Annotated[
+    bool, typer.Option("--json", rich_help_panel="Output", help="One JSON object on stdout.")
+]
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -98,7 +138,7 @@ def replay(
     Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log cannot be read, or is of
     another mission.
     """
-    read = [_read(path, stamps, frame) for path in logs]
+    read = _read(logs, stamps, frame)
     if list_:
         _print_logs(read, as_json=json_)
         return 0
@@ -107,8 +147,7 @@ def replay(
     driven = _mission(mission, read)
     placing = _placing(map_, align, time_offset, poses, robot_name)
     plans = None if plan is None else _plans(plan, driven)
-    replays = files.with_floor(_replays(read, driven, placing, plans))
-    files.write(replays, plans)
+    replays = files.compare_and_write(_replays(read, driven, placing, plans), plans)
     _print_replays(replays, as_json=json_)
     return _exit_code(replays)
 
@@ -139,6 +178,14 @@ class _ReplayFiles:
         if self.csv is not None and len(self.logs) > 1:
             raise InputError(f"--csv {self.csv}: is a table of one log, not {len(self.logs)}; give one log")
 
+    def compare_and_write(self, replays: list[Replay], plans: Review | None) -> list[Replay]:
+        """Return the replays with what was visible on the floor, and write every file."""
+        with running("comparing with the floor") as step:
+            found = self.with_floor(replays)
+            step.begin("writing the results")
+            self.write(found, plans)
+        return found
+
     def with_floor(self, replays: list[Replay]) -> list[Replay]:
         """Return the replays with what was visible on the floor, and write the follow-up mission."""
         if self.floor is None:
@@ -168,22 +215,25 @@ class _ReplayFiles:
             write_atomic(self.html, report_html(page_of(replays, plans)))
 
 
-def _read(path: Path, stamps: str, frame: str | None) -> FieldLog:
+def _read(paths: list[Path], stamps: str, frame: str | None) -> list[FieldLog]:
     from stopgo.recordings.logs import read_log
 
-    return read_log(path, _reading(stamps, frame, path))
+    logs = []
+    for path in paths:
+        with running(f"reading {path.name}") as step:
+            logs.append(read_log(path, _reading(stamps, frame, path, step)))
+    return logs
 
 
-def _reading(stamps: str, frame: str | None, path: Path) -> Reading:
-    """Return the options for reading a log, with progress on a terminal."""
+def _reading(stamps: str, frame: str | None, path: Path, step: RunningStep) -> Reading:
+    """Return the options for reading a log, with its progress."""
     from stopgo.recordings.logs import Reading
 
     if stamps not in ("header", "log"):
         raise InputError(f"--stamps {stamps}: must be header or log")
 
     def tick(fraction: float) -> None:
-        if sys.stderr.isatty():
-            typer.echo(f"\r\033[K{path.name} {fraction:.0%}", err=True, nl=fraction >= 1)
+        step.progress(f"reading {path.name}, {fraction:.0%}")
 
     return Reading(stamps="log" if stamps == "log" else "header", frame=frame, tick=tick)
 
@@ -238,7 +288,8 @@ def _replays(logs: list[FieldLog], mission: Mission, placing: Placing, plans: Re
 
     items = () if plans is None else plans.recordings
     sights = tuple(sight for item in items for sight in item.recording.sights)
-    return [replay_of(log, mission, placing, sights) for log in logs]
+    with running("comparing with the mission"):
+        return [replay_of(log, mission, placing, sights) for log in logs]
 
 
 def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import must_not_replace, write_atomic
@@ -51,9 +52,11 @@ def review(
     from stopgo.recordings.page.reviewed import review as read
 
     must_not_replace(html, *recordings)
-    found = read(recordings)
-    if found.recordings:
-        _write_files(found, html, out, png)
+    with running("reading recordings") as step:
+        found = read(recordings)
+        if found.recordings:
+            step.begin("writing the results")
+            _write_files(found, html, out, png)
     _print_review(found, as_json=json_)
     if view:
         from stopgo.recordings.viewing.viewer import open_viewer

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError
 
@@ -37,7 +38,8 @@ def runs(
         raise InputError(f"--port {port}: needs --web; add --web or leave out --port")
     from stopgo.recordings.catalog.run_index import index_json, index_of, index_text
 
-    index = index_of(folder, say=lambda line: typer.echo(printable(line), err=True))
+    with running(f"reading {folder}"):
+        index = index_of(folder, say=lambda line: typer.echo(printable(line), err=True))
     text = json.dumps(index_json(index), ensure_ascii=False) if json_ else printable_lines(index_text(index))
     typer.echo(text)
     for fault in index.faults():

@@ -20,7 +20,7 @@ from stopgo.mission.files.exports import (
     stops_dxf,
     vda5050,
 )
-from stopgo.mission.files.exports.format import Format, Supplements
+from stopgo.mission.files.exports.format import OPTIONS, Format, Supplements
 
 QUANTUM = 0.008
 """Largest distance in metres of 1e-7 degrees."""
@@ -103,7 +103,8 @@ def check_uses(name: str, given: Mapping[str, object]) -> None:
     for option, value in given.items():
         if value is not None and option not in form_of(name).uses:
             fitting = ", ".join(form.suffix for form in FORMATS.values() if option in form.uses)
-            raise InputError(f"--{option}: not used by {form_of(name).title}; only by {fitting}")
+            flag = OPTIONS.get(option, option)
+            raise InputError(f"--{flag}: not used by {form_of(name).title}; only by {fitting}")
 
 
 def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:

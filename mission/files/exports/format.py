@@ -42,6 +42,10 @@ class Supplements:
     """The time that files with a time stamp get."""
 
 
+OPTIONS = {"settle": "settle-item", "coverage": "coverage-file"}
+"""Names of the options for supplements that have another name."""
+
+
 def written_as(options: Mapping[str, str | None]) -> Supplements:
     """Supplements by the words given for `--autopilot`, `--trigger`, `--scan-wait` and `--settle-item`.
 
@@ -55,7 +59,8 @@ def written_as(options: Mapping[str, str | None]) -> Supplements:
     for option, word in given.items():
         known = get_args(hints[option]) if option in hints else tuple(AUTOPILOTS)
         if word not in known:
-            raise InputError(f"--{option.replace('_', '-')} {word}: one of {', '.join(known)}")
+            flag = OPTIONS.get(option, option.replace("_", "-"))
+            raise InputError(f"--{flag} {word}: one of {', '.join(known)}")
     return Supplements(**given)  # type: ignore[arg-type]  # checked above
 
 
