@@ -93,7 +93,7 @@ REFUSED = {
     "trigger of none": (["-o", "x.csv", "--trigger", "auto"], "--trigger: not used by table of stops"),
     "floor missing": (["-o", "x.dxf", "--floor", "no.dxf"], "no.dxf: cannot be read"),
     "floor no dxf": (["-o", "x.dxf", "--floor", "README.md"], "only over a .dxf"),
-    "floor of another mission": (["-o", "x.dxf", "--floor", str(SAMPLE)], "is not the floor of this mission"),
+    "floor of another mission": (["-o", "x.dxf", "--floor", str(SAMPLE)], "is not the floor that"),
     "coverage missing": (["-o", "x.dxf", "--coverage-file", "no.json"], "no.json: cannot be read"),
     "folder missing": (["-o", "no/x.csv"], "does not exist"),
 }
