@@ -101,3 +101,15 @@ def test_an_old_option_is_taken_with_a_line(given: tuple[str, ...], today: list[
     assert words == today
     assert [text for text in lines if line not in text] == []
     assert bool(lines) == bool(line)
+
+
+@pytest.mark.parametrize("given", [("--mavlink", "udpout:127.0.0.1:14550"), ("--mavlink=tcp:1.2.3.4:5",)])
+def test_home_names_what_a_vehicle_can_do_instead(
+    given: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["home", *given]) == 2
+    line = capsys.readouterr().err
+    assert line.startswith("stopgo: --mavlink has no meaning with home: ") and line.count("\n") == 1
+    assert "stopgo abort --mavlink" in line
+    assert main(["home"]) == 2
+    assert "add --robot NAME (or preset" in capsys.readouterr().err
