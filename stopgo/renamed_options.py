@@ -47,7 +47,7 @@ _OF_COVERAGE = {"--coverage": NewName("--coverage-file")}
 _WITHOUT_LEASE = {"--take-over": Dropped(takes_value=False), "--stop": Dropped(takes_value=True)}
 _WITHOUT_STOP = {"--stop": Dropped(takes_value=True)}
 
-_HOME = {
+_HOME: dict[str, NewName | Dropped | Unavailable] = {
     **_WITHOUT_STOP,
     "--mavlink": Unavailable(
         "an autopilot drives its mission forward only; end the run with stopgo abort --mavlink, or drive the "

@@ -80,7 +80,7 @@ SigningKey = Annotated[
 ]
 StateFolder = Annotated[
     Path | None,
-    typer.Option("--state", metavar="DIR", help="The station's state folder; one per vehicle."),
+    typer.Option("--state", metavar="DIR", help="Folder for what must outlast a restart; one per vehicle."),
 ]
 
 # Output
@@ -160,7 +160,7 @@ RunRecordingFile = Annotated[
 ]
 PlanRecordingFile = Annotated[
     Path | None,
-    typer.Option("--plan", metavar="PLAN.rrd", help="The run's plan, with floor and visibility."),
+    typer.Option("--plan", metavar="PLAN.rrd", help="The plan's recording, with floor and visibility."),
 ]
 FinishedRun = Annotated[
     str | None,
@@ -177,7 +177,8 @@ RouterEndpoint = Annotated[
     typer.Option("--connect", metavar="ENDPOINT", help="A router to connect to, instead of listening."),
 ]
 JournalFolder = Annotated[
-    Path, typer.Option("--state", metavar="DIR", help="Folder of its journal; one per robot.")
+    Path,
+    typer.Option("--state", metavar="DIR", help="Folder for what must outlast a restart; one per robot."),
 ]
 OnRevision = Annotated[
     str,
@@ -199,11 +200,15 @@ ControllerKind = Annotated[
 ]
 SimulatedPose = Annotated[
     str | None,
-    typer.Option("--at", metavar="X,Y,HEADING", help="sim: initial pose; default: the mission's start."),
+    typer.Option(
+        "--at",
+        metavar="X,Y,HEADING",
+        help="sim: initial pose in the site frame; default: the mission's start.",
+    ),
 ]
 SiteToMap = Annotated[
     str | None,
-    typer.Option("--map", metavar="X,Y,HEADING", help="sim: site to map; rotate by HEADING, then shift."),
+    typer.Option("--map", metavar="X,Y,HEADING", help="sim: site to map: rotate by HEADING, then shift."),
 ]
 FaultsOfRobot = Annotated[
     list[str] | None,
@@ -244,14 +249,14 @@ SimulatedAutopilot = Annotated[
 ]
 SimulatedState = Annotated[
     Path | None,
-    typer.Option("--state", metavar="DIR", help="Folder of its mission items and its position."),
+    typer.Option("--state", metavar="DIR", help="Folder for what must outlast a restart; one per vehicle."),
 ]
 SimulatedOrigin = Annotated[
     str | None,
     typer.Option("--origin", metavar="LAT,LON,ALT[,HEADING]", help="Its global origin from the start."),
 ]
 VehiclePose = Annotated[
-    str | None, typer.Option("--at", metavar="X,Y,HEADING", help="Its initial pose in the site frame.")
+    str | None, typer.Option("--at", metavar="X,Y,HEADING", help="Initial pose in the site frame.")
 ]
 FaultsOfVehicle = Annotated[
     list[str] | None,

@@ -172,11 +172,14 @@ ScanWaitOption = Annotated[
     str | None, typer.Option(metavar="delay|script_time", help="How the vehicle waits for a scan.")
 ]
 SettleOption = Annotated[
-    str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
+    str | None,
+    typer.Option(
+        "--settle-item", metavar="delay|hold", help="Settle in a delay item, or as the hold of a waypoint."
+    ),
 ]
 MapOption = Annotated[
     str | None,
-    typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: rotate, then shift."),
+    typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: rotate by HEADING, then shift."),
 ]
 
 
@@ -211,8 +214,8 @@ def export(
     there = placed(document, origin=origin, to_map=map_)
     _check_problems(mission, there)
     name = format_named(to, out)
-    writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
-    drawn = {"floor": floor, "coverage": coverage}
+    writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle-item": settle}
+    drawn = {"floor": floor, "coverage-file": coverage}
     check_uses(name, {**drawn, **writing, "origin": origin, "map": map_})
     must_not_replace(out, mission, floor, coverage)
     supplements = _supplements(document, floor, coverage, writing)

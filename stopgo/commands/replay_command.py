@@ -35,7 +35,10 @@ ReplayMission = Annotated[
 ReplayOut = Annotated[Path | None, typer.Option("-o", "--out", help="Recording to write (.rrd).")]
 ReplayList = Annotated[bool, typer.Option("--list", help="Only list the content of each log.")]
 ReplayMap = Annotated[
-    str | None, typer.Option("--map", help="X,Y,HEADING (m, degrees) of the site in the log's frame.")
+    str | None,
+    typer.Option(
+        "--map", metavar="X,Y,HEADING", help="Site to the log's map: rotate by HEADING, then shift."
+    ),
 ]
 ReplayAlign = Annotated[
     str | None, typer.Option(help="first: the log begins at the start; stops: fit standstills to stops.")
@@ -61,7 +64,7 @@ ReplayHtml = Annotated[
     Path | None, typer.Option(metavar="REPORT.html", help="Report to write, as one HTML file.")
 ]
 ReplayPlan = Annotated[
-    Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording: its floor, for the report.")
+    Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording, with floor and visibility.")
 ]
 ReplayAsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 

@@ -25,7 +25,7 @@ from stopgo.mission.files.exports.format import Format, Supplements
 QUANTUM = 0.008
 """Largest distance in metres of 1e-7 degrees."""
 
-WRITING = ("autopilot", "trigger", "scan-wait", "settle")
+WRITING = ("autopilot", "trigger", "scan-wait", "settle-item")
 """Options for the writing of a mission as items."""
 
 FORMATS: dict[str, Format] = {
@@ -39,7 +39,7 @@ FORMATS: dict[str, Format] = {
     ),
     "dxf": Format(
         ".dxf", "DXF drawing", stops_dxf.write, stops_dxf.read_back, 1e-6,
-        uses=("floor", "coverage"), notes=stops_dxf.notes,
+        uses=("floor", "coverage-file"), notes=stops_dxf.notes,
     ),
     "csv": Format(
         ".csv", "table of stops", stops_csv.write, stops_csv.read_back, 1e-6,
@@ -47,7 +47,7 @@ FORMATS: dict[str, Format] = {
     ),
     "geojson": Format(
         ".geojson", "GeoJSON (RFC 7946)", geojson.write, geojson.read_back, 1e-3,
-        georeferenced=True, uses=("origin", "coverage"),
+        georeferenced=True, uses=("origin", "coverage-file"),
     ),
     "nav2": Format(
         ".nav2.yaml", "Nav2 waypoints", nav2_yaml.write, nav2_yaml.read_back, 1e-5,

@@ -51,12 +51,13 @@ def written_as(options: Mapping[str, str | None]) -> Supplements:
         Naming the option, the word and those that are known.
     """
     given = {option.replace("-", "_"): word for option, word in options.items() if word is not None}
-    hints = {"trigger": Trigger, "scan_wait": ScanWait, "settle": Settle}
+    hints = {"trigger": Trigger, "scan_wait": ScanWait, "settle_item": Settle}
     for option, word in given.items():
         known = get_args(hints[option]) if option in hints else tuple(AUTOPILOTS)
         if word not in known:
             raise InputError(f"--{option.replace('_', '-')} {word}: one of {', '.join(known)}")
-    return Supplements(**given)  # type: ignore[arg-type]  # checked above
+    fields = {option.removesuffix("_item"): word for option, word in given.items()}
+    return Supplements(**fields)  # type: ignore[arg-type]  # checked above
 
 
 Writer = Callable[[Mission, Supplements], bytes]
