@@ -65,7 +65,7 @@ def verified(path: Path, options: dict[str, float], **more: float) -> tuple[Plan
     made = plan(read_floor(path, options_of(settings)), settings)
     told = msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
     begin = time.process_time()
-    simulation = Simulation(range_m=settings.range, joining_m=settings.farthest_overlap)
+    simulation = Simulation(range_m=settings.range, joining_m=settings.farthest_overlap, cone_deg=60.0)
     proof = verify(made.mission, made.space, simulation, told)
     return proof, time.process_time() - begin
 

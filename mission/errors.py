@@ -18,6 +18,10 @@ class InputError(StopgoError):
     exit_code = 2
 
 
+class OtherFloor(InputError):
+    """A floor's file on which the mission was not planned."""
+
+
 class MissingExtra(StopgoError):
     """A command needs an optional part that is not installed."""
 

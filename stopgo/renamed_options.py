@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from stopgo.mission.errors import InputError
+
 
 @dataclass(frozen=True)
 class NewName:
@@ -20,6 +22,13 @@ class Dropped:
     """An option that never had an effect on its command."""
 
     takes_value: bool
+
+
+@dataclass(frozen=True)
+class Unavailable:
+    """An option that its command could never carry out."""
+
+    remedy: str
 
 
 _OF_PLANS = {
@@ -38,7 +47,15 @@ _OF_COVERAGE = {"--coverage": NewName("--coverage-file")}
 _WITHOUT_LEASE = {"--take-over": Dropped(takes_value=False), "--stop": Dropped(takes_value=True)}
 _WITHOUT_STOP = {"--stop": Dropped(takes_value=True)}
 
-RENAMED: Mapping[str, Mapping[str, NewName | Dropped]] = {
+_HOME: dict[str, NewName | Dropped | Unavailable] = {
+    **_WITHOUT_STOP,
+    "--mavlink": Unavailable(
+        "an autopilot drives its mission forward only; end the run with stopgo abort --mavlink, or drive the "
+        "vehicle by stopgo robot --controller mavlink:URL, which can drive home"
+    ),
+}
+
+RENAMED: Mapping[str, Mapping[str, NewName | Dropped | Unavailable]] = {
     "plan": {**_OF_PLANS, **_OF_FLOORS},
     "floors": _OF_FLOORS,
     "convert": _OF_FLOORS,
@@ -55,7 +72,7 @@ RENAMED: Mapping[str, Mapping[str, NewName | Dropped]] = {
     "pause": _WITHOUT_LEASE,
     "abort": _WITHOUT_LEASE,
     "resume": {**_OF_VEHICLES, **_WITHOUT_STOP},
-    "home": _WITHOUT_STOP,
+    "home": _HOME,
     "skip": _OF_VEHICLES,
     "retry": _OF_VEHICLES,
     "robot": {"--endurance": NewName("--battery-life", unit="h")},
@@ -69,6 +86,11 @@ def with_new_names(arguments: list[str]) -> tuple[list[str], list[str]]:
     """The arguments of a command with today's option names, and a line for each old one.
 
     Everything after `--` is left as it is.
+
+    Raises
+    ------
+    InputError
+        For an option that its command could never carry out.
     """
     renamed = next((RENAMED[word] for word in arguments[:1] if word in RENAMED), {})
     end = arguments.index("--") if "--" in arguments else len(arguments)
@@ -80,6 +102,8 @@ def with_new_names(arguments: list[str]) -> tuple[list[str], list[str]]:
         new = renamed.get(option)
         if new is None:
             words.append(argument)
+        elif isinstance(new, Unavailable):
+            raise InputError(f"{option} has no meaning with {arguments[0]}: {new.remedy}")
         elif isinstance(new, Dropped):
             lines.append(f"{option} has no effect on {arguments[0]}; it ends with 0.3")
             if new.takes_value and not sign:

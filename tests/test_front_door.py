@@ -111,3 +111,15 @@ def test_a_command_has_the_new_option_and_not_the_old_one(command: str, old: str
     assert old not in options
     new = RENAMED[command][old]
     assert not isinstance(new, NewName) or new.option in options
+
+
+@pytest.mark.parametrize("given", [("--mavlink", "udpout:127.0.0.1:14550"), ("--mavlink=tcp:1.2.3.4:5",)])
+def test_home_names_what_a_vehicle_can_do_instead(
+    given: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["home", *given]) == 2
+    line = capsys.readouterr().err
+    assert line.startswith("stopgo: --mavlink has no meaning with home: ") and line.count("\n") == 1
+    assert "stopgo abort --mavlink" in line
+    assert main(["home"]) == 2
+    assert "add --robot NAME (or preset" in capsys.readouterr().err

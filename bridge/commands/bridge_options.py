@@ -140,7 +140,10 @@ SigningKey = Annotated[
 StateFolder = Annotated[
     Path | None,
     typer.Option(
-        "--state", metavar="DIR", rich_help_panel=VEHICLE, help="The station's state folder; one per vehicle."
+        "--state",
+        metavar="DIR",
+        rich_help_panel=VEHICLE,
+        help="Folder for what must outlast a restart; one per vehicle.",
     ),
 ]
 
@@ -244,7 +247,7 @@ RunRecordingFile = Annotated[
 ]
 PlanRecordingFile = Annotated[
     Path | None,
-    typer.Option("--plan", metavar="PLAN.rrd", help="The run's plan, with floor and visibility."),
+    typer.Option("--plan", metavar="PLAN.rrd", help="The plan's recording, with floor and visibility."),
 ]
 FinishedRun = Annotated[
     str | None,
@@ -261,7 +264,8 @@ RouterEndpoint = Annotated[
     typer.Option("--connect", metavar="ENDPOINT", help="A router to connect to, instead of listening."),
 ]
 JournalFolder = Annotated[
-    Path, typer.Option("--state", metavar="DIR", help="Folder of its journal; one per robot.")
+    Path,
+    typer.Option("--state", metavar="DIR", help="Folder for what must outlast a restart; one per robot."),
 ]
 OnRevision = Annotated[
     str,
@@ -287,7 +291,7 @@ SimulatedPose = Annotated[
         "--at",
         metavar="X,Y,HEADING",
         rich_help_panel=SIMULATION,
-        help="sim: initial pose; default: the mission's start.",
+        help="sim: initial pose in the site frame; default: the mission's start.",
     ),
 ]
 SiteToMap = Annotated[
@@ -296,7 +300,7 @@ SiteToMap = Annotated[
         "--map",
         metavar="X,Y,HEADING",
         rich_help_panel=SIMULATION,
-        help="sim: site to map; rotate by HEADING, then shift.",
+        help="sim: site to map: rotate by HEADING, then shift.",
     ),
 ]
 FaultsOfRobot = Annotated[
@@ -363,14 +367,14 @@ SimulatedAutopilot = Annotated[
 ]
 SimulatedState = Annotated[
     Path | None,
-    typer.Option("--state", metavar="DIR", help="Folder of its mission items and its position."),
+    typer.Option("--state", metavar="DIR", help="Folder for what must outlast a restart; one per vehicle."),
 ]
 SimulatedOrigin = Annotated[
     str | None,
     typer.Option("--origin", metavar="LAT,LON,ALT[,HEADING]", help="Its global origin from the start."),
 ]
 VehiclePose = Annotated[
-    str | None, typer.Option("--at", metavar="X,Y,HEADING", help="Its initial pose in the site frame.")
+    str | None, typer.Option("--at", metavar="X,Y,HEADING", help="Initial pose in the site frame.")
 ]
 FaultsOfVehicle = Annotated[
     list[str] | None,

@@ -179,6 +179,8 @@ def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandB
     def called(context: typer.Context, **values: Any) -> Any:
         given = given_options(context)
         chosen = with_presets(given, {option.name: values.pop(option.name) for option in options})
+        if "mavlink" in without and chosen["robot"] is None:
+            raise InputError("no robot given; add --robot NAME (or preset it in stopgo.toml or STOPGO_ROBOT)")
         return command(connection_of(given, **chosen), **values)
 
     context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)

@@ -105,7 +105,7 @@ NO_EFFECT: dict[Verb, tuple[str, ...]] = {
     "skip": ("disarm",),
     "retry": ("disarm",),
     "abort": ("stop", "take_over", "arm", "any_origin"),
-    "home": ("stop", "arm", "any_origin", "disarm"),
+    "home": ("stop", "arm", "any_origin", "disarm", "mavlink", "vehicle", "signing_key", "state"),
 }
 """Options that have no effect on each command, and that it does not take."""
 

@@ -72,8 +72,13 @@ def rise_of(settings: Settings) -> float:
 
 def blind_range(settings: Settings) -> float:
     """Return the radius in metres in which the scanner does not see, or does not see the foot of a wall."""
-    cone = math.radians(settings.blind_cone or 0.0)
+    cone = math.radians(blind_cone_deg(settings))
     return max(settings.near or 0.0, round(scanner_height(settings) * math.tan(cone / 2), 6))
+
+
+def blind_cone_deg(settings: Settings) -> float:
+    """Return the opening angle of the blind cone below the scanner; 0 if the settings have none."""
+    return settings.blind_cone or 0.0
 
 
 def scanner_height(settings: Settings) -> float:

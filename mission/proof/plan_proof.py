@@ -46,8 +46,8 @@ class Simulation:
     """Height of walls and columns."""
     ceiling_known: bool = False
     """True if the model contains that height."""
-    cone_deg: float = 60.0
-    """Opening angle of the blind cone below the scanner."""
+    cone_deg: float = 0.0
+    """Opening angle of the blind cone below the scanner; 0: none."""
     pose_error_m: float = 0.05
     """Error of the robot's pose from which a pair of scans is registered."""
     pose_error_deg: float = 2.0

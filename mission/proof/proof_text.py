@@ -178,11 +178,16 @@ def assumed_words(simulation: Simulation) -> list[str]:
         if simulation.poses
         else "pairs start without poses"
     )
+    cone = (
+        f"blind cone of {simulation.cone_deg:g}°"
+        if simulation.cone_deg
+        else "no blind cone below it (--blind-cone 60 tries a common one)"
+    )
     return [
         f"rays every {simulation.step_deg:g}° to {simulation.range_m:g} m along {along}, "
         f"noise {1000 * simulation.noise_m:g} mm",
         f"points up to {simulation.joining_m:g} m for registration",
-        f"scanner level at {simulation.height_m:g} m, blind cone of {simulation.cone_deg:g}°",
+        f"scanner level at {simulation.height_m:g} m, {cone}",
         f"walls up to {simulation.ceiling_m:g} m ({known}), openings equally high; floor and ceiling level",
         f"{start}; registered: from both sides under {1000 * REGISTERED_M:g} mm and {REGISTERED_DEG:g}°",
         f"a promise is met within {100 * ALLOWED_SHARE:g} percentage point",

@@ -18,6 +18,7 @@ from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document.own_floor import must_be_own_floor
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.plan_toml import read_settings
@@ -78,17 +79,14 @@ def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
 
     Raises
     ------
+    OtherFloor
+        When the file is not the mission's floor.
     InputError
-        When the file cannot be read, or is not the mission's floor.
+        When the file cannot be read.
     """
+    must_be_own_floor(path, mission)
     settings = read_settings(None, mission.origin.parameters)
-    floor = read_floor(path, options_of(settings))
-    if floor.digest != mission.origin.floor_digest:
-        raise InputError(
-            f"{path}: is not the floor that {mission.name} was planned on (sha256 {floor.digest[:12]}…, not "
-            f"{mission.origin.floor_digest[:12]}…); give the file it was planned on"
-        )
-    return PlannedFloor(floor, settings, mission)
+    return PlannedFloor(read_floor(path, options_of(settings)), settings, mission)
 
 
 def as_driven(planned: PlannedFloor, poses: ScanPoses) -> AsDriven:

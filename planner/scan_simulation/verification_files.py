@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.mission.document import Mission
-from stopgo.mission.document.limits import scanner_height
+from stopgo.mission.document.limits import blind_cone_deg, scanner_height
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage, read_coverage
@@ -76,11 +76,11 @@ def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
     known: dict[str, Any] = {
         "step_deg": settings.angular_step,
         "near_m": settings.near,
-        "cone_deg": settings.blind_cone,
     }
     simulation = replace(
         simulation,
         height_m=scanner_height(settings),
+        cone_deg=blind_cone_deg(settings),
         joining_m=max(settings.farthest_overlap, simulation.range_m),
         **{name: value for name, value in known.items() if value is not None},
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -73,8 +72,8 @@ def check(
     that the mission claims. All of it is computed again, each line of sight against every wall. With
     --coverage-file it checks the claims of that file.
 
-    Exit code 0: valid; 1: readable but invalid, of another floor, without clearance, or with more coverage
-    claimed than its stops have; 2: not readable.
+    Exit code 0: valid; 1: readable but invalid, without clearance, or with more coverage claimed than its
+    stops have; 2: not readable, or planned on another floor.
 
     Example: stopgo check out/mission.json --floor office.dxf
     """
@@ -108,6 +107,7 @@ class _Checked:
 
 
 def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Checked:
+    from stopgo.mission.document.own_floor import must_be_own_floor
     from stopgo.mission.document.problems import problems_of
     from stopgo.mission.files.coverage_json import read_coverage
 
@@ -117,7 +117,7 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
             raise InputError(f"--coverage-file {coverage}: needs the floor; give it with --floor")
         return _Checked(problems)
     claims = None if coverage is None else read_coverage(coverage, mission)
-    other = _other_floor(mission, floor)
+    must_be_own_floor(floor, mission)
     try:
         from stopgo.planner.checking.verdict import verdict
 
@@ -128,14 +128,10 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
             raise
         unchecked = "neither clearances nor coverage were checked"
         note = f'{error.name} is not installed, so {unchecked}; pip install "stopgo[plan]"'
-        return _Checked((*problems, *other), notes=(note,))
-    except InputError:
-        if other:  # not the mission's floor, and not readable as a floor
-            return _Checked((*problems, *other))
-        raise
+        return _Checked(problems, notes=(note,))
     counted = found.counted
     return _Checked(
-        (*problems, *other, *found.problems),
+        (*problems, *found.problems),
         coverage=None if counted is None else counted.as_json(),
         coverage_text=None if counted is None else counted.in_words(),
     )
@@ -144,21 +140,6 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
 def _is_library(error: ModuleNotFoundError) -> bool:
     """Return True if the missing module is a library of the extra, not a part of this program."""
     return (error.name or "").partition(".")[0] not in ("", "stopgo")
-
-
-def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
-
-    from stopgo.mission.document.problems import Problem
-
-    try:
-        digest = hashlib.sha256(floor.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{floor}: cannot be read ({error.strerror}); give the floor's file") from None
-    if digest == mission.origin.floor_digest:
-        return ()
-    planned = mission.origin
-    message = f"is {planned.floor_digest[:12]}… ({planned.floor}), but {floor} has {digest[:12]}…; plan again"
-    return (Problem("$.origin.floor_digest", message),)
 
 
 def _verdict(path: Path, mission: Mission, found: _Checked) -> dict[str, Any]:
@@ -215,7 +196,7 @@ SettleOption = Annotated[
 ]
 MapOption = Annotated[
     str | None,
-    typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: rotate, then shift."),
+    typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: rotate by HEADING, then shift."),
 ]
 
 
@@ -295,6 +276,7 @@ def _supplements(
 
 def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     """Return the drawing the mission was planned on, in the unit it was planned in."""
+    from stopgo.mission.document.own_floor import must_be_own_floor
     from stopgo.mission.files.exports.format import FloorDrawing
     from stopgo.planner.floors import options_of
     from stopgo.planner.floors.drawing import open_drawing
@@ -304,8 +286,7 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
         raise InputError(
             f"--floor {path}: layers can be drawn only over a .dxf; leave --floor out to write them alone"
         )
-    for problem in _other_floor(mission, path):
-        raise InputError(f"--floor {path}: is not the floor of this mission: its digest {problem.message}")
+    must_be_own_floor(path, mission)
     data = path.read_bytes()
     drawing, _ = open_drawing(data, source=path)
     options = options_of(read_settings(None, mission.origin.parameters))

@@ -55,6 +55,16 @@ HeightOption = Annotated[
         show_default="the scanner's, else 1.3",
     ),
 ]
+BlindConeOption = Annotated[
+    float | None,
+    typer.Option(
+        "--blind-cone",
+        min=0.0,
+        max=170.0,
+        help="Apex angle of the blind cone under the scanner, degrees.",
+        show_default="the plan's, else 0",
+    ),
+]
 CeilingOption = Annotated[
     float | None,
     typer.Option(
@@ -99,6 +109,7 @@ def prove_command(
     step: StepOption = None,
     noise: NoiseOption = 2.0,
     height: HeightOption = None,
+    blind_cone: BlindConeOption = None,
     ceiling: CeilingOption = None,
     slant: SlantOption = False,
     without_poses: WithoutPosesOption = False,
@@ -121,7 +132,7 @@ def prove_command(
         must_be_writable(path)
     assumed: dict[str, Any] = {"noise_m": noise / 1000, "slant": slant}
     assumed |= {"poses": not without_poses, "seed": seed}
-    given = {"step_deg": step, "height_m": height, "ceiling_m": ceiling}
+    given = {"step_deg": step, "height_m": height, "cone_deg": blind_cone, "ceiling_m": ceiling}
     assumed |= {key: value for key, value in given.items() if value is not None}
     proof, on_floor = _simulated(mission, floor, coverage, assumed)
     with running("writing the proof"):

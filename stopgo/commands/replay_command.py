@@ -42,7 +42,7 @@ ReplayMap = Annotated[
         "--map",
         metavar="X,Y,HEADING",
         rich_help_panel="Position of the log",
-        help="Pose of the site in the log's frame, m and degrees.",
+        help="Site to the log's map: rotate by HEADING, then shift.",
     ),
 ]
 ReplayAlign = Annotated[
@@ -99,7 +99,7 @@ ReplayHtml = Annotated[
     typer.Option(metavar="REPORT.html", rich_help_panel="Output", help="Report to write, as one HTML file."),
 ]
 ReplayPlan = Annotated[
-    Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording: its floor, for the report.")
+    Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording, with floor and visibility.")
 ]
 ReplayAsJson = Annotated[
     bool, typer.Option("--json", rich_help_panel="Output", help="One JSON object on stdout.")

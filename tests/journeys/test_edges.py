@@ -68,9 +68,7 @@ def test_what_cannot_be_read_is_one_line(
 ) -> None:
     before = sorted(os.listdir(workplace))
     arguments = [file if word == "FILE" else word for word in READERS[command]]
-    assert main(arguments) == (
-        1 if command == "check --floor" and file in ("empty", "noise", "/dev/null") else 2
-    )
+    assert main(arguments) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("stopgo: ")
     assert line.isprintable()
@@ -203,11 +201,18 @@ def test_with_json_an_error_is_json_too(
     assert capsys.readouterr().out == ""
 
 
-def test_an_answer_in_json_is_the_only_one(workplace: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The findings of `check` are its only answer; that it has some is not a second one."""
+def test_another_floor_is_the_same_bad_input_to_every_command(
+    workplace: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing is compared with a floor that is not the mission's, whatever the file is."""
     (workplace / "other.dxf").write_text("another floor")
-    assert main(["check", "mission.json", "--floor", "other.dxf", "--json"]) == 1
-    assert json.loads(capsys.readouterr().out)["ok"] is False
+    mission, floor = "mission.json", ["--floor", "other.dxf"]
+    assert main(["check", mission, *floor]) == 2
+    line = capsys.readouterr().err
+    assert "other.dxf: is not the floor that" in line and line.count("\n") == 1
+    for command in (["prove", mission, *floor], ["export", mission, *floor, "-o", "x.dxf"]):
+        assert main(command) == 2
+        assert capsys.readouterr().err == line
 
 
 @pytest.mark.parametrize(("typed", "offered"), [("stopgo pau", "pause"), ("stopgo plan --sel", "--selector")])

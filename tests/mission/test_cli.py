@@ -89,11 +89,11 @@ def test_check_of_a_sound_mission_on_its_floor(
     assert "valid; id 0123456789abcdef0123456789abcdef revision 1, 2 stops" in capsys.readouterr().out
 
 
-def test_check_against_another_floor_is_no(path: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", path, "--floor", path, "--json"]) == 1
-    verdict = json.loads(capsys.readouterr().out)
-    assert verdict["ok"] is False
-    assert [problem["path"] for problem in verdict["problems"]] == ["$.origin.floor_digest"]
+def test_check_against_another_floor_is_bad_input(path: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", path, "--floor", path, "--json"]) == 2
+    error = json.loads(capsys.readouterr().out)["error"]
+    assert error["exit_code"] == 2
+    assert f"{path}: is not the floor that" in error["message"]
 
 
 def test_check_prints_a_line_per_problem(broken: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -62,6 +62,18 @@ def test_a_damaged_coverage_beside_the_mission_is_told(planned: Path, tmp_path: 
     assert "only the mission's counts are compared with the scans" in told.stderr
 
 
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [((), "no blind cone below it (--blind-cone 60"), (("--blind-cone", "60"), "blind cone of 60°")],
+)
+def test_the_blind_cone_is_the_plans_unless_one_is_given(
+    more: tuple[str, ...], words: str, planned: Path, tmp_path: Path
+) -> None:
+    told = prove(planned, "-o", str(tmp_path), *more)
+    assert told.returncode in (0, 1)
+    assert words in told.stdout
+
+
 def test_another_floor_is_refused(planned: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.dxf"
     other.write_bytes((planned / "floor.dxf").read_bytes() + b"999\nanother\n")

@@ -83,6 +83,15 @@ REFUSED = {
     "unknown format": (["-o", "x.csv", "--to", "dwg"], "known: plan"),
     "useless option": (["-o", "x.csv", "--map", "1,2,3"], "--map: not used by table of stops"),
     "another useless option": (["-o", "x.dxf", "--autopilot", "px4"], "--autopilot: not used by DXF drawing"),
+    "settling of none": (
+        ["-o", "x.csv", "--settle-item", "hold"],
+        "--settle-item: not used by table of stops",
+    ),
+    "strange settling": (["-o", "x.plan", "--settle-item", "kk"], "--settle-item kk: one of delay, hold"),
+    "coverage of none": (
+        ["-o", "x.csv", "--coverage-file", "c.json"],
+        "--coverage-file: not used by table of",
+    ),
     "origin of three": (["-o", "x.csv", "--origin", "1,2,3"], "write LAT,LON,ALT,HEADING"),
     "origin of words": (["-o", "x.csv", "--origin", "here"], "write LAT,LON,ALT,HEADING"),
     "origin beyond the pole": (["-o", "x.csv", "--origin", "91,0,0,0"], "latitude must be within"),
@@ -93,7 +102,7 @@ REFUSED = {
     "trigger of none": (["-o", "x.csv", "--trigger", "auto"], "--trigger: not used by table of stops"),
     "floor missing": (["-o", "x.dxf", "--floor", "no.dxf"], "no.dxf: cannot be read"),
     "floor no dxf": (["-o", "x.dxf", "--floor", "README.md"], "only over a .dxf"),
-    "floor of another mission": (["-o", "x.dxf", "--floor", str(SAMPLE)], "is not the floor of this mission"),
+    "floor of another mission": (["-o", "x.dxf", "--floor", str(SAMPLE)], "is not the floor that"),
     "coverage missing": (["-o", "x.dxf", "--coverage-file", "no.json"], "no.json: cannot be read"),
     "folder missing": (["-o", "no/x.csv"], "does not exist"),
 }
