@@ -29,7 +29,6 @@ MEANINGS = {
     "--out": "file or folder to write",
     "--parameters": "plan.toml",
     "--robot": "name of the robot",
-    "--scan-wait": "item with which the vehicle waits for a scan",
     "--seed": "seed of the random numbers",
     "--speed-up": "factor by which simulated time runs faster",
     "--start": "start pose of the robot",
@@ -40,7 +39,6 @@ MEANINGS = {
     "--vehicle": "MAVLink system id",
     "--view": "open the viewer",
     "-o": "file or folder to write",
-    "-p": "plan.toml",
 }
 """Meaning of each option whose help differs between commands. Only the command's own details differ."""
 
