@@ -39,6 +39,7 @@ MEANINGS = {
     "--vehicle": "MAVLink system id",
     "--view": "open the viewer",
     "-o": "file or folder to write",
+    "-p": "plan.toml",
 }
 """Meaning of each option whose help differs between commands. Only the command's own details differ."""
 

@@ -13,7 +13,7 @@ import typer
 from stopgo.commands.align_command import align
 from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
-from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.errors import InputError, NegativeResult, OtherFloor
 from stopgo.mission.files.atomic import must_not_replace, write_checked
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import PARAMETERS
@@ -117,7 +117,10 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
             raise InputError(f"--coverage-file {coverage}: needs the floor; give it with --floor")
         return _Checked(problems)
     claims = None if coverage is None else read_coverage(coverage, mission)
-    must_be_own_floor(floor, mission)
+    try:
+        must_be_own_floor(floor, mission)
+    except OtherFloor as other:
+        raise OtherFloor(f"{other}{_fit_on_other_floor(mission, floor)}") from None
     try:
         from stopgo.planner.checking.verdict import verdict
 
@@ -135,6 +138,20 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
         coverage=None if counted is None else counted.as_json(),
         coverage_text=None if counted is None else counted.in_words(),
     )
+
+
+def _fit_on_other_floor(mission: Mission, floor: Path) -> str:
+    """Return in words if the mission fits a floor that it was not planned on; empty if unknown."""
+    try:
+        from stopgo.planner.checking.verdict import verdict
+
+        found = verdict(mission, floor, None).problems
+    except (ModuleNotFoundError, InputError):
+        return ""
+    if not found:
+        return "; its stops and legs fit there too"
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    return f"; there, {found[0]}{more}"
 
 
 def _is_library(error: ModuleNotFoundError) -> bool:
