@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import nullcontext
@@ -15,6 +14,7 @@ from hypothesis import settings
 
 from tests.alone import first_alone
 from tests.faults.sizes import FULL, size
+from tests.shell import forget_the_shell
 
 # The same examples every time, and no deadline on a shared machine.
 settings.register_profile(
@@ -29,15 +29,13 @@ TESTS = Path(__file__).parent
 def pytest_configure() -> None:
     """Let no test depend on where the tests run, or on which of them ran before in the same process.
 
-    A shell without job control starts background programs with SIGINT ignored, and children inherit that.
-    What commands remember of robots and vehicles goes to a folder of the tests' own.
+    What commands remember of robots and vehicles, and their caches, go to a folder of the tests' own.
     pymavlink asks this variable for its version, at its import and again later; the bridge sets it.
     """
     os.environ["MAVLINK20"] = "1"
     if "PYTEST_XDIST_WORKER" not in os.environ:  # workers have their parent's
-        os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.environ["XDG_STATE_HOME"] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
+    forget_the_shell()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -51,7 +49,6 @@ def pytest_collection() -> Iterator[None]:
 
 def pytest_collection_finish() -> None:
     """Look no more for garbage among thousands of collected tests: that takes a tenth of all time."""
-    gc.collect()
     gc.freeze()
 
 
