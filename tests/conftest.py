@@ -18,7 +18,7 @@ from tests.shell import forget_the_shell
 
 # The same examples every time, and no deadline on a shared machine.
 settings.register_profile(
-    "tests", deadline=None, derandomize=True, max_examples=size(short=30, full=300), database=None
+    "tests", deadline=None, derandomize=True, max_examples=size(short=20, full=300), database=None
 )
 settings.register_profile("search", deadline=None, max_examples=20_000)
 settings.load_profile(os.environ.get("STOPGO_HYPOTHESIS", "tests"))
