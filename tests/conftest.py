@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import math
 import os
-import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import nullcontext
@@ -17,10 +16,11 @@ from hypothesis import settings
 from stopgo.mission.console import running_step
 from tests.alone import first_alone
 from tests.faults.sizes import FULL, size
+from tests.shell import forget_the_shell
 
 # The same examples every time, and no deadline on a shared machine.
 settings.register_profile(
-    "tests", deadline=None, derandomize=True, max_examples=size(short=30, full=300), database=None
+    "tests", deadline=None, derandomize=True, max_examples=size(short=20, full=300), database=None
 )
 settings.register_profile("search", deadline=None, max_examples=20_000)
 settings.load_profile(os.environ.get("STOPGO_HYPOTHESIS", "tests"))
@@ -31,17 +31,15 @@ TESTS = Path(__file__).parent
 def pytest_configure() -> None:
     """Let no test depend on where the tests run, or on which of them ran before in the same process.
 
-    A shell without job control starts background programs with SIGINT ignored, and children inherit that.
-    What commands remember of robots and vehicles goes to a folder of the tests' own.
+    What commands remember of robots and vehicles, and their caches, go to a folder of the tests' own.
     A command that takes long on a busy machine prints no further line for that.
     pymavlink asks this variable for its version, at its import and again later; the bridge sets it.
     """
     os.environ["MAVLINK20"] = "1"
     running_step.PATIENCE_S = math.inf
     if "PYTEST_XDIST_WORKER" not in os.environ:  # workers have their parent's
-        os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.environ["XDG_STATE_HOME"] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
+    forget_the_shell()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -55,7 +53,6 @@ def pytest_collection() -> Iterator[None]:
 
 def pytest_collection_finish() -> None:
     """Look no more for garbage among thousands of collected tests: that takes a tenth of all time."""
-    gc.collect()
     gc.freeze()
 
 

@@ -151,7 +151,7 @@ def test_a_power_cut_at_any_journal_entry_loses_nothing_and_repeats_nothing(
 
 
 def test_many_power_cuts_in_one_run_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
-    trials, failures, again = size(short=150, full=3000), 0, 0
+    trials, failures, again = size(short=75, full=3000), 0, 0
     for seed in range(trials):
         chance = random.Random(seed)
         cuts = {

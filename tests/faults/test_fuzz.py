@@ -100,7 +100,7 @@ def test_no_payload_on_any_key_brings_the_robot_down() -> None:
     station.push(MISSION)
 
     @settings(
-        max_examples=size(short=500, full=30_000),
+        max_examples=size(short=200, full=30_000),
         deadline=None,
         derandomize=True,
         database=None,
@@ -132,7 +132,7 @@ def test_a_command_on_the_key_of_another_verb_is_malformed() -> None:
 
 
 @given(data=st.data())
-@settings(max_examples=size(short=150, full=3000), deadline=None, derandomize=True, database=None)
+@settings(max_examples=size(short=60, full=3000), deadline=None, derandomize=True, database=None)
 def test_no_document_brings_the_robot_down(data: st.DataObject) -> None:
     """What is transferred whole and with the right hash may still be anything."""
     field = Field()

@@ -264,7 +264,7 @@ class Trial:
 def test_a_malicious_router_can_do_nothing_but_withhold(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     did: Counter[str] = Counter()
     outcomes: Counter[str] = Counter()
-    for seed in range(size(short=8, full=200)):
+    for seed in range(size(short=4, full=200)):
         trial = Trial(site, seed)
         monkeypatch.setattr(stations, "time", FieldTime(trial.field))
         trial.run()

@@ -328,7 +328,7 @@ def plan_or_refuse(floor: FloorPlan, chosen: Settings) -> Any:
 
 
 @settings(
-    max_examples=size(short=20, full=200),
+    max_examples=size(short=12, full=200),
     deadline=None,
     derandomize=True,
     suppress_health_check=list(HealthCheck),

@@ -15,7 +15,7 @@ import pytest
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.document import Scan
 from stopgo.mission.files.mission_json import write
-from stopgo.mission.run.events import Finished, Scanned, Unconfirmed
+from stopgo.mission.run.events import Finished, Scanned
 from stopgo.recordings.embedded.reading import read_recording
 from tests.bridge.mavlink.auto.site import real_tour
 from tests.called import stopgo
@@ -77,13 +77,14 @@ def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tm
     assert refused.returncode == 1 and "--arm" in refused.stderr and refused.stderr.count("\n") == 1
     told = json.loads(refused.stdout)
     assert (told["outcome"], told["reason"]) == ("refused", "not_armed") and "--arm" in told["message"]
-    begun = vehicle.run("start", "--arm", "--json")
-    assert begun.returncode == 0 and json.loads(begun.stdout)["state"] == "RUNNING"
 
+    # It watches before the run begins: a vehicle that nobody watches may have left its first stop.
     killed = subprocess.Popen(vehicle.command("watch"), stdout=subprocess.PIPE, text=True)
     assert killed.stdout is not None
-    # Unconfirmed, if the vehicle had left the stop before anybody watched.
-    assert any("Scanned" in line or "Unconfirmed" in line for line in killed.stdout)
+    assert "waiting" in killed.stdout.readline()
+    begun = vehicle.run("start", "--arm", "--json")
+    assert begun.returncode == 0 and json.loads(begun.stdout)["state"] == "RUNNING"
+    assert any("Scanned" in line for line in killed.stdout)
     killed.send_signal(signal.SIGKILL)
     killed.wait()
 
@@ -101,7 +102,7 @@ def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tm
     assert events[-1]["event"] == "Finished"
     assert (told["done"], told["skipped"]) == (["S1", "S3"], ["S2"])
     (log,) = read_recording(tmp_path / "field.rrd").logs
-    through = [event.stop for event in log.events if isinstance(event, Scanned | Unconfirmed)]
+    through = [event.stop for event in log.events if isinstance(event, Scanned)]
     assert sorted(through) == ["S1", "S3"]
     assert isinstance(log.events[-1], Finished)
 

@@ -81,6 +81,8 @@ def test_a_watch_that_comes_first_waits_for_the_run_and_ends_with_1_when_it_is_a
         assert watch.stdout is not None
         assert "waiting" in watch.stdout.readline()
         station.command("start")
+        # A watch that has received no pose asks for those of the past, with much patience.
+        assert any(isinstance(report, PoseReport) for report in station.reports())
         station.command("abort")
         said = watch.communicate(timeout=120)[0]
     assert watch.returncode == 1

@@ -22,6 +22,7 @@ from stopgo.mission.stages import NavigableSpace, Route, Selection
 from stopgo.mission.stages.figures import percent
 from stopgo.planner.checking.claims import Recount, overclaims, recount
 from stopgo.planner.visibility.sight.sight import sight
+from tests.faults.sizes import some
 from tests.journeys.test_base import without_extras
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (
@@ -62,11 +63,13 @@ def counted(mission: Mission, nouns: dict[type, Any]) -> tuple[Recount, list[str
     return found, [str(problem) for problem in overclaims(mission, found, coverage)]
 
 
-@pytest.mark.parametrize("move", [shifted(0, 0), turned(17), shifted(5e5, 5.4e6)])
-@pytest.mark.parametrize("name", WORLDS)
-def test_what_a_plan_claims_is_so(name: str, move: Any) -> None:
+MOVES = {"as drawn": shifted(0, 0), "turned": turned(17), "far off": shifted(5e5, 5.4e6)}
+
+
+@pytest.mark.parametrize(("name", "by"), some([(name, by) for name in WORLDS for by in MOVES], every=2))
+def test_what_a_plan_claims_is_so(name: str, by: str) -> None:
     floor, settings = WORLDS[name]
-    mission, nouns = planned(moved(floor, move), settings)
+    mission, nouns = planned(moved(floor, MOVES[by]), settings)
     found, problems = counted(mission, nouns)
     assert problems == []
     assert [len(units) for units in found.by_stop] == [stop.sees.units for stop in mission.stops]

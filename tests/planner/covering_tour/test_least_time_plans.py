@@ -162,7 +162,7 @@ def test_a_bound_that_another_selector_claims_is_not_believed() -> None:
         {"graph": "grid", "router": "aco"},
         {"candidates": "triangulation"},
         {"coverage_rule": "paper"},
-        {"selector": "anywhere", "range": 5.0, "grid": 2.0},
+        {"selector": "anywhere", "range": 5.0, "grid": 3.0},
     ],
     ids=str,
 )

@@ -126,7 +126,7 @@ def test_a_file_cut_off_anywhere_is_refused_or_read_with_a_finding(tmp_path: Pat
 
 
 @settings(
-    max_examples=size(short=50, full=150),
+    max_examples=size(short=25, full=150),
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -33,9 +33,15 @@ QUICK = {
 def brisk(**details: Any) -> Mission:
     """Two stops that are driven to and scanned in a few seconds: processes wait in real time."""
     made = site_mission(scan=Scan(profile="default", duration_s=1.0, timeout_s=20.0), **details)
-    return sealed(
-        msgspec.structs.replace(made, robot=msgspec.structs.replace(made.robot, speed=1.2, acceleration=1.5))
+    robot = msgspec.structs.replace(made.robot, speed=1.2, acceleration=1.5)
+    stops = tuple(
+        msgspec.structs.replace(
+            stop, x=stop.x / 2, y=stop.y / 2, approach=tuple((x / 2, y / 2) for x, y in stop.approach)
+        )
+        for stop in made.stops
     )
+    back = made.return_ and tuple((x / 2, y / 2) for x, y in made.return_)
+    return sealed(msgspec.structs.replace(made, robot=robot, stops=stops, return_=back))
 
 
 @contextmanager
@@ -73,7 +79,7 @@ def scans_begun(operator: Operator) -> int:
 @pytest.mark.parametrize("profile", ["ardupilot", "px4"])
 def test_a_mission_over_zenoh_is_driven_by_an_autopilot_and_recorded(tmp_path: Path, profile: str) -> None:
     document, field = tmp_path / "mission.json", tmp_path / "field.rrd"
-    document.write_bytes(msgspec.json.encode(brisk(closed=True)))
+    document.write_bytes(msgspec.json.encode(brisk(closed=profile == "ardupilot")))
     with (
         vehicle(tmp_path, profile) as (url, operator),
         robot_process("r1", tmp_path / "r1", extra=driving(url)) as endpoint,

@@ -34,7 +34,7 @@ LAYERED = Path(__file__).parents[5] / "shared" / "data" / "layered"
 LARGE = ("workshop-2018-11-08", "workshop-2019-10-29", "house", "barcelona-plan", "barcelona-wrong-units")
 """They take longest; the tests of the readers read one of each building, and another of Barcelona is here."""
 WILD = [path for path in sorted((LAYERED.parent / "dxf").glob("*.dxf")) if FULL or path.stem not in LARGE]
-FLOORS = ("office-l1", "duplex-l1", "fzk-haus-eg")
+FLOORS = ("duplex-l1", "fzk-haus-eg", *(["office-l1"] if FULL else []))
 
 pytestmark = pytest.mark.skipif(not LAYERED.is_dir(), reason=f"the real inputs are not in {LAYERED}")
 
