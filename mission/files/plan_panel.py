@@ -212,8 +212,7 @@ def _symbol(name: str, x: float, y: float) -> str:
         inner = circle(x + 3.5, y, 1.5, fill="#fff", stroke=route_look.INK, stroke_width=0.3)
         tick = line(x + 5, y, x + 6.2, y, stroke=route_look.INK, stroke_width=0.6)
         return tick + (outer if name == "doorway" else "") + inner + _centred("1", x + 3.5, y)
-    look = floor_look.LOOKS.get(name, floor_look.LOOKS["other"])
-    return rect(x, y - 1.3, 7.0, 2.6, stroke_width=0.18, **look)
+    return rect(x, y - 1.3, 7.0, 2.6, **floor_look.look_of(name))
 
 
 def _centred(word: str, x: float, y: float, **style: object) -> str:
