@@ -16,6 +16,7 @@ from stopgo.commands.align_command import align
 from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.atomic import must_not_replace, write_checked
+from stopgo.mission.files.given_file import bytes_of
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import PARAMETERS
 
@@ -151,10 +152,7 @@ def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
 
     from stopgo.mission.document.problems import Problem
 
-    try:
-        digest = hashlib.sha256(floor.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{floor}: cannot be read ({error.strerror}); give the floor's file") from None
+    digest = hashlib.sha256(bytes_of(floor, "give the floor's file")).hexdigest()
     if digest == mission.origin.floor_digest:
         return ()
     planned = mission.origin
