@@ -26,7 +26,12 @@ FLOOR_PERCENTILE = 0.5
 
 def _reader(name: str) -> CloudReader:
     load = loader(f"stopgo.recordings.clouds.{name}:read_{name}")
-    return lambda path: load()(path)
+
+    def read(path: Path) -> CloudChunks:
+        chunks: CloudChunks = load()(path)
+        return chunks
+
+    return read
 
 
 CLOUD_READERS = {
