@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.document import Stop
-from stopgo.mission.files.floor_drawing import LOOKS, kinds_of
+from stopgo.mission.files.floor_drawing import kinds_of, look_of
 from stopgo.mission.files.svg import (
     circle,
     group,
@@ -147,7 +147,8 @@ def elements_of(floor: FloorPlan, window: Window, *, faint: bool = False) -> Ite
         if faint and kind == "beams":
             continue
         elements = [item for item in floor.elements if item.kind == kind]
-        look = {**LOOKS[kind], **({"stroke_dasharray": "7 4"} if kind == "beams" else {})}
+        dash = {"stroke_dasharray": "7 4"} if kind == "beams" else {}
+        look = {**look_of(kind), "stroke_width": 1, **dash}
         yield path(window.region(p for item in elements for p in item.solids), **look, fill_rule="evenodd")
         lines = (line_data(window(drawn)) for item in elements for drawn in item.lines)
         yield path(lines, **{**look, "fill": "none"})
@@ -181,7 +182,7 @@ def draw_floor(drawn: PartPlan) -> str:
         ring = room.polygons[0].exterior
         x, y = window.at((ring.min(axis=0) + ring.max(axis=0)) / 2)
         names.append(text(x, y + 5, room.label, size=13, fill="#333333", text_anchor="middle", **halo))
-    signs = {kind: LOOKS[kind] for kind in kinds_of(drawn.floor)}
+    signs = {kind: {**look_of(kind), "stroke_width": 1} for kind in kinds_of(drawn.floor)}
     legend = [
         *((swatch(**look), kind) for kind, look in signs.items()),
         (stroke(stroke="#0b63b0", stroke_width=3), "door"),
@@ -458,7 +459,10 @@ def draw_vertex(_: PartPlan) -> str:
         shift = np.array([3.9 * k, 0.6])
         colour = SEEN if seen else MISSED
         dash = {} if seen else {"stroke_dasharray": "5 4"}
-        layers += [polygon(window(np.array(solid) + shift), **LOOKS["walls"]) for solid in solids]
+        layers += [
+            polygon(window(np.array(solid) + shift), **{**look_of("walls"), "stroke_width": 1})
+            for solid in solids
+        ]
         ray = line_data(window(np.array([eye, unit]) + shift))
         layers.append(path([ray], stroke=colour, stroke_width=1.6, fill="none", **dash))
         layers.append(circle(*window.at(np.array(eye) + shift), 5.0, fill=INK))

@@ -18,8 +18,6 @@ REASONS = {
     "stopgo.mission.plan": "a plan is drawn where a notebook shows it",
     "stopgo.planner.candidates.triangulation": "scipy.spatial takes 0.4 s, and few plans triangulate",
     "stopgo.planner.pipeline": "`import stopgo.planner` loads no stage",
-    "stopgo.recordings.clouds": "one format's reader is loaded, by the file's suffix",
-    "stopgo.recordings.logs": "one format's reader is loaded, by the log's name or first bytes",
     "stopgo.recordings.viewing.importer": "Rerun asks of every file; most are not ours",
 }
 """Modules that import lazily although no library is spared."""

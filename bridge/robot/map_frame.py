@@ -12,9 +12,7 @@ from threading import Event
 
 from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest
 from stopgo.mission.document import Mission, Point, RobotSpec
-from stopgo.mission.frames import frame_transform
-from stopgo.mission.frames.frame_transform import SAME
-from stopgo.mission.frames.transform import Transform
+from stopgo.mission.frames.transform import SAME, Transform
 from stopgo.mission.run.events import Pose
 
 
@@ -51,7 +49,7 @@ class OnMap:
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:
-        points = [turned_point(point, self.to_map) for point in path]
+        points = [self.to_map.point(point) for point in path]
         on_map = None if heading is None else heading + self.to_map.heading
         return self._base.goto(points, heading=on_map, limits=limits, interrupt=interrupt)
 
@@ -68,21 +66,15 @@ class OnMap:
         return self._base.blocked_by()
 
 
-def turned_point(point: Point, to_map: Transform) -> Point:
-    """Transform a point from the site to the map: rotated by `heading`, then shifted."""
-    return frame_transform.to_map_point(to_map, point)
-
-
 def turned(pose: Pose, to_map: Transform) -> Pose:
     """Transform a pose from the site to the map."""
-    x, y = turned_point((pose.x, pose.y), to_map)
-    return Pose(x=x, y=y, heading=math.remainder(pose.heading + to_map.heading, math.tau))
+    there = to_map.after(Transform(x=pose.x, y=pose.y, heading=pose.heading))
+    return Pose(x=there.x, y=there.y, heading=there.heading)
 
 
 def turned_back(pose: Pose, to_map: Transform) -> Pose:
     """Transform a pose from the map to the site; without a transform it is returned unchanged."""
     if to_map == SAME:
         return pose
-    x, y = frame_transform.from_map_point(to_map, (pose.x, pose.y))
-    heading = math.remainder(pose.heading - to_map.heading, math.tau)
-    return Pose(x=x, y=y, heading=heading)
+    x, y = to_map.back((pose.x, pose.y))
+    return Pose(x=x, y=y, heading=math.remainder(pose.heading - to_map.heading, math.tau))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from importlib import import_module
@@ -113,6 +113,12 @@ def variant(stage: str, name: str, known: Mapping[str, T], *, said: str = "") ->
         there = ", ".join([*known, *sorted(points)])
         raise InputError(f"{said}: no such {stage}; known: {there}, or module:function")
     return Variant(said, name, _loaded(said, name, points.get(name)), ours=False)
+
+
+def loader(reference: str) -> Callable[[], Any]:
+    """Return a function that loads one of our `module:function` when it is first needed."""
+    module, _, function = reference.partition(":")
+    return lambda: getattr(import_module(module), function)
 
 
 def installed(stage: str) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.given_file import bytes_of
 from stopgo.mission.floor import Element
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import Route, Targets
@@ -81,11 +82,10 @@ def read_coverage(path: Path, mission: Mission) -> Coverage:
     InputError
         When the file cannot be read, or holds the coverage of another mission.
     """
+    data = bytes_of(path, "give a coverage.json").removeprefix(BOM_UTF8)
     try:
         with one_decode_error():
-            coverage = msgspec.json.decode(path.read_bytes().removeprefix(BOM_UTF8), type=Coverage)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a coverage.json") from None
+            coverage = msgspec.json.decode(data, type=Coverage)
     except msgspec.DecodeError as error:
         raise InputError(f"{path}: not a coverage.json of this version ({error}); plan again") from None
     _check_mission(coverage.mission, mission, path)

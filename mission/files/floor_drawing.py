@@ -8,23 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from stopgo.mission.files.sheet import PaperSheet
+from stopgo.mission.files.sheet import PaperMap, PaperSheet
 from stopgo.mission.files.svg import clean, group, line_data, number, path, ring_data
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, Polygon
+from stopgo.mission.settings.element_kinds import kind_of
 from stopgo.mission.stages import NavigableSpace, OpeningState, Selection, Targets
 from stopgo.mission.stages.covered_intervals import runs_of, seen_units
 
-LOOKS: dict[str, dict[str, object]] = {
-    "walls": {"fill": "#9b9b9b", "stroke": "#6f6f6f"},
-    "columns": {"fill": "#4a4a4a", "stroke": "#2e2e2e"},
-    "beams": {"fill": "none", "stroke": "#8a6d3b", "stroke_dasharray": "1.6 0.8"},
-    "stairs": {"fill": "#e3dccf", "stroke": "#94876f"},
-    "windows": {"fill": "#cfe8f5", "stroke": "#4c8fb5"},
-    "railings": {"fill": "#ecdff2", "stroke": "#8b5fa3"},
-    "other": {"fill": "#efe2e2", "stroke": "#a58787"},
-}
-"""Fill of each element kind; other kinds look like `other`."""
+FLOOR: dict[str, object] = {"fill": "#f3f0dc", "stroke": "#555", "stroke_width": 0.25}
+ROOM: dict[str, object] = {"fill": "#ffffff", "stroke": "#b5b5b5", "stroke_width": 0.1}
 SEEN: dict[str, Any] = {"stroke": "#1a8f3c", "stroke_width": 0.5}
 UNSEEN: dict[str, Any] = {"stroke": "#d7191c", "stroke_width": 0.8}
 HIDDEN: dict[str, Any] = {"stroke": "#ee9a7b", "stroke_width": 0.3}
@@ -34,17 +27,28 @@ PASSABLE: dict[str, object] = {"stroke": "#0b63b0", "stroke_width": 0.4}
 BLOCKED: dict[str, object] = {"stroke": "#e07b00", "stroke_width": 0.5}
 
 
+def look_of(kind: str) -> dict[str, object]:
+    """Return fill and stroke of an element kind; overhead kinds are dashed."""
+    row = kind_of(kind)
+    dashes = {"stroke_dasharray": "1.6 0.8"} if row.fill == "none" else {}
+    return {"fill": row.fill, "stroke": row.colour, "stroke_width": 0.18, **dashes}
+
+
 def building(space: NavigableSpace, sheet: PaperSheet) -> Iterator[str]:
     """Floor, rooms, elements by kind, and openings."""
-    floor = space.floor
-    outline = "".join(_region(part, sheet) for part in floor.outline)
-    yield group("floor", [path([outline])], fill="#f1f1ee", stroke="#555", stroke_width=0.25, **_EVEN_ODD)
-    rooms = (_region(part, sheet) for room in floor.rooms for part in room.polygons)
-    yield group("rooms", [path(rooms)], fill="#ffffff", stroke="#b5b5b5", stroke_width=0.1, **_EVEN_ODD)
+    yield from floor_layers(space.floor, sheet)
+    yield from _openings(space.openings, sheet)
+
+
+def floor_layers(floor: FloorPlan, paper: PaperSheet | PaperMap, *, named: bool = False) -> Iterator[str]:
+    """Yield floor, rooms, and elements by kind; `named` gives every element a tooltip, not only a model's."""
+    outline = "".join(_region(part, paper) for part in floor.outline)
+    yield group("floor", [path([outline])], **FLOOR, **_EVEN_ODD)
+    rooms = (_region(part, paper) for room in floor.rooms for part in room.polygons)
+    yield group("rooms", [path(rooms)], **ROOM, **_EVEN_ODD)
     for kind in kinds_of(floor):
         elements = [item for item in floor.elements if item.kind == kind]
-        yield group(kind, _elements(elements, sheet), stroke_width=0.18, **LOOKS.get(kind, LOOKS["other"]))
-    yield from _openings(space.openings, sheet)
+        yield group(kind, _elements(elements, paper, named=named), **look_of(kind))
 
 
 def outline(floor: FloorPlan, sheet: PaperSheet) -> str:
@@ -87,23 +91,24 @@ def cross(at: FloatArray, *, size: float) -> str:
     )
 
 
-def _region(part: Polygon, sheet: PaperSheet) -> str:
+def _region(part: Polygon, sheet: PaperSheet | PaperMap) -> str:
     return "".join(ring_data(sheet.on_paper(ring)) for ring in part.rings)
 
 
-def _elements(elements: list[Element], sheet: PaperSheet) -> Iterator[str]:
+def _elements(elements: list[Element], sheet: PaperSheet | PaperMap, *, named: bool) -> Iterator[str]:
     """Yield the elements; those of a model are separate shapes with a tooltip."""
-    yield from (_named(item, sheet) for item in elements if item.global_id)
-    elements = [item for item in elements if not item.global_id]
+    yield from (_named(item, sheet) for item in elements if named or item.global_id)
+    elements = [] if named else [item for item in elements if not item.global_id]
     solids = (_region(part, sheet) for item in elements for part in item.solids)
     yield path(solids, **_EVEN_ODD)
     yield path((line_data(sheet.on_paper(line)) for item in elements for line in item.lines), fill="none")
 
 
-def _named(item: Element, sheet: PaperSheet) -> str:
+def _named(item: Element, sheet: PaperSheet | PaperMap) -> str:
     solids = path((_region(part, sheet) for part in item.solids), **_EVEN_ODD)
     lines = path((line_data(sheet.on_paper(line)) for line in item.lines), fill="none")
-    return f"<g><title>{clean(f'{item.id} {item.global_id}')}</title>{solids}{lines}</g>"
+    name = " ".join(filter(None, (item.id, item.global_id)))
+    return f"<g><title>{clean(name)}</title>{solids}{lines}</g>"
 
 
 def _openings(openings: tuple[OpeningState, ...], sheet: PaperSheet) -> Iterator[str]:

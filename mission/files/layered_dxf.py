@@ -14,24 +14,21 @@ from stopgo.mission.console.table import printable
 from stopgo.mission.files.dxf_bytes import encoded, reproducible
 from stopgo.mission.floor import FloorPlan, Room
 from stopgo.mission.geometry import FloatArray, Polygon
-from stopgo.mission.settings.element_kinds import KINDS
+from stopgo.mission.settings.element_kinds import KINDS, kind_of
 
 if TYPE_CHECKING:
     from ezdxf.entities import DXFEntity
     from ezdxf.layouts import Modelspace
 
-COLOURS = {
-    "FLOOR": 8, "ROOMS": 3, "DOORS": 5, "PASSAGES": 150, "WALLS": 7, "COLUMNS": 1, "BEAMS": 40,
-    "STAIRS": 30, "WINDOWS": 4, "RAILINGS": 6, "OBJECTS": 33, "OTHER": 9,
-}  # fmt: skip
-"""AutoCAD colour of each layer."""
+COLOURS = {"FLOOR": 8, "ROOMS": 3, "DOORS": 5, "PASSAGES": 150}
+"""AutoCAD colours of the layers that hold no elements."""
 TEXT = 0.2
 """Height of a room's name in metres."""
 
 
 def layered_dxf(floor: FloorPlan) -> bytes:
     """Return the drawing's bytes; equal floors give equal bytes."""
-    import ezdxf
+    import ezdxf.colors
     import ezdxf.units
 
     with reproducible():
@@ -39,6 +36,8 @@ def layered_dxf(floor: FloorPlan) -> bytes:
         drawing.appids.add("IFC")
         for name, colour in COLOURS.items():
             drawing.layers.add(name, color=colour)
+        for kind in KINDS.values():
+            drawing.layers.add(kind.name.upper(), true_color=ezdxf.colors.rgb2int(kind.rgb))
         _draw(drawing.modelspace(), floor)
         return encoded(drawing)
 
@@ -51,7 +50,7 @@ def _draw(space: Modelspace, floor: FloorPlan) -> None:
             _rings(space, part, "ROOMS", room.global_id)
         _name(space, room)
     for element in floor.elements:
-        layer = element.kind.upper() if element.kind in KINDS else "OTHER"
+        layer = kind_of(element.kind).name.upper()
         for part in element.solids:
             _rings(space, part, layer, element.global_id)
         for line in element.lines:

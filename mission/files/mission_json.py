@@ -15,6 +15,7 @@ import msgspec
 from stopgo.mission.document import SCHEMA, VERSION, Mission, canonical, digest_of, sealed
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.given_file import bytes_of
 
 _WIDEST = 2**53
 """Largest integer that readers with double-precision numbers keep exactly."""
@@ -28,11 +29,7 @@ def read(path: Path | str) -> Mission:
     InputError
         When it cannot be read, or `parse` refuses it.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a mission.json") from None
-    return parse(data, str(path))
+    return parse(bytes_of(Path(path), "give a mission.json"), str(path))
 
 
 def parse(data: bytes, name: str) -> Mission:

@@ -11,7 +11,7 @@ from stopgo.mission.console.table import duration, printable, table
 from stopgo.mission.document import Mission
 from stopgo.mission.document.limits import limits_in_words
 from stopgo.mission.document.schedule import Schedule
-from stopgo.mission.document.stop_list import COLUMNS, stop_list
+from stopgo.mission.files.stop_list import COLUMNS, stop_list
 from stopgo.mission.geometry import frozen, polyline_length
 
 

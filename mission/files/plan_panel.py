@@ -13,11 +13,11 @@ from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission
 from stopgo.mission.document.limits import limits_in_words
 from stopgo.mission.document.schedule import schedule
-from stopgo.mission.document.stop_list import stop_list
 from stopgo.mission.files import floor_drawing as floor_look
 from stopgo.mission.files import route_drawing as route_look
 from stopgo.mission.files.shared_drawing import back, letter, line_of
 from stopgo.mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
+from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
 from stopgo.mission.geometry import polyline_length
 from stopgo.mission.stages import Route, Selection
@@ -213,8 +213,7 @@ def _symbol(name: str, x: float, y: float) -> str:
         inner = circle(x + 3.5, y, 1.5, fill="#fff", stroke=route_look.INK, stroke_width=0.3)
         tick = line(x + 5, y, x + 6.2, y, stroke=route_look.INK, stroke_width=0.6)
         return tick + (outer if name == "doorway" else "") + inner + _centred("1", x + 3.5, y)
-    look = floor_look.LOOKS.get(name, floor_look.LOOKS["other"])
-    return rect(x, y - 1.3, 7.0, 2.6, stroke_width=0.18, **look)
+    return rect(x, y - 1.3, 7.0, 2.6, **floor_look.look_of(name))
 
 
 def _centred(word: str, x: float, y: float, **style: object) -> str:

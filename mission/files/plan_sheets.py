@@ -14,13 +14,13 @@ from itertools import product
 import numpy as np
 
 from stopgo.mission.document import Mission
-from stopgo.mission.document.stop_list import stop_list
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import outline
 from stopgo.mission.files.pdf import PdfPage, pdf_of
 from stopgo.mission.files.plan_svg import drawing_of, extent_of, overview, whole_sheet
 from stopgo.mission.files.room_labels import inside
 from stopgo.mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, PaperSheet
+from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import group, line, rect, shortened, text
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray

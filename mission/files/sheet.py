@@ -23,6 +23,23 @@ HEADER = 5.0
 
 
 @dataclass(frozen=True)
+class PaperMap:
+    """Map from site metres, y up, to paper, y down."""
+
+    point: tuple[float, float]
+    """A point of the site …"""
+    position: tuple[float, float]
+    """… and its position on paper."""
+    per_metre: float = 1.0
+    """Paper's units per metre."""
+
+    def on_paper(self, xy: FloatArray) -> FloatArray:
+        """Return points of the site (…, 2) on paper."""
+        moved = (np.asarray(xy, dtype=np.float64) - self.point) * self.per_metre
+        return np.asarray(moved * (1.0, -1.0) + self.position)
+
+
+@dataclass(frozen=True)
 class PaperBox:
     """A rectangle on paper, in millimetres from the sheet's upper left corner."""
 
@@ -60,8 +77,7 @@ class PaperSheet:
     def on_paper(self, xy: FloatArray) -> FloatArray:
         """Site metres (…, 2), y up, as millimetres on the sheet, y down."""
         middle = (self.drawing.x + self.drawing.width / 2, self.drawing.y + self.drawing.height / 2)
-        moved = (np.asarray(xy, dtype=np.float64) - self.centre) * (1000 / self.scale)
-        return np.asarray(moved * (1.0, -1.0) + middle)
+        return PaperMap(self.centre, middle, 1000 / self.scale).on_paper(xy)
 
     def length(self, metres: float) -> float:
         """Metres as millimetres on paper."""

@@ -70,12 +70,19 @@ def rigid_fit(first: FloatArray, second: FloatArray) -> RigidFit:
         )
     if _is_mirrored(a, b, math.hypot(along, across)):
         raise InputError("the map is mirrored: exchange its x and y, or change the sign of one of them")
+    transform = least_squares(first, second)
+    return RigidFit(transform, frozen(np.hypot(*(transform.points(first) - second).T)), scale)
+
+
+def least_squares(first: FloatArray, second: FloatArray, weight: FloatArray | None = None) -> Transform:
+    """Return the rotation and shift of least squared distances, each with its weight if given (n,)."""
+    a, b = (points - np.average(points, axis=0, weights=weight) for points in (first, second))
+    along, across = _products(a if weight is None else a * weight[:, None], b)
     heading = math.atan2(across, along)
-    cos, sin = math.cos(heading), math.sin(heading)
-    turned = first @ np.array([[cos, sin], [-sin, cos]])
-    x, y = (second.mean(axis=0) - turned.mean(axis=0)).tolist()
-    away = turned + np.array([x, y]) - second
-    return RigidFit(Transform(x=x, y=y, heading=heading), frozen(np.hypot(*away.T)), scale)
+    turned = Transform(x=0.0, y=0.0, heading=heading).points(first)
+    middles = (np.average(points, axis=0, weights=weight) for points in (second, turned))
+    x, y = np.subtract(*middles).tolist()
+    return Transform(x=x, y=y, heading=heading)
 
 
 def _products(a: FloatArray, b: FloatArray) -> tuple[float, float]:

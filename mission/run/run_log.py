@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stopgo.mission.frames.transform import Transform
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Started
 from stopgo.mission.run.pose_gaps import gap_limit_ns, gaps_after
@@ -131,6 +132,15 @@ class Alignment:
     residual_max_m: float | None = None
     pairs: int = 0
     """Pairs of positions that were fitted."""
+
+    @classmethod
+    def by(cls, transform: Transform, how: str, pairs: int = 0) -> Alignment:
+        """Return an alignment without residuals."""
+        return cls(how, transform.x, transform.y, transform.heading, pairs=pairs)
+
+    @property
+    def transform(self) -> Transform:
+        return Transform(x=self.x, y=self.y, heading=self.heading)
 
 
 @dataclass(frozen=True, eq=False)

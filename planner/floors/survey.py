@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import FloatArray
 
@@ -55,6 +57,11 @@ class SurveyLine:
     """(n, 2) in metres."""
     taken: bool
     closed: bool = False
+
+    @property
+    def drawn(self) -> FloatArray:
+        """Points (n, 2); a closed line ends where it begins."""
+        return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.document.own_floor import must_be_own_floor
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen

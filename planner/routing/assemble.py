@@ -34,8 +34,7 @@ from stopgo.mission.document.specs import (
     site_origin_of,
 )
 from stopgo.mission.errors import StopgoError
-from stopgo.mission.frames.frame_transform import SAME
-from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.frames.transform import SAME, SiteOrigin
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace, Route

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from stopgo.mission.console.plugins import loader
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray
 
@@ -23,25 +24,22 @@ FLOOR_PERCENTILE = 0.5
 """Percentile of point heights that is the floor; it is measured in the first chunk."""
 
 
-def _e57(path: Path) -> CloudChunks:
-    from stopgo.recordings.clouds.e57 import read_e57
+def _reader(name: str) -> CloudReader:
+    load = loader(f"stopgo.recordings.clouds.{name}:read_{name}")
 
-    return read_e57(path)
+    def read(path: Path) -> CloudChunks:
+        chunks: CloudChunks = load()(path)
+        return chunks
 
-
-def _las(path: Path) -> CloudChunks:
-    from stopgo.recordings.clouds.las import read_las
-
-    return read_las(path)
+    return read
 
 
-def _ply(path: Path) -> CloudChunks:
-    from stopgo.recordings.clouds.ply import read_ply
-
-    return read_ply(path)
-
-
-CLOUD_READERS: dict[str, CloudReader] = {".e57": _e57, ".las": _las, ".laz": _las, ".ply": _ply}
+CLOUD_READERS = {
+    ".e57": _reader("e57"),
+    ".las": _reader("las"),
+    ".laz": _reader("las"),
+    ".ply": _reader("ply"),
+}
 
 
 def clouds_in(folder: Path) -> tuple[Path, ...]:

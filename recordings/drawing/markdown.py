@@ -9,7 +9,7 @@ import msgspec
 from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import Schedule
-from stopgo.mission.document.stop_list import stop_list
+from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.figures import Figures

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from stopgo.mission import stages
+from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.mission.stages import DROP_REASONS
 
 Colour = tuple[int, int, int, int]
@@ -66,17 +67,8 @@ MEANINGS = (
     *(reason(number) for number in range(len(DROP_REASONS))),
 )
 
-KIND_COLOURS: dict[str, Colour] = {
-    "walls": (165, 168, 175, 255),
-    "columns": (240, 150, 50, 255),
-    "beams": (170, 115, 220, 255),
-    "stairs": (40, 165, 150, 255),
-    "windows": (95, 165, 245, 255),
-    "railings": (110, 135, 225, 255),
-    "objects": (185, 150, 90, 255),
-    "other": (150, 130, 105, 255),
-}
-"""Colour of every element kind of `stopgo.mission.settings.element_kinds.KINDS`."""
+KIND_COLOURS: dict[str, Colour] = {kind.name: (*kind.rgb, 255) for kind in KINDS.values()}
+"""Colour of every element kind."""
 
 OUTLINE: Colour = (110, 118, 135, 255)
 HOLE: Colour = (175, 95, 120, 255)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from stopgo.mission.console.plugins import Variant
+from stopgo.mission.console.plugins import Variant, loader
 from stopgo.mission.errors import InputError
 from stopgo.recordings.logs.field_log import FieldLog, Reading
 from stopgo.recordings.logs.files import head, must_be_readable
@@ -32,62 +32,31 @@ class LogFormat:
     """Loader of the reader: some readers need libraries that others do not."""
 
 
-def _ros() -> LogReader:
-    from stopgo.recordings.logs.ros import read_ros
-
-    return read_ros
-
-
-def _dataflash() -> LogReader:
-    from stopgo.recordings.logs.dataflash import read_dataflash
-
-    return read_dataflash
-
-
-def _telemetry() -> LogReader:
-    from stopgo.recordings.logs.telemetry_log import read_telemetry_log
-
-    return read_telemetry_log
-
-
-def _ulog() -> LogReader:
-    from stopgo.recordings.logs.ulog import read_ulog
-
-    return read_ulog
-
-
-def _table() -> LogReader:
-    from stopgo.recordings.logs.tables import read_table
-
-    return read_table
-
-
-def _journal() -> LogReader:
-    from stopgo.recordings.logs.own import read_journal
-
-    return read_journal
-
-
-def _recording() -> LogReader:
-    from stopgo.recordings.logs.own_recording import read_run_recording
-
-    return read_run_recording
-
-
 SQLITE = b"SQLite format 3\0"
 ZSTD = b"\x28\xb5\x2f\xfd"
+_ros, _journal = (loader(f"stopgo.recordings.logs.{name}") for name in ("ros:read_ros", "own:read_journal"))
 READERS = (
     LogFormat("ROS 1 bag", (".bag",), (b"#ROSBAG V",), _ros),
     LogFormat("ROS 2 MCAP", (".mcap",), (b"\x89MCAP0\r\n",), _ros),
     LogFormat("ROS 2 SQLite", (".db3",), (SQLITE,), _ros),
     LogFormat("ROS 2, compressed", (".zstd",), (ZSTD,), _ros),
     LogFormat("stopgo journal", (".sqlite",), (SQLITE,), _journal),
-    LogFormat("stopgo recording", (".rrd",), (b"RRF2",), _recording),
-    LogFormat("ArduPilot BIN", (".bin",), (b"\xa3\x95",), _dataflash),
-    LogFormat("PX4 ULog", (".ulg",), (b"ULog\x01\x12\x35",), _ulog),
-    LogFormat("MAVLink telemetry", (".tlog",), (), _telemetry),
-    LogFormat("trajectory", (".tum", ".txt", ".csv", ".tsv"), (), _table),
-)
+    LogFormat(
+        "stopgo recording", (".rrd",), (b"RRF2",),
+        loader("stopgo.recordings.logs.own_recording:read_run_recording"),
+    ),
+    LogFormat(
+        "ArduPilot BIN", (".bin",), (b"\xa3\x95",), loader("stopgo.recordings.logs.dataflash:read_dataflash")
+    ),
+    LogFormat("PX4 ULog", (".ulg",), (b"ULog\x01\x12\x35",), loader("stopgo.recordings.logs.ulog:read_ulog")),
+    LogFormat(
+        "MAVLink telemetry", (".tlog",), (),
+        loader("stopgo.recordings.logs.telemetry_log:read_telemetry_log"),
+    ),
+    LogFormat(
+        "trajectory", (".tum", ".txt", ".csv", ".tsv"), (), loader("stopgo.recordings.logs.tables:read_table")
+    ),
+)  # fmt: skip
 """Formats that can be read; a folder is a rosbag2."""
 
 

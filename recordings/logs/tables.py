@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import separator_of
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, fixes_of, poses_of
 from stopgo.recordings.logs.files import digest_of
 from stopgo.recordings.logs.ros_poses import headings_of
@@ -93,7 +94,7 @@ def read_csv(path: Path, reading: Reading) -> FieldLog:
     """
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         begin = file.readline()
-        separator = max(",;\t", key=begin.count)
+        separator = separator_of(begin)
         columns = _Columns(
             [name.strip() for name in next(csv.reader(io.StringIO(begin), delimiter=separator))], path
         )

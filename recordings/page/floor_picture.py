@@ -11,18 +11,18 @@ import numpy as np
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission, Stop
+from stopgo.mission.files.sheet import PaperMap
 from stopgo.mission.files.svg import text_width
 from stopgo.mission.geometry import BoolArray, FloatArray, bounds
 from stopgo.mission.run.events import Held, LinkLost, Paused
 from stopgo.mission.run.route_position import legs_of
+from stopgo.mission.settings.element_kinds import kind_of
 from stopgo.mission.stages import Targets
 from stopgo.mission.stages.covered_intervals import runs_of
-from stopgo.recordings.page.style import BLUE, GREY, INK, PALE, PURPLE, VERMILION, YELLOW
+from stopgo.recordings.page.style import BLUE, GREY, INK, PURPLE, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import shown, tag
 
-FILLED = {"walls": PALE, "columns": "#b9bcc4", "stairs": "#e3e4e8", "other": "#e3e0d8"}
-"""Kinds of elements that are filled; of the others, the outline is drawn."""
 MOST_LABELS = 300
 """Number of stops above which only stops that need attention are named."""
 SLACK_M = 0.5
@@ -54,8 +54,7 @@ def plan_picture(
 class PictureFrame:
     """Transform from drawing metres to the picture, whose y axis points down."""
 
-    left: float
-    top: float
+    paper: PaperMap
     width: float
     height: float
     mark: float
@@ -69,8 +68,9 @@ class PictureFrame:
         left, low, right, high = bounds([*lines, *paths, start])
         size = max(right - left, high - low, 1.0)
         margin = 0.02 * size
+        paper = PaperMap((left - margin, high + margin), (0.0, 0.0))
         return cls(
-            left - margin, high + margin, right - left + 2 * margin, high - low + 2 * margin,
+            paper, right - left + 2 * margin, high - low + 2 * margin,
             min(0.013 * size, 0.35 * _spacing(mission)),
         )  # fmt: skip
 
@@ -84,17 +84,23 @@ class PictureFrame:
         return f"0 0 {self.width:.3f} {self.height:.3f}"
 
     def to_picture(self, x: float, y: float) -> tuple[float, float]:
-        return x - self.left, self.top - y
+        x, y = self.paper.on_paper(np.array((x, y))).tolist()
+        return x, y
 
     def path(self, lines: Iterable[FloatArray], *, close: bool = False) -> str:
         """Return the `d` of a path; lines that end at their first point are closed."""
         return "".join(self._line(line, close) for line in lines if len(line) > 1)
 
     def _line(self, line: FloatArray, close: bool) -> str:
-        closed = close and np.allclose(line[0], line[-1])
-        points = np.stack([line[:, 0] - self.left, self.top - line[:, 1]], axis=1)
+        closed = close and is_closed(line)
+        points = self.paper.on_paper(line)
         points = points[:-1] if closed else points
         return "M" + "L".join(f"{x:.3f} {y:.3f}" for x, y in points.tolist()) + ("Z" if closed else "")
+
+
+def is_closed(line: FloatArray) -> bool:
+    """True if a line (n, 2) ends where it begins."""
+    return len(line) > 2 and bool(np.allclose(line[0], line[-1]))
 
 
 def _spacing(mission: Mission) -> float:
@@ -121,8 +127,10 @@ def _floor(subject: ReportSubject, frame: PictureFrame) -> Iterator[str]:
         return
     yield stroke(frame.path(floor.outline, close=True), GREY, 1)
     for kind, lines in floor.kinds.items():
-        fill = {"fill": FILLED[kind], "fill_rule": "evenodd"} if kind in FILLED else {}
-        yield stroke(frame.path(lines, close=True), "#9a9da5", 0.6, **fill)
+        look = kind_of(kind)
+        areas = frame.path((line for line in lines if is_closed(line)), close=True)
+        yield stroke(areas, look.colour, 0.6, fill=look.fill, fill_rule="evenodd")
+        yield stroke(frame.path(line for line in lines if not is_closed(line)), look.colour, 0.6)
     for name, x, y in floor.names:
         px, py = frame.to_picture(x, y)
         fitting = _room_width(floor.rooms, x, y) / max(text_width(name, 1.0), 1.0)

@@ -74,7 +74,7 @@ def _tiles(proof: PlanProof) -> str:
 
 
 def _picture(proof: PlanProof, floor: FloorPlan) -> str:
-    subject = ReportSubject((proof.mission,), floor=_lines_of(floor))
+    subject = ReportSubject((proof.mission,), floor=lines_of(floor))
     picture = plan_picture(subject, None, beneath=lambda frame: _layers(proof, frame))
     marks = [
         (line_sample(BLUE, 2.4), "points lie on it"),
@@ -103,7 +103,7 @@ def _layers(proof: PlanProof, frame: PictureFrame) -> Iterator[str]:
     yield stroke(lines(True), GREEN, 3)
 
 
-def _lines_of(floor: FloorPlan) -> FloorLines:
+def lines_of(floor: FloorPlan) -> FloorLines:
     """Return the floor as report pictures use it."""
     kinds: dict[str, list[FloatArray]] = {}
     for item in floor.elements:

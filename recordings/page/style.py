@@ -5,7 +5,7 @@ from __future__ import annotations
 BLUE, SKY, ORANGE, VERMILION, YELLOW, PURPLE, GREEN = (
     *("#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#F0E442", "#CC79A7", "#009E73"),
 )
-INK, GREY, PALE = "#111", "#6b6f76", "#d7d9de"
+INK, GREY = "#111", "#6b6f76"
 
 STATES = {
     "RUNNING": (SKY, INK),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import NegativeResult
+from stopgo.mission.frames.rigid_fit import least_squares
+from stopgo.mission.frames.transform import Transform
 from stopgo.mission.geometry import FloatArray
 from stopgo.recordings.replay.matching import matched, reaches
 from stopgo.recordings.replay.standstills import Standstill
@@ -33,24 +35,16 @@ HUBER_M = 0.15
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Rotation, then shift, from the log's frame to the mission's."""
+    """Transform from the log's frame to the mission's, and the residuals of its pairs."""
 
-    heading: float
-    x: float
-    y: float
-    pairs: int
-    rms_m: float
-    max_m: float
+    transform: Transform
+    pairs: int = 2
+    rms_m: float = 0.0
+    max_m: float = 0.0
 
     def placed(self, xy: FloatArray) -> FloatArray:
         """Return points (n, 2) in the mission's frame."""
-        return xy @ rotation(self.heading).T + (self.x, self.y)
-
-
-def rotation(heading: float) -> FloatArray:
-    """Return the matrix (2, 2) that rotates by `heading`."""
-    cos, sin = np.cos(heading), np.sin(heading)
-    return np.array([[cos, -sin], [sin, cos]])
+        return self.transform.points(xy)
 
 
 def fitted(standstills: Sequence[Standstill], mission: Mission) -> Fit:
@@ -119,8 +113,9 @@ def _guesses(positions: FloatArray, stops: FloatArray) -> Iterator[Fit]:
                 fits = np.abs(np.hypot(*driven.T) - length) <= SLACK_M + STRETCH * length
                 for step in driven[fits]:
                     turn = float(np.arctan2(planned[1], planned[0]) - np.arctan2(step[1], step[0]))
-                    middle = (stops[i] + stops[j]) / 2 - rotation(turn) @ (positions[k] + step / 2)
-                    yield Fit(turn, float(middle[0]), float(middle[1]), 2, 0.0, 0.0)
+                    driven_middle = tuple((positions[k] + step / 2).tolist())
+                    middle = tuple(((stops[i] + stops[j]) / 2).tolist())
+                    yield Fit(Transform.bringing(driven_middle, middle, turn))
 
 
 def _refined(guess: Fit, standstills: Sequence[Standstill], mission: Mission) -> tuple[float, Fit] | None:
@@ -145,39 +140,19 @@ def _refined(guess: Fit, standstills: Sequence[Standstill], mission: Mission) ->
 
 
 def _moved(standstill: Standstill, fit: Fit) -> Standstill:
-    x, y = fit.placed(np.array([standstill.xy]))[0]
-    return Standstill(
-        standstill.begin_ns,
-        standstill.end_ns,
-        float(x),
-        float(y),
-        standstill.heading + fit.heading,
-        standstill.moved_m,
-    )
+    x, y = fit.transform.point(standstill.xy)
+    return replace(standstill, x=x, y=y, heading=standstill.heading + fit.transform.heading)
 
 
 def _least_squares(positions: FloatArray, stops: FloatArray, fit: Fit) -> Fit:
-    """Return the rotation and shift of least squared distances; outliers weigh less (Umeyama 1991)."""
+    """Return the rotation and shift of least squared distances; outliers weigh less."""
+    transform = fit.transform
     for _ in range(ROUNDS):
-        away = np.hypot(*(fit.placed(positions) - stops).T)
+        away = np.hypot(*(transform.points(positions) - stops).T)
         weight = np.where(away > HUBER_M, HUBER_M / np.maximum(away, 1e-12), 1.0)
-        middle, target = (np.average(points, axis=0, weights=weight) for points in (positions, stops))
-        a, b = positions - middle, stops - target
-        turn = float(np.arctan2(
-            (weight * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])).sum(), (weight * (a * b).sum(axis=1)).sum()
-        ))  # fmt: skip
-        x, y = target - rotation(turn) @ middle
-        fit = Fit(turn, float(x), float(y), len(positions), 0.0, 0.0)
-    away = np.hypot(*(fit.placed(positions) - stops).T)
-    rms, largest = float(np.sqrt((away**2).mean())), float(away.max())
-    return Fit(
-        float(np.remainder(fit.heading + np.pi, 2 * np.pi) - np.pi),
-        fit.x,
-        fit.y,
-        len(positions),
-        rms,
-        largest,
-    )
+        transform = least_squares(positions, stops, weight)
+    away = np.hypot(*(transform.points(positions) - stops).T)
+    return Fit(transform, len(positions), float(np.sqrt((away**2).mean())), float(away.max()))
 
 
 def _apart(one: Fit, other: Fit, positions: FloatArray) -> float:

@@ -17,7 +17,7 @@ from stopgo.mission.mavlink.local_frame import is_other_site
 from stopgo.mission.run.run_log import Alignment, Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 from stopgo.recordings.logs.own import AT_EVENTS, SITE
-from stopgo.recordings.replay.fitting import Fit, fitted, rotation
+from stopgo.recordings.replay.fitting import Fit, fitted
 from stopgo.recordings.replay.standstills import find_standstills
 
 Align = Literal["first", "stops"]
@@ -151,7 +151,7 @@ def _transform(
 ) -> Alignment:
     """Return the first transform that applies: the user's, then one from log and mission."""
     if placing.to_map is not None:
-        return _from_map(placing.to_map, "given by --map")
+        return Alignment.by(placing.to_map.inverse, "given by --map")
     if placing.align == "first":
         return _first(track, turns, mission)
     if placing.align == "stops":
@@ -162,38 +162,27 @@ def _transform(
     if source.origin is not None and mission.georeference is not None:
         return _by_georeference(log, source, mission)
     if mission.frame.to_map is not None and source.frame in ("map", "world"):
-        return _from_map(mission.frame.to_map, f"the mission's own transform to {source.frame}")
+        return Alignment.by(mission.frame.to_map.inverse, f"the mission's own transform to {source.frame}")
     raise InputError(
         f"{log.path}: no transform from frame {source.frame or '(without a name)'} to the mission frame;"
         " give --map X,Y,HEADING, or --align first (the log begins at the mission's start), or --align stops"
     )
 
 
-def _from_map(to_map: Transform, how: str) -> Alignment:
-    """Return the inverse of site to map: rotate by `heading`, then shift."""
-    x, y = -rotation(-to_map.heading) @ (to_map.x, to_map.y)
-    return Alignment(how=how, x=float(x), y=float(y), heading=-to_map.heading)
-
-
 def _first(track: Track, turns: bool, mission: Mission) -> Alignment:
     """Return the transform that puts the first pose, averaged if stationary, on the mission's start."""
     standstills = find_standstills(track, speed=mission.robot.speed, turns=turns)
-    position, rotation_angle = track.xy[0], float(track.heading[0])
+    position, rotation_angle = tuple(track.xy[0].tolist()), float(track.heading[0])
     if standstills and standstills[0].begin_ns - int(track.ns[0]) <= FIRST_NS:
-        position, rotation_angle = np.array(standstills[0].xy), standstills[0].heading
+        position, rotation_angle = standstills[0].xy, standstills[0].heading
     heading = math.remainder(mission.start.heading - rotation_angle, math.tau)
-    x, y = np.array([mission.start.x, mission.start.y]) - rotation(heading) @ position
-    return Alignment(
-        how="first pose at the mission's start", x=float(x), y=float(y), heading=heading, pairs=1
-    )
+    transform = Transform.bringing(position, (mission.start.x, mission.start.y), heading)
+    return Alignment.by(transform, "first pose at the mission's start", pairs=1)
 
 
 def _of_fit(fit: Fit) -> Alignment:
-    return Alignment(
-        how=f"fitted to {fit.pairs} standstills at stops",
-        x=fit.x, y=fit.y, heading=fit.heading,
-        residual_rms_m=fit.rms_m, residual_max_m=fit.max_m, pairs=fit.pairs,
-    )  # fmt: skip
+    fitted_by = Alignment.by(fit.transform, f"fitted to {fit.pairs} standstills at stops", fit.pairs)
+    return replace(fitted_by, residual_rms_m=fit.rms_m, residual_max_m=fit.max_m)
 
 
 def _by_georeference(log: FieldLog, source: Poses, mission: Mission) -> Alignment:
@@ -212,7 +201,7 @@ def _by_georeference(log: FieldLog, source: Poses, mission: Mission) -> Alignmen
 
 
 def _moved(track: Track, by: Alignment, offset_ns: int) -> Track:
-    xy = track.xy @ rotation(by.heading).T + (by.x, by.y)
+    xy = by.transform.points(track.xy)
     return Track.of(track.ns + offset_ns, xy, track.heading + by.heading)
 
 

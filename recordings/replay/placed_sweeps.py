@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from stopgo.mission.frames.transform import SAME, Transform
 from stopgo.mission.geometry import FloatArray
 from stopgo.recordings.logs.field_log import Sweep
-from stopgo.recordings.replay.fitting import rotation
 from stopgo.recordings.replay.replayed import Replay
 
 BAND_M = 1.0
@@ -18,19 +18,19 @@ BAND_M = 1.0
 def placed_sweeps(replay: Replay) -> Iterator[FloatArray]:
     """Yield points (n, 2) of each scan made during a standstill; of all scans if there is no standstill."""
     offset = replay.placed.alignment.time_offset_ns
-    mounts = {name: (x, y, heading) for name, x, y, heading in replay.log.mounts}
+    mounts = {name: Transform(x=x, y=y, heading=heading) for name, x, y, heading in replay.log.mounts}
     for sweep in replay.log.sweeps():
         pose = _pose(replay, sweep.ns + offset)
         if pose is not None:
-            yield _placed(sweep, mounts.get(sweep.frame, (0.0, 0.0, 0.0)), pose)
+            yield _placed(sweep, mounts.get(sweep.frame, SAME), pose)
 
 
-def _pose(replay: Replay, ns: int) -> tuple[float, float, float] | None:
+def _pose(replay: Replay, ns: int) -> Transform | None:
     """Return the robot's pose: the median of the standstill, or without standstills the newest pose."""
     for match in replay.matches:
         standstill = match.standstill
         if standstill.begin_ns <= ns <= standstill.end_ns:
-            return (standstill.x, standstill.y, standstill.heading)
+            return Transform(x=standstill.x, y=standstill.y, heading=standstill.heading)
     if replay.matches:
         return None
     track = replay.run.poses
@@ -38,11 +38,9 @@ def _pose(replay: Replay, ns: int) -> tuple[float, float, float] | None:
     if index is None:
         return None
     x, y = track.xy[index].tolist()
-    return (x, y, float(track.heading[index]))
+    return Transform(x=x, y=y, heading=float(track.heading[index]))
 
 
-def _placed(sweep: Sweep, mount: tuple[float, float, float], pose: tuple[float, float, float]) -> FloatArray:
+def _placed(sweep: Sweep, mount: Transform, pose: Transform) -> FloatArray:
     band = np.abs(sweep.xyz[:, 2]) <= BAND_M
-    on_robot = sweep.xyz[band, :2] @ rotation(mount[2]).T + mount[:2]
-    placed: FloatArray = on_robot @ rotation(pose[2]).T + pose[:2]
-    return placed
+    return pose.after(mount).points(sweep.xyz[band, :2])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ import typer
 from stopgo.mission.console.table import table
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_checked
+from stopgo.mission.files.given_file import bytes_of, rows_of
 from stopgo.mission.settings.parameter import numbers
 
 if TYPE_CHECKING:
@@ -73,15 +73,12 @@ def _pair(text: str) -> PointPair:
 
 
 def _read(path: Path) -> list[PointPair]:
+    remedy = "give a CSV of x,y,map_x,map_y"
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}); give a CSV of x,y,map_x,map_y"
-        ) from None
+        text = bytes_of(path, remedy).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file; give a CSV of x,y,map_x,map_y") from None
-    lines = [(number, row) for number, row in enumerate(csv.reader(text.splitlines()), start=1) if any(row)]
+        raise InputError(f"{path}: is not a text file; {remedy}") from None
+    lines = rows_of(text, str(path))
     return [_row(row, f"{path}: line {number}") for number, row in lines if not _is_header(number, row)]
 
 

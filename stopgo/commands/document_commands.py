@@ -15,6 +15,7 @@ from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult, OtherFloor
 from stopgo.mission.files.atomic import must_not_replace, write_checked
+from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import PARAMETERS
 
@@ -107,7 +108,6 @@ class _Checked:
 
 
 def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Checked:
-    from stopgo.mission.document.own_floor import must_be_own_floor
     from stopgo.mission.document.problems import problems_of
     from stopgo.mission.files.coverage_json import read_coverage
 
@@ -293,7 +293,6 @@ def _supplements(
 
 def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     """Return the drawing the mission was planned on, in the unit it was planned in."""
-    from stopgo.mission.document.own_floor import must_be_own_floor
     from stopgo.mission.files.exports.format import FloorDrawing
     from stopgo.planner.floors import options_of
     from stopgo.planner.floors.drawing import open_drawing

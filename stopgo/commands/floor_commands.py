@@ -111,10 +111,12 @@ def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
 
     from stopgo.mission.files.floor_svg import floor_svg
     from stopgo.planner.floors import read_floor
-    from stopgo.planner.floors.survey_picture import survey_svg
 
     if found.lines:
-        write_atomic(out, survey_svg(found.lines, found.floor, title=found.file))
+        taken, ignored = (
+            [line.drawn for line in found.lines if line.taken == wanted] for wanted in (True, False)
+        )
+        write_atomic(out, floor_svg([found.floor] if found.floor else [], taken=taken, ignored=ignored))
         return
     names = [item.name for item in found.floors if not item.aside]
     if any(item.chosen for item in found.floors) or not names:

@@ -15,7 +15,6 @@ from stopgo.bridge.commands.robot_commands import read_map
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import read, write
-from stopgo.mission.frames.frame_transform import to_map_point
 from stopgo.mission.frames.rigid_fit import rigid_fit
 from tests.mission.worlds import square_tour
 
@@ -41,9 +40,9 @@ def test_any_turn_and_shift_is_found(x: float, y: float, heading: float, far: fl
 
     wanted = Transform(x=x, y=y, heading=heading)
     site = CORNERS + far
-    there = np.array([to_map_point(wanted, (px, py)) for px, py in site.tolist()])
+    there = np.array([wanted.point((px, py)) for px, py in site.tolist()])
     found = rigid_fit(site, there).transform
-    back = np.array([to_map_point(found, (px, py)) for px, py in site.tolist()])
+    back = np.array([found.point((px, py)) for px, py in site.tolist()])
     assert np.abs(back - there).max() < 1e-8
 
 

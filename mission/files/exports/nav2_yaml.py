@@ -14,7 +14,7 @@ from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import frame_name, mapped
-from stopgo.mission.frames.frame_transform import SAME, from_map_point
+from stopgo.mission.frames.transform import SAME
 
 _NUMBER = r"(-?\d+\.\d+)"
 _POSE = re.compile(rf"^    pose: \[{_NUMBER}, {_NUMBER}, {_NUMBER}\]$", re.MULTILINE)
@@ -35,7 +35,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
     """Return the positions of the poses, back in the site's frame."""
     to_map = mission.frame.to_map or SAME
     places = [(float(x), float(y)) for x, y, _ in _POSE.findall(data.decode())]
-    return [from_map_point(to_map, place) for place in places]
+    return [to_map.back(place) for place in places]
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from stopgo.mission.document import Mission, Point
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.nav2_yaml import unmapped
 from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from stopgo.mission.frames.frame_transform import SAME, from_map_point
+from stopgo.mission.frames.transform import SAME
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -50,7 +50,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
     """Return the positions in the PoseArray, back in the site's frame."""
     poses = [pose.position for pose in read_messages(data)[STOPS].poses]
     to_map = mission.frame.to_map or SAME
-    return [from_map_point(to_map, (position.x, position.y)) for position in poses]
+    return [to_map.back((position.x, position.y)) for position in poses]
 
 
 def read_messages(data: bytes) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.nav2_yaml import unmapped
 from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from stopgo.mission.frames.frame_transform import SAME, from_map_point
+from stopgo.mission.frames.transform import SAME
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
     nodes = msgspec.json.decode(data)["nodes"]
     places = [node["nodePosition"] for node in nodes if node["actions"]]
     to_map = mission.frame.to_map or SAME
-    return [from_map_point(to_map, (place["x"], place["y"])) for place in places]
+    return [to_map.back((place["x"], place["y"])) for place in places]
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ from itertools import pairwise
 import msgspec
 
 from stopgo.mission.document import Frame, Mission, Point, Stop
-from stopgo.mission.frames.frame_transform import to_map_point
 from stopgo.mission.frames.transform import Transform
 
 
@@ -67,7 +66,7 @@ def mapped(mission: Mission) -> Mission:
     to_map = mission.frame.to_map
     if to_map is None:
         return mission
-    x, y = to_map_point(to_map, (mission.start.x, mission.start.y))
+    x, y = to_map.point((mission.start.x, mission.start.y))
     start = msgspec.structs.replace(
         mission.start, x=x, y=y, heading=_turned_heading(to_map, mission.start.heading)
     )
@@ -81,7 +80,7 @@ def mapped(mission: Mission) -> Mission:
 
 
 def _turned_stop(to_map: Transform, stop: Stop) -> Stop:
-    x, y = to_map_point(to_map, (stop.x, stop.y))
+    x, y = to_map.point((stop.x, stop.y))
     heading = _turned_heading(to_map, stop.heading)
     return msgspec.structs.replace(
         stop, x=x, y=y, heading=heading, approach=_turned_leg(to_map, stop.approach)
@@ -89,7 +88,7 @@ def _turned_stop(to_map: Transform, stop: Stop) -> Stop:
 
 
 def _turned_leg(to_map: Transform, leg: Sequence[Point]) -> tuple[Point, ...]:
-    return tuple(to_map_point(to_map, point) for point in leg)
+    return tuple(to_map.point(point) for point in leg)
 
 
 def _turned_heading(to_map: Transform, heading: float) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 from stopgo.mission.document import Mission
 from stopgo.mission.document.specs import site_origin_of
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import bytes_of
 from stopgo.mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
 from stopgo.mission.files.imports.assembling import mission_of
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions, MissionReader
@@ -35,7 +36,7 @@ def read_mission(
         Naming the file, the problem in it, and the action.
     """
     reader = READERS[_kind(path, kind)]
-    data = _bytes_of(path)
+    data = bytes_of(path, "give a file to import", most=LARGEST)
     track = reader(data, str(path), ImportOptions(site_origin_of(settings), autopilot))
     digest = hashlib.sha256(data).hexdigest()
     return mission_of(track, settings, name=path.stem, file=path.name, digest=digest), track
@@ -51,13 +52,3 @@ def _kind(path: Path, given: str | None) -> str:
     if name not in READERS:
         raise InputError(f"--from {name}: no such format; known: {', '.join(READERS)}")
     return name
-
-
-def _bytes_of(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(f"{path}: is larger than {LARGEST // 1_000_000} MB, too large for a mission")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"{path}: cannot be read ({why}); give a file to import") from None

@@ -6,8 +6,6 @@ are decimal, unless full stops are there too.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from collections import Counter
@@ -18,6 +16,7 @@ from typing import Any, get_args
 from stopgo.mission.document import OnFailure, Point
 from stopgo.mission.document.problems import JOIN
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import rows_of, separator_of
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions, Visit
 from stopgo.mission.frames.geodesy import Geodetic, from_geodetic, heading_of
 
@@ -82,11 +81,7 @@ def read(data: bytes, source: str, given: ImportOptions) -> ImportedRoute:
 
 def _rows(data: bytes, source: str) -> list[_Row]:
     text = _text(data, source)
-    separator = _separator(text)
-    try:
-        lines = [(line, cells) for line, cells in _numbered(text, separator) if any(map(str.strip, cells))]
-    except csv.Error as error:
-        raise InputError(f"{source}: not a table ({error}); save it as CSV") from None
+    lines = rows_of(text, source, strict=True)
     if len(lines) < 2:
         raise InputError(f"{source}: holds no stop; it needs a row of column names and a row per stop")
     if len(lines) > MOST:
@@ -97,7 +92,7 @@ def _rows(data: bytes, source: str) -> list[_Row]:
             raise InputError(
                 f"{source}: line {line} has {len(cells)} cells, not {len(names)}; mend or save it again"
             )
-    comma = separator != "," and not any(map(_has_point, text.splitlines()[1:]))
+    comma = separator_of(text) != "," and not any(map(_has_point, text.splitlines()[1:]))
     return [_Row(dict(zip(names, cells, strict=True)), line, source, comma) for line, cells in lines[1:]]
 
 
@@ -109,17 +104,6 @@ def _text(data: bytes, source: str) -> str:
     if "\0" in text:
         raise InputError(f"{source}: holds zero bytes, which no table does; save it as CSV UTF-8")
     return text
-
-
-def _separator(text: str) -> str:
-    head = text.lstrip().partition("\n")[0]
-    return max(",;\t", key=head.count)
-
-
-def _numbered(text: str, separator: str) -> list[tuple[int, list[str]]]:
-    """Rows with the line each ends on."""
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
-    return [(reader.line_num, cells) for cells in reader]
 
 
 def _has_point(line: str) -> bool:

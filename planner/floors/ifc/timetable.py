@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import re
 from collections import defaultdict
@@ -12,6 +11,7 @@ from datetime import date
 from pathlib import Path
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import bytes_of, rows_of
 from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.model import Task
 
@@ -44,24 +44,16 @@ def read_timetable(path: Path, columns: Mapping[str, str]) -> Timetable:
     InputError
         Naming the file, the line and the column that cannot be used.
     """
-
+    data = bytes_of(path, "give the schedule's CSV")
     try:
-        data = path.read_bytes()
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("cp1252", errors="replace")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the schedule's CSV") from None
-    rows = list(csv.reader(text.splitlines(), delimiter=_delimiter(text)))
+    rows = rows_of(text, str(path))
     if not rows:
         raise InputError(f"{path}: is empty; give a CSV of GlobalIds with start and finish")
-    where = _columns(rows[0], columns, path)
+    where = _columns(rows[0][1], columns, path)
     return Timetable(_tasks(rows, where, path), hashlib.sha256(data).hexdigest())
-
-
-def _delimiter(text: str) -> str:
-    head = text.partition("\n")[0]
-    return max(",;\t", key=head.count)
 
 
 def _columns(header: Sequence[str], given: Mapping[str, str], path: Path) -> dict[str, int]:
@@ -87,14 +79,14 @@ def _no_column(what: str, header: Sequence[str], path: Path) -> InputError:
 
 
 def _tasks(
-    rows: Sequence[Sequence[str]], where: Mapping[str, int], path: Path
+    rows: Sequence[tuple[int, list[str]]], where: Mapping[str, int], path: Path
 ) -> dict[str, tuple[Task, ...]]:
     """Tasks by GlobalId; rows without one are left out."""
 
     def cell(row: Sequence[str], what: str) -> str:
         return row[where[what]].strip() if what in where and where[what] < len(row) else ""
 
-    used = [(line, row) for line, row in enumerate(rows[1:], 2) if cell(row, "guid")]
+    used = [(line, row) for line, row in rows[1:] if cell(row, "guid")]
     if not used:
         raise InputError(
             f"{path}: no row has a GlobalId; say which column it is: --schedule-column guid=NAME"

@@ -14,7 +14,7 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
 from stopgo.bridge.robot.journal_file import memory_journal
-from stopgo.bridge.robot.map_frame import OnMap, turned, turned_back, turned_point
+from stopgo.bridge.robot.map_frame import OnMap, turned, turned_back
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.mission.document import Frame, sealed
 from stopgo.mission.frames.transform import Transform
@@ -27,7 +27,7 @@ QUARTER = Transform(x=10.0, y=20.0, heading=math.pi / 2)
 
 def test_a_quarter_turn_on_paper() -> None:
     """(1, 2) turned by 90° is (-2, 1); shifted by (10, 20) it is (8, 21)."""
-    assert turned_point((1.0, 2.0), QUARTER) == pytest.approx((8.0, 21.0))
+    assert QUARTER.point((1.0, 2.0)) == pytest.approx((8.0, 21.0))
     there = turned(Pose(x=1.0, y=2.0, heading=0.5), QUARTER)
     assert there.heading == pytest.approx(0.5 + math.pi / 2)
     back = turned_back(there, QUARTER)
@@ -55,7 +55,7 @@ def test_a_mission_is_driven_on_the_map_and_told_in_its_own_frame(own: Transform
     field.work()
     assert controller.run.state == "FINISHED"
     assert (base.pose().x, base.pose().y) == pytest.approx((6.0, 0.0), abs=1e-6)
-    assert (inner.pose().x, inner.pose().y) == pytest.approx(turned_point((6.0, 0.0), own or other))
+    assert (inner.pose().x, inner.pose().y) == pytest.approx((own or other).point((6.0, 0.0)))
 
 
 def test_push_shows_the_transform(tmp_path: Path) -> None:

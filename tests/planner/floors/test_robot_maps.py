@@ -121,6 +121,16 @@ def test_a_png_is_the_same_picture(kind: int) -> None:
     assert np.array_equal(read_picture(png(cells, kind=kind), name="map.png").grey, cells)
 
 
+def test_a_damaged_picture_is_refused_and_one_too_large_is_not_unpacked() -> None:
+    whole = png(two_rooms())
+    with pytest.raises(InputError, match="cannot be read"):
+        read_picture(whole[:20] + b"\xff" + whole[21:], name="map.png")
+    header = struct.pack(">4sIIBBBBB", b"IHDR", 90_000, 90_000, 8, 0, 0, 0, 0)
+    large = whole[:12] + header + struct.pack(">I", zlib.crc32(header)) + whole[33:]
+    with pytest.raises(InputError, match="90000 x 90000 pixels"):
+        read_picture(large, name="map.png")
+
+
 def test_modes_and_thresholds_are_map_servers(tmp_path: Path) -> None:
     cells = two_rooms()
     plain = read_floor(map_in(tmp_path, cells))

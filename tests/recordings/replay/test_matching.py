@@ -111,7 +111,7 @@ def test_a_turned_and_shifted_log_is_fitted_to_the_stops() -> None:
     track = logged(driven(mission, Odd(frozenset({1}), frozenset({2}), frozenset({5}))), senses)
     fit = fitted(find_standstills(track, speed=1.0), mission)
     assert fit.pairs == 9
-    assert math.remainder(fit.heading + 2.0, math.tau) == pytest.approx(0, abs=0.005)
+    assert math.remainder(fit.transform.heading + 2.0, math.tau) == pytest.approx(0, abs=0.005)
     assert np.allclose(fit.placed(np.array([(40.0, -7.0)])), 0, atol=0.05)
     assert fit.rms_m < 0.03
 

@@ -21,7 +21,6 @@ from stopgo.mission.document import Mission, OnFailure
 from stopgo.mission.files.exports import FORMATS, exported, format_named
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import mapped, way
-from stopgo.mission.frames.frame_transform import from_map_point, to_map_point
 from stopgo.mission.frames.transform import Transform
 from tests.mission.files.exports.vda5050_order import ORDERS
 from tests.mission.files.exports.worlds import MAP, laboratory, on_a_map
@@ -31,8 +30,8 @@ FileOf = Callable[[bytes, str], str]
 
 
 def test_turning_onto_the_map_and_back_is_nothing() -> None:
-    assert to_map_point(Transform(x=1.0, y=2.0, heading=math.pi / 2), (3.0, 0.0)) == pytest.approx((1.0, 5.0))
-    assert from_map_point(MAP, to_map_point(MAP, (12.5, -7.25))) == pytest.approx((12.5, -7.25))
+    assert Transform(x=1.0, y=2.0, heading=math.pi / 2).point((3.0, 0.0)) == pytest.approx((1.0, 5.0))
+    assert MAP.back(MAP.point((12.5, -7.25))) == pytest.approx((12.5, -7.25))
 
 
 def test_the_way_is_start_corners_stops_and_back() -> None:

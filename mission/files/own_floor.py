@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING
 
-from stopgo.mission.errors import InputError, OtherFloor
+from stopgo.mission.errors import OtherFloor
+from stopgo.mission.files.given_file import bytes_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,10 +24,7 @@ def must_be_own_floor(path: Path, mission: Mission) -> None:
     InputError
         When the file cannot be read.
     """
-    try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the floor's file") from None
+    digest = hashlib.sha256(bytes_of(path, "give the floor's file")).hexdigest()
     planned = mission.origin
     if digest != planned.floor_digest:
         raise OtherFloor(
