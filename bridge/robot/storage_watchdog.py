@@ -49,7 +49,7 @@ class StorageWatchdog:
         """Command a driving base to stand if the journal does not answer; hold the run once it does."""
         late = self._waits.longest_s() > ANSWERS_WITHIN_S
         self._count_looks()
-        if late and self._standing is None and self._control.driving:
+        if late and self._control.driving and not self._control.stands:
             self._standing = ExitStack()
             self._standing.enter_context(self._control.standing())
             self._say(f"{LATE}: the robot stands")

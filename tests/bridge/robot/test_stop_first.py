@@ -522,6 +522,15 @@ def await_state(station: Station, state: str, field: Field | None = None) -> Non
         assert time.monotonic() < deadline, station.status()
 
 
+def test_a_stop_that_is_being_stored_is_not_held_too() -> None:
+    watched = Watched()
+    watched.control.driving = True
+    watched.waits.begin()
+    with watched.control.standing():
+        watched.look_for(5.0)
+    assert (watched.base.stops, watched.calls) == (1, [])
+
+
 def test_a_long_drive_and_a_robot_that_stands_do_not_trip_the_watchdog() -> None:
     watched = Watched()
     watched.control.driving = True
