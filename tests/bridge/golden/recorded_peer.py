@@ -35,11 +35,8 @@ def with_new_fields(message: Any) -> Any:
     """The message with an unknown field in it and in the objects that the protocol itself defines."""
     if not isinstance(message, dict):
         return message
-    inner = {
-        name: with_new_fields(value) if name in ("state", "manifest") else value
-        for name, value in message.items()
-    }
-    return {**inner, NEW: {"any": [1]}}
+    inner = {name: with_new_fields(message[name]) for name in ("state", "manifest") if name in message}
+    return {**message, **inner, NEW: {"any": [1]}}
 
 
 def changed(text: str, change: Change) -> bytes:
@@ -90,7 +87,7 @@ class RecordedStation:
 
 
 class RecordedRobot:
-    """Answers today's station as recorded: each key's answers in their order, the last one again and again."""
+    """Answers today's station as recorded: each key's answers in order, the last one again and again."""
 
     def __init__(self, version: str, change: Change) -> None:
         self._change = change
