@@ -416,6 +416,14 @@ RestartCommand = Annotated[
     str | None,
     typer.Option("--restart", metavar="COMMAND", help="Restarts the robot's program, and returns."),
 ]
+SlowDiskCommand = Annotated[
+    str | None,
+    typer.Option(
+        "--slow-disk",
+        metavar="COMMAND",
+        help="Makes each sync of the robot's disk take the given seconds (0: as before), and returns.",
+    ),
+]
 StationCommand = Annotated[
     str | None,
     typer.Option(

@@ -25,6 +25,7 @@ from stopgo.bridge.commands.bridge_options import (
     RestartCommand,
     RobotName,
     SiteName,
+    SlowDiskCommand,
     StationCommand,
     TakeOver,
     Timeout,
@@ -65,6 +66,7 @@ def conform_robot(
     who: As = None,
     drive: MayDrive = False,
     restart: RestartCommand = None,
+    slow_disk: SlowDiskCommand = None,
     take_over: TakeOver = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
@@ -74,18 +76,15 @@ def conform_robot(
 
     The robot receives small missions around its present position; its own is stored again at the end. It
     does not move without --drive, and is not tested on a run. Durability is tested by a restart.
-
     Ends with 0 if nothing failed, 1 if something did, 2 if nothing was tested, and 3 if the robot stopped
     answering or its durability was not tested.
-
-    Example: stopgo conform robot --robot r1 --connect tcp/127.0.0.1:7447
 
     Example: stopgo conform robot --robot r1 --keys ~/keys/alice --other-keys ~/keys/bob --drive
     """
     from stopgo.bridge.conform.conform_robot import REQUIREMENTS, ConformOptions, robot_bench, robot_verdicts
 
     options = ConformOptions(
-        connect, robot, site, who, timeout, insecure, keys, other_keys, take_over, restart,
+        connect, robot, site, who, timeout, insecure, keys, other_keys, take_over, restart, slow_disk,
         asked=partial(ask_for_restart, robot) if sys.stdin.isatty() else None,
     )  # fmt: skip
     with robot_bench(options) as bench, Bar("conform", REQUIREMENTS_UNIT) as bar:

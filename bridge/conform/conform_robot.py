@@ -26,6 +26,7 @@ from stopgo.bridge.conform.robot_questions import QUESTIONS
 from stopgo.bridge.conform.robot_restarts import RESTARTS
 from stopgo.bridge.conform.robot_runs import RUNS
 from stopgo.bridge.conform.robot_seals import SEALS
+from stopgo.bridge.conform.robot_slow_disk import SLOW_DISK
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import Info, KeyExpressions
 from stopgo.bridge.link.seals import Seals
@@ -35,10 +36,10 @@ from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.run.lease import remaining_s
 
 REQUIREMENTS: tuple[Requirement[RobotBench], ...] = (
-    *QUESTIONS, *SEALS, *IDLE, *PUSHES, *ORDERS, *RUNS, *RESTARTS,
+    *QUESTIONS, *SEALS, *IDLE, *PUSHES, *ORDERS, *RUNS, *SLOW_DISK, *RESTARTS,
 )  # fmt: skip
 RESTART_S = 120.0
-"""Timeout of the command that restarts a robot."""
+"""Timeout of a command that restarts a robot or makes its disk slow."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,8 @@ class ConformOptions:
     other_keys: Path | None = None
     take_over: bool = False
     restart: str | None = None
+    slow_disk: str | None = None
+    """The user's command that makes the robot's disk slow; it gets the seconds of one sync."""
     asked: Callable[[], None] | None = None
     """Asks a person to restart the robot, where no command does; raises `NotTried` if nobody does."""
 
@@ -96,6 +99,7 @@ def robot_bench(options: ConformOptions) -> Iterator[RobotBench]:
             station.link, station.keys, commander=station.commander, timeout_s=options.timeout_s,
             take_over=options.take_over, other=other, forger=_forger(station, options, stack),
             restart=options.asked if options.restart is None else restarting(options.restart),
+            slow_disk=None if options.slow_disk is None else slowing(options.slow_disk),
         )  # fmt: skip
         try:
             yield bench
@@ -163,24 +167,34 @@ def await_robot(link: Link, keys: KeyExpressions, timeout_s: float) -> None:
         raise OutcomeUnknown(f"{keys.robot} was not found on a second link within {timeout_s:g} s")
 
 
-def restarting(command: str) -> Any:
+def restarting(command: str) -> Callable[[], None]:
     """Return a function that runs the user's command for a restart of the robot, and waits for its end."""
+    words = _words("--restart", command)
+    return lambda: _run("--restart", command, words)
+
+
+def slowing(command: str) -> Callable[[float], None]:
+    """Return a function that runs the user's command for a slow disk, with the seconds of one sync."""
+    words = _words("--slow-disk", command)
+    return lambda seconds: _run("--slow-disk", command, [*words, f"{seconds:g}"])
+
+
+def _words(option: str, command: str) -> list[str]:
     try:
-        words = shlex.split(command)
+        return shlex.split(command)
     except ValueError as error:
-        raise InputError(f"--restart {command}: {error}") from None
+        raise InputError(f"{option} {command}: {error}") from None
 
-    def restart() -> None:
-        try:
-            subprocess.run(
-                words, check=True, timeout=RESTART_S, stdin=subprocess.DEVNULL, capture_output=True
-            )
-        except OSError as error:
-            raise InputError(f"--restart {command}: {error.strerror}") from None
-        except subprocess.SubprocessError as error:
-            raise InputError(f"--restart {command}: {error}") from None
 
-    return restart
+def _run(option: str, command: str, words: list[str]) -> None:
+    """Run a command of the user's, and wait for its end; processes that it leaves behind may go on."""
+    null = subprocess.DEVNULL
+    try:
+        subprocess.run(words, check=True, timeout=RESTART_S, stdin=null, stdout=null, stderr=null)
+    except OSError as error:
+        raise InputError(f"{option} {command}: {error.strerror}") from None
+    except subprocess.SubprocessError as error:
+        raise InputError(f"{option} {command}: {error}") from None
 
 
 def robot_verdicts(bench: RobotBench, *, drive: bool) -> Iterator[ConformVerdict]:

@@ -51,11 +51,14 @@ class RobotBench(RobotQueries):
         other: OtherStation | None = None,
         forger: Forger | None = None,
         restart: Callable[[], None] | None = None,
+        slow_disk: Callable[[float], None] | None = None,
     ) -> None:
+        """`slow_disk` makes each sync of the robot's disk take that many seconds; 0: as before."""
         super().__init__(link, keys, commander=commander, timeout_s=timeout_s)
         self.other = other
         self.forger = forger
         self.restart = restart
+        self.slow_disk = slow_disk
         self.missions = TrialPushes(self, take_over=take_over)
         self.commands = TrialCommands(self)
 

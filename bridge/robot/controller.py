@@ -33,7 +33,8 @@ Invariants
     3. The result of work is stored only if the work still belongs to the current run (`same_work`).
     4. After a restart nothing moves until a command comes. An interrupted scan is taken again, unless the
        scanner says that it was completed.
-    5. If the journal cannot be written, the robot stands still. `pause` and `abort` are carried out anyway.
+    5. If the journal cannot be written, or does not answer for 0.5 s while the robot drives, the robot stands
+       still and is HELD. `pause` and `abort` are carried out anyway.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ from stopgo.bridge.robot.mission_acceptance import MissionAcceptance
 from stopgo.bridge.robot.run_driver import RunDriver
 from stopgo.bridge.robot.run_store import RunStore
 from stopgo.bridge.robot.runner import Position
-from stopgo.bridge.robot.storage_watchdog import StorageWatchdog
+from stopgo.bridge.robot.storage_watchdog import LATE, StorageWatchdog
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission
 from stopgo.mission.run import states as runs
@@ -60,6 +61,9 @@ from stopgo.mission.run.lease import Lease
 from stopgo.mission.run.orders import Answer, Order
 from stopgo.mission.run.revision import RevisionPolicy
 from stopgo.mission.run.states import Run
+
+REPORT_WITHIN_S = 0.1
+"""Longest wait of a report for a decision that is being stored."""
 
 
 def new_boot_id() -> str:
@@ -94,7 +98,7 @@ class Controller:
             robot=robot, boot_id=boot_id or new_boot_id(), journal=journal, clock=clock, control=control,
             current=CurrentMission(journal, mission_taken), changed=self._report_change,
         )  # fmt: skip
-        self._watchdog = StorageWatchdog(control, journal.rows.waits, say)
+        self._watchdog = StorageWatchdog(control, journal.rows.waits, self.hold, say)
         self.works: tuple[Callable[[], None], ...] = (self.serve, self._watchdog.watch)
         self._driver = RunDriver(store, control=control, base=base, scanner=scanner, clock=clock)
         self._commands = CommandExecutor(
@@ -209,8 +213,11 @@ class Controller:
     # Reports, to any thread
 
     def snapshot(self) -> tuple[Run, Mission | None]:
-        """Return the run and its mission at one moment."""
-        return self._store.snapshot()
+        """Return the run and its mission; HELD while the robot stands because its journal does not answer."""
+        run, mission = self._store.snapshot_within(REPORT_WITHIN_S)
+        if self._watchdog.late and run.state in ("RUNNING", "HOMING"):
+            run = runs.changed(run, state="HELD", reason=LATE)
+        return run, mission
 
     def position(self) -> Position:
         ns = self._clock.now_ns()

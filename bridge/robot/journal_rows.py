@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from stopgo.bridge.robot.hashed_rows import DamagedRow, NewestTransaction, read_rows, verify_rows, write_row
 from stopgo.bridge.robot.journal_format import bring_up_to_date, make_tables
@@ -120,6 +120,10 @@ class JournalRows:
         """Return why `size` more bytes would need the reserved disk space; empty if they would not."""
         with storage_errors():
             return "" if self._reserve is None else self._reserve.shortage(size)
+
+    def free_within(self, longest_s: float) -> AbstractContextManager[bool]:
+        """Keep other threads' transactions out for the block, if none lasts longer than that."""
+        return self._lock.within(longest_s)
 
     def select(self, statement: str, *values: object) -> list[tuple]:
         """Return the columns that a statement selects; their rows' hashes are not checked."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 
 
@@ -27,6 +28,10 @@ class LockWaits:
 
     def end(self, mark: object) -> None:
         self._began_ns.pop(mark, None)
+
+    def oldest(self) -> object | None:
+        """Return the mark of the oldest section that has not ended; `None` if there is none."""
+        return next(iter(list(self._began_ns)), None)
 
     def longest_s(self) -> float:
         """Return the age of the oldest section that has not ended; 0 if there is none."""
@@ -52,3 +57,15 @@ class WatchedLock:
     ) -> None:
         self._lock.release()
         self._waits.end(self._marks.open.pop())
+
+    @contextmanager
+    def within(self, longest_s: float) -> Iterator[bool]:
+        """Hold the lock if it is free within that time; the block learns if it is."""
+        mark = self._waits.begin()
+        free = self._lock.acquire(timeout=longest_s)
+        try:
+            yield free
+        finally:
+            if free:
+                self._lock.release()
+            self._waits.end(mark)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import re
 import threading
+from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 
 from stopgo.bridge.link.link import Request
@@ -27,6 +29,8 @@ LIMIT_BYTES = 512_000_000
 """About two hundred hours of runs."""
 MAX_RUNS = 1000
 """Runs whose names are stored; older ones are deleted entirely."""
+MOST_ARRIVED = 50_000
+"""Poses and states that wait for the disk: over half an hour at 20 poses a second; older ones are dropped."""
 RETIRED = "let go for want of room, as the oldest run that was over"
 RECORD_SUFFIX, RETIRED_SUFFIX = ".record", ".retired"
 _NAME = re.compile(r"[0-9]+-.*\.(record|retired)", re.ASCII)
@@ -62,6 +66,8 @@ class RunRecorder:
         """Size and entries of files of other runs."""
         self._older: dict[Path, int] = {}
         """Files of other runs, oldest first, and their sizes."""
+        self._arrived: deque[Callable[[], None]] = deque(maxlen=MOST_ARRIVED)
+        """Poses and states that were added while the disk was busy."""
         self._idle = False
         """True if there was no run for a time, so that the next one is recorded from its begin."""
         try:
@@ -71,14 +77,16 @@ class RunRecorder:
 
     def close(self) -> None:
         """Write what is pending, and close the files."""
-        self._end_run()
+        with self._lock:
+            self._take_in()
+            self._end_run()
         with self._past_lock:
             self._read = None
             self._reading.close()
 
     def _end_run(self) -> None:
         with self._lock:
-            self.write()
+            self._write()
             self._run = None
             self._open.close()
 
@@ -87,26 +95,36 @@ class RunRecorder:
         self._idle = True
 
     def pose(self, report: PoseReport, *, began_ns: int, over: bool) -> None:
-        """Add a pose of a run; of a run that is `over` only the first."""
-        with self._lock:
-            if report.run_id is None or (over and not self._is_of(report.run_id)):
-                self._idle = True
-                return
-            with suppress(OSError):  # without the folder, or with a full disk, it is missing
-                run = self._of(report.run_id)
-                run.pose(report, began_ns=began_ns, over=over, seen=self._idle)
-            self._idle = self._idle or over
+        """Add a pose of a run; of a run that is `over` only the first. It does not wait for the disk."""
+        self._arrived.append(partial(self._take_pose, report, began_ns, over))
 
     def state(self, report: StateReport) -> None:
-        """Add a state of the run that is recorded."""
-        with self._lock:
-            if self._run is not None and report.run_id == self._run.run_id:
-                self._run.state(report)
+        """Add a state of the run that is recorded. It does not wait for the disk."""
+        self._arrived.append(partial(self._take_state, report))
+
+    def _take_in(self) -> None:
+        """Take in what was added; whoever calls this has the lock."""
+        while self._arrived:
+            self._arrived.popleft()()
+
+    def _take_pose(self, report: PoseReport, began_ns: int, over: bool) -> None:
+        if report.run_id is None or (over and not self._is_of(report.run_id)):
+            self._idle = True
+            return
+        with suppress(OSError):  # without the folder, or with a full disk, it is missing
+            run = self._of(report.run_id)
+            run.pose(report, began_ns=began_ns, over=over, seen=self._idle)
+        self._idle = self._idle or over
+
+    def _take_state(self, report: StateReport) -> None:
+        if self._run is not None and report.run_id == self._run.run_id:
+            self._run.state(report)
 
     def look(self, *, battery: float, robot_ns: int) -> Health | None:
         """Add the base's health, and return it if it has changed."""
         base = self.health()
         with self._lock:
+            self._take_in()
             if self._run is None:
                 return None
             health = Health(
@@ -119,8 +137,12 @@ class RunRecorder:
     def write(self) -> None:
         """Write an entry with what was added; without disk space it is reported as missing."""
         with self._lock:
-            if self._run is not None:
-                self._run.write(self._shortage)
+            self._take_in()
+            self._write()
+
+    def _write(self) -> None:
+        if self._run is not None:
+            self._run.write(self._shortage)
 
     @property
     def newest_ns(self) -> int:
@@ -150,6 +172,7 @@ class RunRecorder:
     def page(self, run_id: str, since: int | None = 0, *, robot_ns: int = 0) -> RecordPage:
         """Return the entries of a run above a number, or after a time."""
         with self._lock:
+            self._take_in()
             if self._is_of(run_id) and self._run is not None:
                 return _page(self._run, since, robot_ns)
         with self._past_lock:
@@ -172,6 +195,7 @@ class RunRecorder:
     def index(self) -> RecordIndex:
         """Return the list of recorded runs."""
         with self._lock:
+            self._take_in()
             run = self._run
         with self._past_lock:
             return RecordIndex(runs=tuple(self._kept(path, run) for path in self._paths()))

@@ -71,6 +71,11 @@ class RunStore:
         with self.lock:
             return self._run, self.current.mission
 
+    def snapshot_within(self, longest_s: float) -> tuple[Run, Mission | None]:
+        """Return the same, or a glance if somebody has the lock for longer than that."""
+        with self.lock.within(longest_s):
+            return self._run, self.current.mission
+
     def glance(self) -> tuple[Run, Mission | None]:
         """Return run and mission without the lock: good enough to stop the base, not to store anything."""
         return self._run, self.current.mission

@@ -40,6 +40,11 @@ class WorkControl:
     def closing(self) -> bool:
         return self.closed.is_set()
 
+    @property
+    def stands(self) -> bool:
+        """True while anything keeps the robot standing."""
+        return bool(self._kept_standing or self.failure)
+
     def stop_base(self) -> None:
         """Bring the base to a standstill."""
         self._base.stop()

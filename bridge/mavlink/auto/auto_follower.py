@@ -31,7 +31,8 @@ Invariants
 4. Steps of the run go before changes by somebody else, and end a look if they end the run or hold it.
 5. Nothing is looked at before `begin`: before, the state of the vehicle is known only in part.
 6. A process that only looks stores nothing and sends nothing.
-7. A stop is done only once the list was found to be the one that was sent, after the work there was over.
+7. A HOLD that the run requires is sent before it is stored, and again afterwards until confirmed.
+8. A stop is done only once the list was found to be the one that was sent, after the work there was over.
 
 Three threads work here. `look` runs in the one that receives messages, and must not wait. `act` runs in
 another one: it sends commands, and waits until messages confirm them. `guard` reads the vehicle's list back,
@@ -169,11 +170,13 @@ class AutoFollower:
             self.run = changes[-1].run if changes else before
             return self.run.at > before.at and self._book.pending is None
         if changes:
+            self._pending.hold_before_storing(self._pending.after_step(listed, before, changes[-1].run))
             self._store(listed, observed, before)
         pending = self._pending.past_skipped(self.run, listed, observed) or self._pending.held_again(
             self.run, listed, observed
         )
         if pending is not None:
+            self._pending.hold_before_storing(pending)
             self._book.journal.store_fact("pending", pending)
             self._due.set()
         return self.run.at > before.at and self._book.pending is None

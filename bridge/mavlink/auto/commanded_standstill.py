@@ -81,11 +81,11 @@ def stand(
     *,
     patience_s: float,
     report: Callable[[str], None] = lambda line: None,
-    working: Callable[[], None] = lambda: None,
+    sent: Callable[[], None] = lambda: None,
 ) -> None:
     """Command HOLD until the vehicle reports a standstill in HOLD.
 
-    `report` is called every second with its motion, `working` before each command.
+    `report` is called every second with its motion, `sent` once after the first command; neither may wait.
 
     Raises
     ------
@@ -97,9 +97,9 @@ def stand(
     motion = ReportedMotion(peer.autopilot)
     began = reported = time.monotonic()
     with peer.waiting(*ReportedMotion.TYPES) as waiting:
+        _send_hold(peer)
+        sent()
         while True:
-            working()
-            _send_hold(peer)
             again = time.monotonic() + AGAIN_S
             while (message := waiting.get(again - time.monotonic())) is not None:
                 motion.take(message)
@@ -111,6 +111,7 @@ def stand(
             if now - reported >= REPORTS_S:
                 reported = now
                 report(f"{peer}: HOLD sent again; {motion}")
+            _send_hold(peer)
     raise _not_standing(peer, motion, patience_s)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.vehicle_link.messages import interval, set_current
+from stopgo.bridge.mavlink.vehicle_link.messages import command_long, interval, set_current
 from stopgo.bridge.mavlink.vehicle_link.peer import Ack, Peer
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
@@ -72,6 +72,12 @@ class ConfirmedCommands:
     def hold(self) -> None:
         """Put the vehicle on hold."""
         self._mode(HOLD, self._peer.autopilot.modes.hold)
+
+    def send_hold(self) -> None:
+        """Send HOLD once, without waiting for its effect."""
+        self._peer.send(
+            command_long(self._peer.who, Command.DO_SET_MODE, *self._peer.autopilot.modes.hold.params)
+        )
 
     def auto(self) -> None:
         """Have the vehicle follow its mission."""

@@ -7,7 +7,7 @@ as soon as its heartbeat shows the kind of its autopilot.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -29,17 +29,20 @@ from stopgo.mission.run.orders import Verb
 class FirstHold:
     """Sends HOLD to these vehicles, and to every rover of that system id that is found (`None`: to each)."""
 
-    def __init__(self, wire: Wire, holds: dict[Who, Mode], vehicle: int | None) -> None:
+    def __init__(self, wire: Wire, vehicle: int | None) -> None:
         self._wire = wire
-        self._holds = holds
+        self._holds: dict[Who, Mode] = {}
         self._vehicle = vehicle
-        self._recorded = bool(holds)
+        self._recorded = False
         self._closing = threading.Event()
 
-    def begin(self) -> None:
-        """Send the first frame: HOLD, or a request for a heartbeat if no vehicle is known."""
-        for who in self._holds:
+    def begin(self, holds: Iterable[tuple[int, Mode]]) -> None:
+        """Send the first frame: HOLD to each vehicle of `holds`, or a request for a heartbeat."""
+        for system, hold in holds:
+            who = Who(system, Component.AUTOPILOT1)
+            self._holds[who] = hold
             self._send(who)
+        self._recorded = bool(self._holds)
         if not self._holds:
             self._wire.send(request(Who(self._vehicle or 0, Component.AUTOPILOT1), MessageId.HEARTBEAT))
 
@@ -91,13 +94,9 @@ def held_first(wire: Wire, url: Url, *, vehicle: int | None, state: Path | None)
     OutcomeUnknown
         In place of an error in the block that would say that nothing was sent.
     """
-    holds = {
-        Who(system, Component.AUTOPILOT1): hold
-        for system, hold in recorded_holds(url, vehicle, state).items()
-    }
-    hold = FirstHold(wire, holds, vehicle)
+    hold = FirstHold(wire, vehicle)
     with wire.waiting("HEARTBEAT") as heartbeats:
-        hold.begin()
+        hold.begin(recorded_holds(url, vehicle, state))
         thread = threading.Thread(target=hold.repeat, args=(heartbeats,), daemon=True)
         thread.start()
         try:
@@ -115,15 +114,16 @@ def held_first(wire: Wire, url: Url, *, vehicle: int | None, state: Path | None)
             thread.join()
 
 
-def recorded_holds(url: Url, vehicle: int | None, state: Path | None) -> dict[int, Mode]:
-    """Return the mode HOLD of each vehicle to which this station has sent a mission, by system id."""
-    holds: dict[int, Mode] = {}
+def recorded_holds(url: Url, vehicle: int | None, state: Path | None) -> Iterator[tuple[int, Mode]]:
+    """Yield the mode HOLD of each vehicle to which this station has sent a mission, with its system id.
+
+    Its logbook is open meanwhile: to close it may write.
+    """
     for system in recorded_vehicles(url, state) if vehicle is None else [vehicle]:
         with suppress(InputError), logbook(url, system, state, make=False) as book:
             mode = _hold_of(book)
             if mode is not None:
-                holds[system] = mode
-    return holds
+                yield system, mode
 
 
 def _hold_of(book: Logbook) -> Mode | None:

@@ -100,6 +100,8 @@ class Logbook:
         self.clock = clock
         self.boot_ms = 0
         """The vehicle's time since its start, as last reported."""
+        self.own_order: Ordered | None = None
+        """The command that this process carries out; it counts before the journal has it."""
         self._listed: tuple[Sent, ListedMission] | None = None
 
     @property
@@ -187,7 +189,7 @@ class Logbook:
     @property
     def ordered(self) -> Ordered | None:
         """The command that is being carried out, or was the last."""
-        return self.journal.fact("ordered", Ordered)
+        return self.own_order or self.journal.fact("ordered", Ordered)
 
     @property
     def pending(self) -> PendingCommand | None:

@@ -51,6 +51,11 @@ class PendingCommands:
             return None
         return PendingCommand(command="hold", place=0, since_ns=self._book.clock.now_ns())
 
+    def hold_before_storing(self, pending: PendingCommand | None) -> None:
+        """Send a HOLD once already; it is stored, sent again and confirmed afterwards."""
+        if pending is not None and pending.command == "hold":
+            self._commands.send_hold()
+
     def send(self, pending: PendingCommand, listed: ListedMission) -> None:
         """Send a command; a refused one holds the run. It is pending no more after either.
 

@@ -1,5 +1,8 @@
 """Commands to a vehicle: decided as a robot decides, carried out by its autopilot, and then stored.
 
+`pause` and `abort` send HOLD before anything is decided, read or stored, and again until the vehicle stands.
+No journal delays that, however slow its disk is.
+
 The journal never contains an effect that the vehicle has not shown. While a command is carried out the
 journal shows that, so that a process that watches does not take its effects for changes by somebody else.
 """
@@ -7,7 +10,11 @@ journal shows that, so that a process that watches does not take its effects for
 from __future__ import annotations
 
 import math
+import sqlite3
+import threading
+from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -36,6 +43,8 @@ from stopgo.mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
 """Longest time of one step of a command; after it, changes count as made by somebody else again."""
+STOPS_KEPT = 1000
+"""Answers to stops of this process that are kept in memory."""
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
 UNREMEMBERED = (
     "no record of a mission pushed to this vehicle; push one by the same URL,"
@@ -80,6 +89,8 @@ class VehicleOrders:
         self._wall = wall
         self._consent = consent
         self._stands = stands
+        self._stops: OrderedDict[str, tuple[Order, Answer]] = OrderedDict()
+        """Answered stops of this process: one that comes again must not stop a resumed vehicle."""
 
     def execute(self, order: Order) -> Answer:
         """Carry out a command once, and store the answer.
@@ -89,11 +100,11 @@ class VehicleOrders:
         OutcomeUnknown
             If the command was sent and the vehicle does not show its effect; nothing is stored then.
         """
+        if order.verb in FREE_VERBS:
+            return self._stop_once(order)
         before = answered(self._book.journal, order, self._book.run)
         if before is not None:
             return before
-        if order.verb in FREE_VERBS:
-            return self._stop(order)
         decision = self._conflict(order) or self._decided(order)
         if isinstance(decision, Refused):
             return self._stored(order, decision, None)
@@ -106,24 +117,33 @@ class VehicleOrders:
                 return self._stored(order, denied.refused, None)
             return self._stored(order, change, decision.lease, decision.note)
 
+    def _stop_once(self, order: Order) -> Answer:
+        known = self._stops.get(order.cmd_id)
+        if known is not None and known[0] == order:
+            return known[1]
+        answer = self._stop(order)
+        self._stops[order.cmd_id] = (order, answer)
+        if len(self._stops) > STOPS_KEPT:
+            self._stops.popitem(last=False)
+        return answer
+
     def _stop(self, order: Order) -> Answer:
         """Have the vehicle stand, whatever the run's state; then change the run, if its state allows that."""
-        with self._ordering(order):
+        with _Stopping(self._book, ordered_by(order.verb, order.commander)) as stopping:
             try:
-                self._stand()
+                if not self._stands:
+                    stand(self._peer, patience_s=SHOWS_S, sent=stopping.note)
                 if order.verb == "abort" and self._consent.disarm:
                     self._commands.arm(False)
             except Denied as denied:
                 return self._stored(order, denied.refused, None)
+            before = answered(self._book.journal, order, self._book.run)
+            if before is not None:
+                return before
             decision = self._decided(order)
             if isinstance(decision, Refused):
                 return self._stored(order, Change(self._book.run), None)
             return self._stored(order, decision.change, decision.lease)
-
-    def _stand(self) -> None:
-        """Command HOLD until the vehicle stands, unless it does so since this command began."""
-        if not self._stands:
-            stand(self._peer, patience_s=SHOWS_S, working=self._commands.working)
 
     def _conflict(self, order: Order) -> Refused | None:
         """Refuse a second command at a time."""
@@ -280,7 +300,8 @@ class VehicleOrders:
     # Storing
 
     def _ordering(self, order: Order) -> _Ordering:
-        return _Ordering(self._book, self._commands, ordered_by(order.verb, order.commander))
+        ordered = ordered_by(order.verb, order.commander)
+        return _Ordering(self._book, ordered, self._commands)
 
     def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None, note: str = "") -> Answer:
         """Store the answer together with the changes by the command."""
@@ -302,13 +323,33 @@ def ordered_by(verb: Verb, commander: str, *, until_ns: int = 0) -> Ordered:
     return Ordered(verb=verb, by=commander, mode=HOLD if verb in FREE_VERBS else AUTO, until_ns=until_ns)
 
 
-class _Ordering:
-    """Shows in the journal that a command is being carried out; one with unknown outcome stays there."""
+class _Noted:
+    """The note in the journal that a command is being carried out; one with unknown outcome stays there."""
 
-    def __init__(self, book: Logbook, commands: ConfirmedCommands, ordered: Ordered) -> None:
+    def __init__(self, book: Logbook, ordered: Ordered) -> None:
         self._book = book
-        self._commands = commands
         self._ordered = ordered
+
+    def __exit__(self, kind: object, *exception: object) -> None:
+        if kind is None:
+            self._book.journal.forget_fact("ordered")
+        else:
+            self._extend(0)
+
+    def _until(self, ns: int) -> Ordered:
+        return msgspec.structs.replace(self._ordered, until_ns=self._book.clock.now_ns() + ns)
+
+    def _extend(self, ns: int) -> None:
+        """Show that it is being carried out for this time from now."""
+        self._book.journal.store_fact("ordered", self._until(ns))
+
+
+class _Ordering(_Noted):
+    """The note of a command that waits for the journal before each step."""
+
+    def __init__(self, book: Logbook, ordered: Ordered, commands: ConfirmedCommands) -> None:
+        super().__init__(book, ordered)
+        self._commands = commands
 
     def __enter__(self) -> None:
         self._commands.working = lambda: self._extend(ORDERING_NS)
@@ -316,15 +357,30 @@ class _Ordering:
 
     def __exit__(self, kind: object, *exception: object) -> None:
         self._commands.working = lambda: None
-        if kind is None:
-            self._book.journal.forget_fact("ordered")
-        else:
-            self._extend(0)
+        super().__exit__(kind, *exception)
 
-    def _extend(self, ns: int) -> None:
-        """Show that it is being carried out for this time from now."""
-        until_ns = self._book.clock.now_ns() + ns
-        self._book.journal.store_fact("ordered", msgspec.structs.replace(self._ordered, until_ns=until_ns))
+
+class _Stopping(_Noted):
+    """The note of a stop: in memory at once; a thread of its own writes it after the first HOLD was sent."""
+
+    def __enter__(self) -> _Stopping:
+        self._book.own_order = self._until(ORDERING_NS)
+        self._writing = threading.Thread(target=self._write, daemon=True)
+        return self
+
+    def note(self) -> None:
+        """Begin to write the note for other processes; do not wait for the journal."""
+        self._writing.start()
+
+    def __exit__(self, kind: object, *exception: object) -> None:
+        if self._writing.ident is not None:
+            self._writing.join()
+        self._book.own_order = None
+        super().__exit__(kind, *exception)
+
+    def _write(self) -> None:
+        with suppress(sqlite3.DatabaseError):  # what follows reports a failed disk
+            self._extend(ORDERING_NS)
 
 
 VERBS: dict[str, Callable[[VehicleOrders, Order, ListedMission, Decision], Change]] = {

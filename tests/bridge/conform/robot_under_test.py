@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -44,6 +45,9 @@ class RobotUnderTest:
         self.base = SimulatedBase(clock=self.clock, wear=EXACT)
         self.scanner = SimulatedScanner(clock=self.clock)
         self.controllers: list[Controller] = []
+        self.sync_s = 0.0
+        """Time that each transaction takes."""
+        self.journal.rows.commit_hook = lambda moment: self._sync() if moment == "commit" else None
         self._running = ExitStack()
         self._folder = TemporaryDirectory()
 
@@ -51,6 +55,13 @@ class RobotUnderTest:
         if self.site is None:
             return NO_SEALS
         return KeySeals(read_keys(self.site / name, now=now_utc()), boot_id=boot_id)
+
+    def slow_disk(self, seconds: float) -> None:
+        self.sync_s = seconds
+
+    def _sync(self) -> None:
+        if self.sync_s:
+            time.sleep(self.sync_s)
 
     def boot(self) -> None:
         boot_id = new_boot_id()
@@ -83,7 +94,7 @@ class RobotUnderTest:
         other = OtherStation("bob", self.board.link(self.seals("bob")))
         return RobotBench(
             self.board.link(self.seals("alice")), self.keys, commander="alice", timeout_s=2.0, other=other,
-            forger=forger, restart=self.restart,
+            forger=forger, restart=self.restart, slow_disk=self.slow_disk,
         )  # fmt: skip
 
 

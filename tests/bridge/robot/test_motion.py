@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.motion import Straight, along
-from stopgo.bridge.robot.simulator import SimulatedBase, read_world
+from stopgo.bridge.robot.simulator import SimulatedBase, World, read_world, write_world
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Pose
 
@@ -58,3 +59,15 @@ def test_a_broken_note_of_where_the_robot_stands_is_refused_in_one_line(tmp_path
     keep.write_text("{")
     with pytest.raises(InputError, match="remove it"):
         read_world(keep)
+
+
+def test_where_the_robot_stands_is_synced_before_it_replaces_the_old_pose(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+    sync, replace = os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda number: (calls.append("sync"), sync(number))[1])
+    monkeypatch.setattr(os, "replace", lambda old, new: (calls.append("replace"), replace(old, new))[1])
+    write_world(tmp_path / "world.json", World(pose=ORIGIN, battery=0.5, placed=True))
+    assert calls == ["sync", "replace"]
+    assert read_world(tmp_path / "world.json").battery == 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
@@ -228,3 +229,26 @@ def test_health_is_written_down_when_it_changes(tmp_path: Path) -> None:
 
 def test_what_follows_without_a_record_is_told_with_the_number_of_poses_that_are_kept() -> None:
     assert f"its last {POSES_KEPT} poses" in WITHOUT[RECORD]
+
+
+def test_a_disk_that_does_not_answer_delays_no_pose_and_no_state(tmp_path: Path) -> None:
+    """The threads that publish them also look for a lost link."""
+    entered, goes_on = threading.Event(), threading.Event()
+
+    def room(size: int) -> str:
+        entered.set()
+        assert goes_on.wait(60.0)
+        return ""
+
+    recorder = RunRecorder(tmp_path, room=room)
+    idle(recorder)
+    writing = threading.Thread(target=drive, args=(recorder, 1))
+    writing.start()
+    assert entered.wait(60.0)
+    recorder.pose(pose(2), began_ns=BEGAN_NS, over=False)
+    assert not goes_on.is_set()
+    goes_on.set()
+    writing.join(60.0)
+    recorder.write()
+    assert seqs(recorder.page("run")) == [1, 2]
+    recorder.close()

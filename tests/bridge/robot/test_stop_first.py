@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import sqlite3
 import threading
+import time
 from collections.abc import Callable
 
 import msgspec
@@ -16,8 +17,9 @@ from stopgo.bridge.link.zenoh_link import connecting, listening
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.robot.lock_waits import LockWaits
 from stopgo.bridge.robot.simulator import Fault, Faults
-from stopgo.bridge.robot.storage_watchdog import ANSWERS_WITHIN_S, StorageWatchdog
+from stopgo.bridge.robot.storage_watchdog import ANSWERS_WITHIN_S, LATE, LOOK_EVERY_S, StorageWatchdog
 from stopgo.bridge.robot.work_control import WorkControl
+from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Verb
 from stopgo.mission.run.states import Run
@@ -420,42 +422,124 @@ class Bare:
         self.stops += 1
 
 
-def watched() -> tuple[Bare, WorkControl, LockWaits, list[int], StorageWatchdog, list[str]]:
-    base, now_ns, said = Bare(), [0], list[str]()
-    control, waits = WorkControl(base), LockWaits(lambda: now_ns[0])  # type: ignore[arg-type]
-    return base, control, waits, now_ns, StorageWatchdog(control, waits, said.append), said
+class Watched:
+    """A watchdog over a bare base, in time of its own."""
+
+    def __init__(self) -> None:
+        self.base, self.now_ns, self.calls = Bare(), 0, list[str]()
+        self.control = WorkControl(self.base)  # type: ignore[arg-type]
+        self.waits = LockWaits(lambda: self.now_ns)
+        self.dog = StorageWatchdog(self.control, self.waits, self._hold, self.calls.append)
+
+    def _hold(self, reason: str) -> None:
+        assert not self.control.clear_for_work()
+        self.calls.append(f"hold: {reason}")
+
+    def look_for(self, seconds: float) -> None:
+        """Look as often as its thread does in that time."""
+        for _ in range(round(seconds / LOOK_EVERY_S)):
+            self.now_ns += round(LOOK_EVERY_S * 1e9)
+            self.dog.look()
 
 
-def test_a_robot_that_drives_stands_while_the_journal_does_not_answer() -> None:
-    base, control, waits, now_ns, watchdog, said = watched()
-    control.driving = True
-    section = waits.begin()
-    now_ns[0] = round(ANSWERS_WITHIN_S * 1e9)
-    watchdog.look()
-    assert base.stops == 0
-    now_ns[0] += 1
-    watchdog.look()
-    control.driving = False
-    watchdog.look()
-    assert (base.stops, control.interrupt.is_set(), control.clear_for_work()) == (1, True, False)
-    waits.end(section)
-    watchdog.look()
-    assert control.clear_for_work()
-    assert [line.partition(":")[0] for line in said] == [
-        "the journal has not answered for 0.5 s", "the journal answers again",
+def test_a_robot_whose_journal_does_not_answer_stands_and_is_then_held() -> None:
+    watched = Watched()
+    watched.control.driving = True
+    section = watched.waits.begin()
+    watched.look_for(ANSWERS_WITHIN_S)
+    assert (watched.base.stops, watched.dog.late) == (0, False)
+    watched.look_for(0.1)
+    watched.control.driving = False
+    watched.look_for(5.0)
+    assert (watched.base.stops, watched.control.interrupt.is_set(), watched.dog.late) == (1, True, True)
+    assert not watched.control.clear_for_work()
+    watched.waits.end(section)
+    watched.look_for(0.1)
+    assert watched.control.clear_for_work() and not watched.dog.late
+    assert watched.calls == [
+        f"{LATE}: the robot stands", "the journal answers again: the robot is held until a command comes",
+        f"hold: {LATE}",
     ]  # fmt: skip
 
 
+def test_a_robot_whose_program_was_frozen_drives_on() -> None:
+    """The section is old, but no look saw it: the disk did not delay it."""
+    watched = Watched()
+    watched.control.driving = True
+    section = watched.waits.begin()
+    watched.look_for(LOOK_EVERY_S)
+    watched.now_ns += 10**10
+    watched.look_for(LOOK_EVERY_S)
+    assert watched.base.stops == 1
+    watched.waits.end(section)
+    watched.look_for(LOOK_EVERY_S)
+    assert watched.control.clear_for_work()
+    assert watched.calls[1:] == ["the journal answers again: the robot continues"]
+
+
+@pytest.mark.parametrize("verb", [None, "abort"])
+def test_a_run_waits_for_a_command_after_a_slow_disk(
+    verb: Verb | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its watchdog, on a disk that takes its time for a skip while the robot drives."""
+    field, disk = started(), SlowDisk()
+    drives, interrupted = threading.Event(), threading.Event()
+
+    def goto(path: object, *, heading: object, limits: object, interrupt: threading.Event) -> str:
+        drives.set()
+        assert interrupt.wait(NET_S)
+        interrupted.set()
+        return "interrupted"
+
+    monkeypatch.setattr(field.base, "goto", goto)
+    threads = [threading.Thread(target=work) for work in field.controller.works]
+    for thread in threads:
+        thread.start()
+    assert drives.wait(NET_S)
+    station = field.station(timeout_s=NET_S)
+    monkeypatch.setattr(field.journal.rows, "commit_hook", disk)
+    orders = [threading.Thread(target=field.journal.store_nonce, args=("n", "d"))]
+    orders[0].start()
+    assert interrupted.wait(NET_S)
+    await_state(station, "HELD")
+    if verb is not None:
+        orders.append(threading.Thread(target=field.order, args=(verb,)))
+        orders[1].start()
+    disk.goes_on.set()
+    for thread in orders:
+        thread.join(NET_S)
+    await_state(station, "ABORTED" if verb == "abort" else "HELD", field)
+    field.controller.close()
+    for thread in threads:
+        thread.join(NET_S)
+    assert verb is not None or field.controller.run.reason == LATE
+
+
+def await_state(station: Station, state: str, field: Field | None = None) -> None:
+    """Wait until the robot reports the state, and its run has it if `field` is given."""
+    deadline = time.monotonic() + NET_S
+    while station.status().state != state or (field is not None and field.controller.run.state != state):
+        assert time.monotonic() < deadline, station.status()
+
+
+def test_a_stop_that_is_being_stored_is_not_held_too() -> None:
+    watched = Watched()
+    watched.control.driving = True
+    watched.waits.begin()
+    with watched.control.standing():
+        watched.look_for(5.0)
+    assert (watched.base.stops, watched.calls) == (1, [])
+
+
 def test_a_long_drive_and_a_robot_that_stands_do_not_trip_the_watchdog() -> None:
-    base, control, waits, now_ns, watchdog, said = watched()
-    control.driving = True
-    now_ns[0] = 10**13
-    watchdog.look()
-    control.driving = False
-    waits.begin()
-    now_ns[0] *= 2
-    watchdog.look()
-    assert (base.stops, said) == (0, [])
+    watched = Watched()
+    watched.control.driving = True
+    watched.now_ns = 10**13
+    watched.dog.look()
+    watched.control.driving = False
+    watched.waits.begin()
+    watched.look_for(10.0)
+    assert (watched.base.stops, watched.calls) == (0, [])
 
 
 def test_drives_and_scans_hold_no_lock() -> None:

@@ -127,7 +127,7 @@ def test_an_abort_under_a_used_id_is_refused_and_never_told_that_it_was_done(tmp
     abort = msgspec.structs.replace(start, verb="abort")
     with Site(tmp_path).book() as book:
         no_vehicle: Any = None
-        orders = VehicleOrders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent())
+        orders = VehicleOrders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent(), stands=True)
         remember_answer(book.journal, start, answer_to(start, None, book.run))
         assert (orders.execute(start).outcome, orders.execute(abort).reason) == ("ok", "id_reused")
 
