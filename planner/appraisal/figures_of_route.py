@@ -10,7 +10,7 @@ from stopgo.mission.stages import Candidates, Route, Selection
 from stopgo.mission.stages.coverage_totals import ledger_of
 from stopgo.mission.stages.covered_intervals import seen_units
 from stopgo.mission.stages.figures import Figures, Shares
-from stopgo.planner.appraisal.plausibility import near_legs, plausibility_findings
+from stopgo.planner.appraisal.plausibility import floor_of_rooms, near_legs, plausibility_findings
 from stopgo.planner.appraisal.quality import NOT_MET, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
@@ -34,7 +34,7 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
         whole=shares.whole,
         rooms=shares.rooms,
         kinds=shares.kinds,
-        rooms_m2=sum(polygon.area for room in space.rooms for polygon in room.area),
+        rooms_m2=sum(floor_of_rooms(space)),
         reached_m2=reached,
         unreached=left_out,
         findings=ranked(findings, near_legs(findings, route)),
@@ -77,15 +77,14 @@ def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]
 
 
 def _reached_m2(candidates: Candidates, parts: frozenset[int]) -> float:
-    """Reached area of rooms: each room's area times the fraction of its drive area in these parts."""
+    """Reached area of rooms: each room's floor times the fraction of its drive area in these parts."""
     space = candidates.space
     origin = local_origin(space.floor)
     found = reach_of(space).parts
     reached = 0.0
-    for room in space.rooms:
-        shape = to_shape(room.area, origin)
-        areas = found.area_by_part(shape)
+    for room, floor in zip(space.rooms, floor_of_rooms(space), strict=True):
+        areas = found.area_by_part(to_shape(room.area, origin))
         free = sum(areas.values())
         if free > 0:
-            reached += shape.area * sum(areas.get(part, 0.0) for part in parts) / free
+            reached += floor * sum(areas.get(part, 0.0) for part in parts) / free
     return reached

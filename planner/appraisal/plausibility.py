@@ -25,6 +25,8 @@ MANY = 0.5
 """… which is grave if it applies to this fraction of the rooms."""
 STRAY = 10.0
 """Elements farther than this (m) from the floor do not belong to it."""
+LEAST_OFF = 0.05
+"""Area of a room outside the floor that is more than rounding, m²."""
 LITTLE = 0.5
 """Fraction of the floor; a plan that reaches less is doubtful."""
 OPEN_END = (1e-3, 0.3)
@@ -105,8 +107,18 @@ def _first_corner(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float
     return (float(x + origin[0]), float(y + origin[1]))
 
 
+def floor_of_rooms(space: NavigableSpace) -> list[float]:
+    """Area in m² of each room's floor: an outline also over a void or beyond the slab counts less."""
+    origin = local_origin(space.floor)
+    ground = to_shape(space.ground, origin)
+    whole = [to_shape(room.area, origin) for room in space.rooms]
+    inside = [shape.intersection(ground).area for shape in whole]
+    pairs = zip(whole, inside, strict=True)
+    return [on if shape.area - on > LEAST_OFF else shape.area for shape, on in pairs]
+
+
 def _little_reached(space: NavigableSpace, reached_m2: float) -> Iterator[Finding]:
-    whole = sum(polygon.area for room in space.rooms for polygon in room.area)
+    whole = sum(floor_of_rooms(space))
     if reached_m2 < LITTLE * whole:
         yield Finding(
             "little_reached",

@@ -29,6 +29,8 @@ AT_ONCE = 2
 def plan_storeys(floor: Path, out: Path, settings: Settings, plan_one: PlanOne, *, as_json: bool) -> int:
     """Plan all storeys that people walk on; returns the worst exit code of the storeys.
 
+    It is at least 1 if a floor with rooms or doors is left out.
+
     Raises
     ------
     InputError
@@ -40,21 +42,24 @@ def plan_storeys(floor: Path, out: Path, settings: Settings, plan_one: PlanOne, 
         found = survey_floor(floor, options_of(settings))
     storeys = [item for item in found.floors if not item.aside and item.option]
     if not storeys:
-        raise InputError(f"{floor}: contains no storeys; remove --all-storeys")
+        raise InputError(f"{floor}: {_none_planned(found.floors)}")
+    left_out = [item for item in found.floors if item.aside]
     names = [item.name for item in storeys]
     folders = [out / name for name in folder_names(names)]
-    each = [_of_storey(settings, item, unique=names.count(item.name) == 1) for item in storeys]
+    each = [replace(settings, storey=name) for name in names]
     pool = ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn"))
     with running(f"planning {len(storeys)} storeys"), pool:
         planned = list(pool.map(plan_one, [floor] * len(storeys), folders, each))
-    _print_storeys(list(zip(storeys, folders, planned, strict=True)), as_json=as_json)
-    return max(code for code, _, _ in planned)
+    _print_storeys(list(zip(storeys, folders, planned, strict=True)), left_out, as_json=as_json)
+    return max(*(code for code, _, _ in planned), int(any(item.has_rooms for item in left_out)))
 
 
-def _of_storey(settings: Settings, storey: FloorChoice, *, unique: bool) -> Settings:
-    if unique:
-        return replace(settings, storey=storey.name)
-    return replace(settings, level=storey.level_m)
+def _none_planned(floors: Sequence[FloorChoice]) -> str:
+    """Return the reason why no storey is planned, and the remedy."""
+    if not any(item.option for item in floors):
+        return "contains no storeys; remove --all-storeys"
+    reasons = "; ".join(f"{item.name}: {item.reason}" for item in floors)
+    return f"has no storey that is planned unasked ({reasons}); name one, such as {floors[0].option}"
 
 
 def folder_names(storeys: Sequence[str]) -> list[str]:
@@ -67,19 +72,28 @@ def folder_names(storeys: Sequence[str]) -> list[str]:
     return names
 
 
-def _print_storeys(done: list[tuple[FloorChoice, Path, Planned]], *, as_json: bool) -> None:
+def _print_storeys(
+    done: list[tuple[FloorChoice, Path, Planned]], left_out: Sequence[FloorChoice], *, as_json: bool
+) -> None:
     if as_json:
         storeys = [
             {"storey": storey.name, "folder": str(folder), "exit_code": code, "parts": parts}
             | ({} if parts else {"error": text})
             for storey, folder, (code, text, parts) in done
         ]
-        typer.echo(json.dumps({"storeys": storeys}, ensure_ascii=False))
+        omitted = [
+            {"storey": item.name, "area_m2": item.area_m2, "has_rooms": item.has_rooms, "why": item.reason}
+            for item in left_out
+        ]
+        typer.echo(json.dumps({"storeys": storeys, "left_out": omitted}, ensure_ascii=False))
         return
     for _, _, (_, text, _) in done:
         typer.echo(printable_lines(text))
     typer.echo("")
     typer.echo(table(("storey", "stops", "route m", "coverage %", "folder"), list(_rows(done))))
+    for item in left_out:
+        area = "" if item.area_m2 is None else f" ({item.area_m2:.0f} m²)"
+        typer.echo(printable_lines(f"left out: {item.name}{area}: {item.reason}; {item.option}"))
 
 
 def _rows(done: list[tuple[FloorChoice, Path, Planned]]) -> Iterator[tuple[str, ...]]:

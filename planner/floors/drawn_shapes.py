@@ -85,6 +85,12 @@ def shapes_of(
 
     Content of a block on layer 0 lies on its insert's layer. A hidden layer counts only if its name is known.
     """
+    try:
+        count = entities_with_copies(drawing)
+    except RecursionError:
+        raise InputError(f"{source}: blocks lie too deep in one another; explode or purge them") from None
+    if count > _MOST:
+        raise InputError(_too_many(source))
     walk = _OutlineWalk(drawing, source=source, layers=layers or Layers())
     shapes = list(walk.through(drawing.modelspace(), _Placement()))
     return shapes, walk.findings()
@@ -130,9 +136,7 @@ class _OutlineWalk:
     def _count(self) -> None:
         self._met += 1
         if self._met > _MOST:
-            raise InputError(
-                f"{self._source}: more than {_MOST} entities; export one floor without furniture"
-            )
+            raise InputError(_too_many(self._source))
 
     def _strands(self, multiline: MLine) -> list[DXFEntity]:
         try:
@@ -213,6 +217,33 @@ class _OutlineWalk:
             Finding("no_such_layer", f"layer {legible(name)} is not in the drawing")
             for name in sorted(absent)
         ]
+
+
+def _too_many(source: Path) -> str:
+    return f"{source}: more than {_MOST} entities; export one floor without furniture"
+
+
+def entities_with_copies(drawing: Drawing) -> int:
+    """Return the number of entities in the model space with all copies of blocks; no block is expanded."""
+    sizes: dict[str, int] = {}
+
+    def size_of(entities: Iterable[DXFEntity]) -> int:
+        return sum(1 if not isinstance(item, Insert) else 1 + copies_in(item) for item in entities)
+
+    def copies_in(insert: Insert) -> int:
+        name = str(insert.dxf.get("name")).casefold()
+        try:
+            block, copies = insert.block(), max(insert.mcount, 1)
+        except RecursionError:
+            raise
+        except BROKEN_INPUT:
+            return 0  # the walk reports it
+        if name not in sizes:
+            sizes[name] = 0  # a block inside itself is not followed
+            sizes[name] = 0 if block is None else size_of(block)
+        return copies * sizes[name] if copies <= _MOST_COPIES else 0
+
+    return size_of(drawing.modelspace())
 
 
 def _hidden_layers(drawing: Drawing) -> list:

@@ -21,7 +21,7 @@ from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawing import open_drawing
 from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
-from stopgo.planner.floors.linework import Derived, as_room_name, completed, derived
+from stopgo.planner.floors.linework import PATTERN, Derived, as_room_name, completed, derived
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
@@ -97,7 +97,7 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
             "say the drawing's unit with --units, or the part that is meant with --region"
         )
     made = derived(sheet.strokes, sheet.words)
-    if made.cells >= _PATTERN:
+    if made.cells >= PATTERN:
         raise InputError(
             f"{path}: what was taken for walls encloses {made.cells} cells smaller than a room: that is a "
             "pattern, no walls; put the walls on a layer of their own, or ask for such an export"
@@ -120,8 +120,6 @@ def _size(sheet: DxfSheet) -> float:
 
 LARGEST_FLOOR = 2000.0
 """Greatest length of a storey, in metres."""
-_PATTERN = 150
-"""This many small cells among the lines of walls are a pattern of tiles or a hatch."""
 
 
 def _no_walls(sheet: DxfSheet) -> str:

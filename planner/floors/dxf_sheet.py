@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 from ezdxf.document import Drawing
+from ezdxf.entities import DXFEntity, Insert
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
 from stopgo.mission.settings.layer_kinds import layer_option
+from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
 from stopgo.planner.floors.drawn_shapes import Shape, shapes_of
 from stopgo.planner.floors.layers import Layers, is_layered, missing_in
@@ -53,6 +55,7 @@ def sheet_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> DxfShe
         When the given unit makes no building, or the given drawing or region does not exist.
     """
     shapes, odd = shapes_of(drawing, source=source, layers=Layers(options.layers))
+    _check_model_space(drawing, source)
     own = frozenset(shape.role for shape in shapes if not shape.is_text)
     layered = is_layered(own)
     by_name = frozenset[str]() if layered else missing_in(own)
@@ -67,6 +70,40 @@ def sheet_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> DxfShe
         layers, shapes, scale, strokes, words, [*odd_units, *odd, *odd_strokes], layered, outlined
     )
     return _one_drawing(_in_region(sheet, options, source), options, source)
+
+
+def _check_model_space(drawing: Drawing, source: Path) -> None:
+    """Refuse a drawing that is not in the model space but in a paper space or in another file."""
+    drawn = [item for item in drawing.modelspace() if item.dxftype() != "VIEWPORT"]
+    absent = [name for item in drawn if (name := _absent_block(item)) is not None]
+    if len(absent) < len(drawn):
+        return
+    if absent:
+        named = ", ".join(sorted(set(absent))[:5])
+        raise InputError(
+            f"{source}: holds only external references ({named}), which are other files; bind them "
+            "(XREF, Bind) and save it again, or name the file that is referenced"
+        )
+    paper = {
+        legible(layout.name): sum(item.dxftype() != "VIEWPORT" for item in layout)
+        for layout in drawing.layouts
+        if not layout.is_modelspace
+    }
+    found = [f"{count} entities are in the paper space '{name}'" for name, count in paper.items() if count]
+    if found:
+        raise InputError(
+            f"{source}: nothing is drawn in the model space; {', '.join(found)}: move them to "
+            "the model space (CHSPACE)"
+        )
+
+
+def _absent_block(entity: DXFEntity) -> str | None:
+    """Return the name of a block that is not in the file; None for other entities."""
+    if not isinstance(entity, Insert):
+        return None
+    block = entity.block()
+    is_absent = block is None or block.block is None or block.block.is_xref
+    return legible(str(entity.dxf.get("name"))) if is_absent else None
 
 
 def _by_name(shapes: Sequence[Shape]) -> list[Finding]:
@@ -108,6 +145,11 @@ def _within(sheet: DxfSheet, box: DrawingBox, *, margin: float) -> DxfSheet:
 
 def _one_drawing(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfSheet:
     """Choose one of several drawings: the one given by the user, else the one that is clearly a plan."""
+    if sheet.layered and options.drawing is not None:
+        raise InputError(
+            f"{source}: --drawing {options.drawing} does not apply: the layers FLOOR, WALLS and so on show "
+            "one floor; remove it, or choose a part with --region"
+        )
     if sheet.layered or (sheet.outlined and options.drawing is None):
         return sheet
     drawings = tuple(drawings_in(sheet.strokes))

@@ -11,11 +11,12 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import bounds
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.ifc.class_kinds import IGNORED, with_given_kinds
-from stopgo.planner.floors.ifc.levels import Level, chosen_level, levels_of, standing_at, walked, with_uses
+from stopgo.planner.floors.ifc.levels import NEAR, Level, chosen_level, levels_of, standing_at, walked
 from stopgo.planner.floors.ifc.loading import load
 from stopgo.planner.floors.ifc.model import Model
 from stopgo.planner.floors.ifc.standing import standing_on
 from stopgo.planner.floors.ifc.storey_plan import as_on_day, floor_on, heights_of, odd_products
+from stopgo.planner.floors.ifc.storey_use import unnamed_floors, with_uses
 from stopgo.planner.floors.parts import in_order
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.standing_body import StandingBody
@@ -67,7 +68,8 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
         if is_chosen
         else None
     )
-    shown = levels if own is None or own in levels else (*levels, own)
+    unnamed = [level for level in unnamed_floors(levels, model) if own is None or abs(level.z - own.z) > NEAR]
+    shown = (*levels, *unnamed, *([own] if own is not None and own not in levels else []))
     choices = [_choice(level, model, file, options, chosen=level == own) for level in shown]
     described = model.described
     return Survey(
@@ -87,12 +89,20 @@ def _choice(
     level: Level, model: Model, file: FloorFile, options: FloorOptions, *, chosen: bool
 ) -> FloorChoice:
     option = f"--storey {shlex.quote(level.name)}" if level.storey else f"--level {level.z:g}"
-    head = FloorChoice(level.name, option, level.z, notes=level.notes, aside=level.aside, chosen=chosen)
+    reason = level.reason
+    head = FloorChoice(
+        *(level.name, option, level.z),
+        notes=level.notes,
+        aside=bool(reason),
+        reason=reason,
+        has_rooms=level.lively,
+        chosen=chosen,
+    )
     try:
         floor = floor_on(level, model, file, options)
     except InputError as error:
-        said = str(error).partition(": ")[2]
-        return replace(head, notes=(*level.notes, said), aside=True)
+        why = reason or str(error).partition(": ")[2].partition(";")[0]
+        return replace(head, notes=tuple(dict.fromkeys((*level.notes, why))), aside=True, reason=why)
     kinds = Counter((*(item.kind for item in floor.elements), *(f"{item.kind}s" for item in floor.openings)))
     counts = {"rooms": len(floor.rooms), **{kind: kinds[kind] for kind in (*KINDS, "doors", "passages")}}
     worked_out = [item.message for item in floor.findings if item.code in WORKED_OUT]

@@ -87,9 +87,9 @@ def floor_area(
     level: Level, model: Model, rooms: Sequence[Space], solids: Sequence[Solid], doors: Sequence[Door]
 ) -> tuple[Region, list[Finding]]:
     """The floor: the slabs at its level, else the rooms and what stands between, else the walls' hull."""
-    slabs, odd = _slabs(level, walked_on(model)), []
+    slabs, odd = slabs_at(level, walked_on(model)), []
     if slabs.is_empty:
-        slabs = _slabs(level, [body for _, body in model.of_role("other")])
+        slabs = slabs_at(level, [body for _, body in model.of_role("other")])
         odd = [
             Finding("floor_from_proxies", f"no slab at {level.z:.2f} m: the floor is IfcBuildingElementProxy")
         ]
@@ -116,7 +116,7 @@ def floor_area(
     return tidy(shapely.union_all([hull, slabs, *sills])), [Finding("floor_from_walls", text)]
 
 
-def _slabs(level: Level, bodies: Iterable[Surface]) -> Region:
+def slabs_at(level: Level, bodies: Iterable[Surface]) -> Region:
     """Upward faces of bodies near a level, with small gaps closed."""
     faces: list[Region] = []
     for mesh in bodies:

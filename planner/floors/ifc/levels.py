@@ -21,8 +21,8 @@ SAME = 0.02
 """Storeys whose floors lie closer than this are one floor."""
 LEAST_SLAB = 1.0
 """Square metres of slab that make a level."""
-HEADROOM = 1.8
-"""A floor that lies less than this above another is no storey over it."""
+HEADROOM = 1.9
+"""Height that a person needs; a floor less than this above another is no storey over it, metres."""
 LIKE_LEVEL = 0.3
 """A level means the storey whose floor is as near as this, metres."""
 OPEN_ABOVE = 3.0
@@ -42,22 +42,28 @@ class Level:
     """GlobalId; None where the user names a level and not a storey."""
     contained: int = 0
     """Products that the model places in it."""
+    also: tuple[str, ...] = ()
+    """Names of the storeys merged into it: they choose it as well."""
+    merged: tuple[str, ...] = ()
+    """GlobalIds of those storeys."""
     notes: tuple[str, ...] = ()
-    aside: bool = False
-    """True if nobody walks there: a foundation, a crawl space, a roof."""
+    reason: str = ""
+    """Reason not to plan it unasked, such as a roof; empty if people walk there."""
+    lively: bool = False
+    """True if it has doors or several rooms."""
 
 
 def levels_of(model: Model) -> tuple[Level, ...]:
     """Every storey with its floor's level, from below; storeys of one floor are merged."""
-    surfaces = _surfaces(model)
+    surfaces = surfaces_of(model)
     found = [_level(storey, surfaces, model) for storey in model.described.storeys]
     found.sort(key=lambda level: (level.z, -level.contained, level.name, level.storey or ""))
-    return tuple(_with_ceilings(_merged(found)))
+    return tuple(_with_names(_with_ceilings(_merged(found))))
 
 
-def _surfaces(model: Model) -> tuple[FloatArray, FloatArray]:
-    """Heights and areas of all that looks up on slabs and floor coverings."""
-    parts = [upward(mesh)[1:] for mesh in walked_on(model)]
+def surfaces_of(model: Model, bodies: Iterable[Surface] | None = None) -> tuple[FloatArray, FloatArray]:
+    """Heights and areas of all that looks up on slabs and floor coverings, or on other bodies."""
+    parts = [upward(mesh)[1:] for mesh in (walked_on(model) if bodies is None else bodies)]
     if not parts:
         return np.empty(0), np.empty(0)
     return np.concatenate([z for z, _ in parts]), np.concatenate([area for _, area in parts])
@@ -74,7 +80,7 @@ def _level(storey: Storey, surfaces: tuple[FloatArray, FloatArray], model: Model
     contained = sum(product.storey == storey.global_id for product in model.described.products)
     moved = z - storey.elevation
     notes = (f"its slab lies {moved:+.2f} m from the storey's level",) if abs(moved) > SAME else ()
-    return Level(legible(storey.name), z, np.inf, storey.global_id, contained, notes)
+    return Level(legible(storey.name), z, np.inf, storey.global_id, contained, notes=notes)
 
 
 def floor_near(elevation: float, surfaces: tuple[FloatArray, FloatArray]) -> float:
@@ -97,10 +103,23 @@ def _merged(levels: Iterable[Level]) -> list[Level]:
         if kept and level.z - kept[-1].z < SAME:
             main, other = sorted((kept[-1], level), key=lambda item: -item.contained)
             note = f"storey '{other.name}' is the same floor"
-            kept[-1] = replace(main, notes=(*main.notes, note))
+            also = (*main.also, *other.also, *filter(None, (other.name,)))
+            merged = (*main.merged, *other.merged, *filter(None, (other.storey,)))
+            kept[-1] = replace(main, also=also, merged=merged, notes=(*main.notes, note))
         else:
             kept.append(level)
     return kept
+
+
+def _with_names(levels: list[Level]) -> list[Level]:
+    """The same floors, each with a name of its own: a repeated or empty one gets its height."""
+    counts = Counter(level.name.strip().casefold() for level in levels)
+    return [
+        level
+        if counts[key := level.name.strip().casefold()] == 1 and key
+        else replace(level, name=f"{level.name.strip() or 'storey'} ({level.z:+.2f} m)")
+        for level in levels
+    ]
 
 
 def _with_ceilings(levels: list[Level]) -> list[Level]:
@@ -142,23 +161,22 @@ def chosen_level(
     raise InputError(f"{path}: has {len(levels)} storeys; choose one with --storey: {listed(levels)}")
 
 
-FOUNDATION = "below the lowest storey with doors or rooms: a foundation"
-ROOF = "nothing above it: a roof"
-
-
 def walked(levels: Iterable[Level]) -> list[Level]:
     """Without foundations and roofs."""
-    return [level for level in levels if not level.aside]
+    return [level for level in levels if not level.reason]
 
 
 def _named(levels: tuple[Level, ...], name: str, path: Path) -> Level:
     wanted = name.strip().casefold()
-    for fits in (lambda text: text == wanted, lambda text: wanted in text):
-        found = [level for level in levels if fits(level.name.casefold())]
+    for found in (
+        [level for level in levels if name.strip() in (level.storey, *level.merged)],
+        [level for level in levels if wanted in map(str.casefold, (level.name, *level.also))],
+        [level for level in levels if any(wanted in text.casefold() for text in (level.name, *level.also))],
+    ):
         if len(found) == 1:
             return found[0]
         if found:
-            raise InputError(f"{path}: --storey {name} is true of several: {listed(found)}; use --level Z")
+            raise InputError(f"{path}: --storey {name} is true of several: {listed(found)}; name one in full")
     raise InputError(f"{path}: has no storey '{name}'; it has {listed(levels) or 'none, use --level Z'}")
 
 
@@ -168,57 +186,12 @@ def _bare(z: float, levels: tuple[Level, ...]) -> Level:
 
 def listed(levels: Iterable[Level]) -> str:
     """Storeys by name and level, for an error."""
-    return ", ".join(f"'{level.name}' ({level.z:+.2f} m)" for level in levels)
+    heights = [f"({level.z:+.2f} m)" for level in levels]
+    names = [f"'{level.name}'" for level in levels]
+    return ", ".join(n if h in n else f"{n} {h}" for n, h in zip(names, heights, strict=True))
 
 
 def standing_at(model: Model) -> str:
     """The heights at which most walls, columns and doors stand, for a model without storeys."""
     feet = Counter(round(body.z[0], 1) + 0.0 for _, body in model.of_role("walls", "columns", "doors"))
     return ", ".join(f"{z:g} m ({count})" for z, count in feet.most_common(4)) or "no height"
-
-
-def with_uses(levels: tuple[Level, ...], model: Model) -> tuple[Level, ...]:
-    """The same floors; those not for walking are marked: crawl spaces, foundations and open roofs."""
-    if not levels:
-        return ()
-    lively = [_lively(level, model) for level in levels]
-    first = lively.index(True) if any(lively) else 0
-    notes = [
-        _crawled(level, above)
-        or (FOUNDATION if number < first else "")
-        or (ROOF if not lively[number] and _under_the_sky(level, model) else "")
-        for number, (level, above) in enumerate(zip(levels, (*levels[1:], None), strict=True))
-    ]
-    return tuple(
-        replace(level, aside=bool(note), notes=(*level.notes, *([note] if note else [])))
-        for level, note in zip(levels, notes, strict=True)
-    )
-
-
-def _crawled(level: Level, above: Level | None) -> str:
-    if above is None or above.z - level.z >= HEADROOM:
-        return ""
-    return f"only {above.z - level.z:.2f} m below '{above.name}': nobody walks there"
-
-
-def _lively(level: Level, model: Model) -> bool:
-    """True if a floor has a door, or several rooms."""
-    doors = any(abs(mesh.z[0] - level.z) < 0.3 for _, mesh in model.of_role("doors"))
-    return doors or sum(abs(mesh.z[0] - level.z) < 0.6 for _, mesh in model.of_role("spaces")) > 1
-
-
-def _under_the_sky(level: Level, model: Model) -> bool:
-    """True if less than half of the floor lies under a slab or a roof, in a model that has any."""
-    if not model.of_role("slabs", "roofs"):
-        return False
-    floor = _surfaces(model)
-    below = float(floor[1][np.abs(floor[0] - level.z) <= 0.05].sum())
-    above = sum(_shade(mesh) for _, mesh in model.of_role("slabs", "roofs") if mesh.z[1] > level.z + HEADROOM)
-    return above < below / 2 if below else not above
-
-
-def _shade(mesh: Surface) -> float:
-    """Area in plan of a closed body, m²: half of what all its faces throw down."""
-    a, b, c = (mesh.triangles[:, index, :2] for index in range(3))
-    u, v = b - a, c - a
-    return float(np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) / 4

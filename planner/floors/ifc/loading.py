@@ -28,7 +28,12 @@ MOST_KEPT = 2 * 1024**3
 """Bytes of models that are kept; the ones longest unused go first."""
 MOST_CRASHES = 20
 """So often the geometry kernel may crash on one model before it is given up."""
-LARGEST_ZIPPED = 4 * 1024**3
+LARGEST_ZIPPED = 1024**3
+"""Bytes of an unzipped model at most."""
+MOST_PACKED = 100
+"""A model packs to no less than this fraction of its size (1/100); more is a zip bomb …"""
+NO_BOMB = 50 * 1024**2
+"""… unless it is no larger than this, bytes."""
 READING = "import sys; from stopgo.planner.floors.ifc.extract import main; sys.exit(main(sys.argv[1:]))"
 """The other process."""
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
@@ -111,12 +116,21 @@ def _unzipped(file: FloorFile) -> bytes:
             members = [item for item in archive.infolist() if item.filename.lower().endswith(".ifc")]
             if len(members) != 1:
                 raise InputError(f"{file.path}: holds {len(members)} .ifc files; zip one model alone")
-            if members[0].file_size > LARGEST_ZIPPED:
-                raise InputError(f"{file.path}: unpacks to {members[0].file_size} bytes; export one building")
+            _check_size(members[0].file_size, file)
             return archive.read(members[0])
     except (zipfile.BadZipFile, OSError, EOFError, RuntimeError, NotImplementedError, ValueError) as error:
         said = str(error) or type(error).__name__
         raise InputError(f"{file.path}: cannot be unzipped ({said}); copy or export it again") from None
+
+
+def _check_size(unpacked_size: int, file: FloorFile) -> None:
+    """Refuse a model that is too large, or that is unpacked to fill the memory."""
+    if unpacked_size > LARGEST_ZIPPED:
+        raise InputError(f"{file.path}: unpacks to {unpacked_size} bytes; export one building")
+    if unpacked_size > max(NO_BOMB, MOST_PACKED * len(file.data)):
+        raise InputError(
+            f"{file.path}: {len(file.data)} bytes unpack to {unpacked_size}, as no model does; unzip it first"
+        )
 
 
 def _check(data: bytes, path: Path) -> None:

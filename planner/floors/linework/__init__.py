@@ -32,6 +32,8 @@ _TREADS = 0.4
 """Lines of stairs no farther apart than this, in metres, are one flight."""
 _PIECE = 0.02
 """Lines of furniture this close, in metres, are one piece."""
+PATTERN = 150
+"""This many small cells among the lines of walls are a pattern of tiles or a hatch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,7 @@ def completed(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
     if "walls" not in roles or ("rooms" in roles and roles & {"doors", "passages"}):
         return Derived(list(strokes), named, [])
     site = _Site(_origin(strokes), strokes, words)
-    walls, gaps = _walls_and_gaps(site)
+    walls, gaps = _walls_and_gaps(site, *_whole_walls(site))
     gaps, rooms = _rooms(site, walls, gaps, Spaces(_drawn_floor(site), ()))
     rooms = _entered(rooms, gaps)  # a wall drawn as a ring is solid, unless a door leads into it
     if "rooms" not in roles and len(rooms) < 2:
@@ -117,9 +119,12 @@ def completed(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
 
 
 def derived(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
-    """The strokes of a layered floor that the line work shows."""
+    """The strokes of a layered floor that the line work shows; none of a pattern."""
     site = _Site(_origin(strokes), strokes, words)
-    walls, gaps = _walls_and_gaps(site)
+    whole, leaves = _whole_walls(site)
+    if whole.cells >= PATTERN:
+        return Derived([], [], site.findings, whole.cells)
+    walls, gaps = _walls_and_gaps(site, whole, leaves)
     spaces = _spaces(site, walls, gaps)
     gaps, rooms = _rooms(site, walls, gaps, spaces)
     made = [
@@ -138,11 +143,17 @@ def _origin(strokes: Sequence[Stroke]) -> FloatArray:
     return np.floor(low)
 
 
-def _walls_and_gaps(site: _Site) -> tuple[SolidWalls, list[WallGap]]:
-    """Return walls without the openings of doors, and the gaps there."""
+def _whole_walls(site: _Site) -> tuple[SolidWalls, list[FloatArray]]:
+    """Return walls with the openings of doors, and the lines of door leaves among them."""
     beside = site.lines("doors", "openings", "windows")
     built, leaves = without_doors(site.lines("walls"))
-    whole = walls_of(built, site.fills("walls"), beside=[*beside, *leaves])
+    return walls_of(built, site.fills("walls"), beside=[*beside, *leaves]), leaves
+
+
+def _walls_and_gaps(
+    site: _Site, whole: SolidWalls, leaves: list[FloatArray]
+) -> tuple[SolidWalls, list[WallGap]]:
+    """Return walls without the openings of doors, and the gaps there."""
     gaps = gaps_of(site.lines("doors"), site.lines("openings"), [*site.lines("other"), *leaves], whole)
     walls = whole.without([gap.opening for gap in gaps])
     for area in whole.too_thick:

@@ -50,6 +50,15 @@ def test_a_floor_in_order_has_nothing_doubtful() -> None:
     assert figures.reached_m2 == pytest.approx(figures.rooms_m2)
 
 
+def test_a_room_beyond_the_floor_counts_no_floor() -> None:
+    """The right room's outline ends 4 m beyond the slab; one more lies outside of it."""
+    floor = two_rooms(0.9)
+    rooms = (floor.rooms[0], room("right", box(4.1, 0, 12, 4)), room("outside", box(14, 0, 18, 4)))
+    figures = figures_of(replace(floor, rooms=rooms))
+    assert figures.rooms_m2 == pytest.approx(2 * 3.9 * 4)
+    assert figures.reached_m2 == pytest.approx(2 * 3.9 * 4)
+
+
 def test_a_leg_over_lines_that_were_not_read_is_told_first() -> None:
     floor = with_lines(two_rooms(0.9), [(4.0, 0.0), (4.0, 4.0)])
     first = figures_of(floor, Settings(range=3, coverage=1.0)).findings[0]

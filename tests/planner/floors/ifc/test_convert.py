@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
 from stopgo.planner.commands.storeys import Planned, folder_names, plan_storeys
-from stopgo.planner.floors import read_floor
+from stopgo.planner.floors import read_floor, survey_floor
+from stopgo.planner.floors.survey import FloorChoice
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import two_rooms
 
@@ -92,6 +94,28 @@ def test_every_storey_that_people_walk_on_is_planned_into_its_folder(
     assert "no candidate" in capsys.readouterr().out
     with pytest.raises(InputError, match="--all-storeys and a storey are both given"):
         plan_storeys(house_file, tmp_path, Settings(storey="EG"), plan_one, as_json=False)
+
+
+def test_a_floor_with_doors_that_is_left_out_ends_in_a_no(
+    house_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    storeys = stopgo.planner.commands.storeys
+    monkeypatch.setattr(storeys, "ProcessPoolExecutor", InThisProcess)
+    survey = survey_floor(house_file)
+    low = FloorChoice("UG", "--storey UG", -1.2, aside=True, reason="nobody walks there", has_rooms=True)
+
+    def plan_one(floor: Path, folder: Path, settings: Settings) -> Planned:
+        return 0, "planned", []
+
+    assert plan_storeys(house_file, tmp_path, Settings(), plan_one, as_json=False) == 0  # a roof is no floor
+    assert "left out: OG (36 m²): nothing above it" in capsys.readouterr().out
+    found = replace(survey, floors=(low, *survey.floors))
+    monkeypatch.setattr(storeys, "survey_floor", lambda *_: found)
+    assert plan_storeys(house_file, tmp_path, Settings(), plan_one, as_json=False) == 1
+    assert "left out: UG: nobody walks there; --storey UG" in capsys.readouterr().out
+    monkeypatch.setattr(storeys, "survey_floor", lambda *_: replace(survey, floors=(low,)))
+    with pytest.raises(InputError, match=r"no storey that is planned unasked \(UG: nobody walks there\)"):
+        plan_storeys(house_file, tmp_path, Settings(), plan_one, as_json=False)
 
 
 def test_folders_have_names_that_any_file_system_takes_and_no_two_the_same() -> None:
