@@ -59,6 +59,8 @@ class Observation:
     """True if no scanner report, with its pose, is expected any more."""
     is_jumped: bool = False
     """True if somebody has made a later item the current one before the current stop's waits were over."""
+    failsafe: str = ""
+    """Failsafe that put it in its present mode, with its cause; empty if it reports none."""
     is_ours: bool = True
     """True if the vehicle's list is known to be the one that was sent; before that no stop is done."""
 
@@ -245,12 +247,17 @@ def taken_over(
     going = run.state in ("RUNNING", "HOMING")
     if going and not observed.drives and observed.place < listed.end:
         why = "disarmed" if observed.mode == "AUTO" else f"mode {observed.mode}"
-        return runs.paused(run, f"{why}, by {by}", stands=observed.mode == "HOLD")
+        return runs.paused(run, f"{why}, by {_author(observed, by)}", stands=observed.mode == "HOLD")
     if run.state in ("PAUSED", "HELD") and observed.drives and observed.place < listed.end:
         return runs.resumed(run, by)
     if run.state == "PAUSED" and observed.place >= listed.end:  # it went on unseen, to the end
         return runs.resumed(run, by)
     return None
+
+
+def _author(observed: Observation, by: str) -> str:
+    """Return who changed the mode: a failsafe, unless somebody is known to have commanded it."""
+    return observed.failsafe if observed.failsafe and by == SOMEBODY else by
 
 
 def run_on_vehicle(run: Run, items: int | None) -> Run:
