@@ -14,6 +14,7 @@ from stopgo.mission.mavlink.captures import STEPS_M, Capture, Picture, capture_o
 from stopgo.mission.mavlink.enums import MissionState, ModeFlag
 from stopgo.mission.mavlink.failsafes import RECENT_S, UNNAMED, Failsafe, failsafe_of
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.scan_watch import ScanWatch
 from stopgo.mission.mavlink.following.steps import Observation
 from stopgo.mission.mavlink.local_frame import LocalFrame, VehicleOrigin, is_other_site, local_frame
 from stopgo.mission.mavlink.read_back import point_at
@@ -100,6 +101,7 @@ class Observer:
         """The last jump, as far as the vehicle has not gone back behind it."""
         self._mode_began_ns = 0
         """Time when the vehicle was first in its present mode."""
+        self._scan_watch = ScanWatch()
         self._failsafe: tuple[Failsafe, int] | None = None
         """The failsafe that a text reported last, and when."""
         self.fix: Fix | None = None
@@ -220,8 +222,12 @@ class Observer:
             scan=None if report is None else report.capture.result,
             stood=_stood(report, arrived),
             is_jumped=self._is_jumped(run, listed),
-            failsafe=self._failsafe_text(),
+            failsafe=self._failsafe_text(), moved=self._moved(run, listed),
         )  # fmt: skip
+
+    def _moved(self, run: Run, listed: ListedMission) -> str:
+        stops = listed.stops
+        return self._scan_watch.why(listed, stops[run.at].stop) if run.at < len(stops) else ""
 
     def _failsafe_text(self) -> str:
         """Return the failsafe that may have caused the present mode; empty if none is reported."""
@@ -268,6 +274,8 @@ class Observer:
 
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         work = (message.seq, message.mission_state == MissionState.COMPLETE)
+        if listed is not None:
+            self._scan_watch.take_item(listed, self.place(listed), same=self._work == work)
         if self._work == work:
             return
         if self._work is not None and listed is not None:
@@ -315,6 +323,7 @@ class Observer:
         self._fix(Pose(x=x, y=y, heading=heading), speed, attitude.message.yawspeed, now_ns)
 
     def _fix(self, pose: Pose, speed: float, yaw_rate: float, now_ns: int) -> None:
+        self._scan_watch.take_pose(pose, speed)
         self.fix = Fix(pose, speed, stands_still(speed=speed, yaw_rate=yaw_rate), now_ns)
 
     def _take_battery(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
