@@ -16,7 +16,7 @@ from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
 from stopgo.bridge.mavlink.vehicle_link.messages import request
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who, sender
 from stopgo.mission.document import Mission, Scan
-from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.mavlink.captures import Picture, picture_of, result_of
 from stopgo.mission.mavlink.enums import CommandResult, MessageId
@@ -42,6 +42,8 @@ AGAIN_S = 3.0
 COUNT_S = 1.0
 """Time that the camera may take to report its number of pictures."""
 EVERY_COMPONENT = 0
+NO_MESSAGE = 0.0
+"""Number of a script message that means nothing: the scans' number is `SCAN_MESSAGE`."""
 BUSY_S = 1.0
 """Interval between two tries of a trigger, while an older scan is under way."""
 
@@ -233,6 +235,27 @@ class MavlinkScanner:
 
     def _now_s(self) -> float:
         return self._clock.now_ns() / 1e9
+
+
+def check_trigger(autopilot: OnboardAutopilot, trigger: ScanTrigger) -> None:
+    """Check that the autopilot takes the trigger's command, by a message that no script reads as a scan.
+
+    Raises
+    ------
+    InputError
+        If it does not. Without an answer nothing is known, and the first scan shows it.
+    """
+    if trigger != "script":
+        return
+    try:
+        ack = autopilot.peer.command(Command.DO_SEND_SCRIPT_MESSAGE, NO_MESSAGE, patience_s=COMMAND_S)
+    except OutcomeUnknown:
+        return
+    if ack.result == CommandResult.UNSUPPORTED:
+        raise InputError(
+            f"--trigger script: {autopilot.peer} does not take DO_SEND_SCRIPT_MESSAGE as a command"
+            " (ArduPilot may know it as a mission item only); use --trigger camera"
+        )
 
 
 def stop_of(label: str) -> str:

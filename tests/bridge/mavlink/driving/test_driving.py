@@ -63,6 +63,15 @@ def test_an_autopilot_drives_a_mission_to_its_end(tmp_path: Path, profile: str, 
     assert all(abs(math.remainder(pose.heading, math.tau)) < math.radians(10) for pose in driven)
 
 
+def test_a_script_trigger_that_the_autopilot_does_not_take_is_refused_at_the_start(tmp_path: Path) -> None:
+    with (
+        rover(tmp_path, "px4") as (vehicle, _),
+        pytest.raises(InputError, match=r"--trigger script: .* DO_SEND_SCRIPT_MESSAGE.*use --trigger camera"),
+        gateway(tmp_path, vehicle.url, trigger="script"),
+    ):
+        pass
+
+
 def test_an_ardupilot_rover_turns_to_the_headings_that_a_narrow_scanner_needs(tmp_path: Path) -> None:
     mission = site_mission(heading=math.pi / 2)
     narrow = msgspec.structs.replace(mission, scanner=msgspec.structs.replace(mission.scanner, fov_deg=90.0))
