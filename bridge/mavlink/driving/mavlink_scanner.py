@@ -48,7 +48,7 @@ BUSY_S = 1.0
 """Interval between two tries of a trigger, while an older scan is under way."""
 
 
-class ScanWatch:
+class StandstillWatch:
     """Watches one vehicle during a scan; `why` says why the scan is spoilt, empty if it is not."""
 
     def __init__(self, autopilot: OnboardAutopilot, tolerance_m: float) -> None:
@@ -100,7 +100,7 @@ class MavlinkScanner:
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         until_s = self._now_s() + scan.timeout_s
-        watch = ScanWatch(self._autopilot, self._tolerances_m.get(stop_of(label), TOLERANCE_M))
+        watch = StandstillWatch(self._autopilot, self._tolerances_m.get(stop_of(label), TOLERANCE_M))
         with self._autopilot.peer.wire.waiting("CAMERA_IMAGE_CAPTURED") as waiting:
             next_index = self._next_index(waiting)
             command = self._trigger_command(label, scan, next_index)
@@ -192,7 +192,7 @@ class MavlinkScanner:
         next_index: int | None,
         until_s: float,
         interrupt: Event,
-        watch: ScanWatch,
+        watch: StandstillWatch,
     ) -> Message | None:
         """The first report of a new picture; `None` if there is none in time, or the scan ends early."""
         asked_s = self._now_s()
