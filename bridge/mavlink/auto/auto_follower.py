@@ -89,7 +89,7 @@ class AutoFollower:
         self._commands = commands
         self._guard = ListGuard(book, peer, observer)
         self._others = ExternalChanges(book, observer, self._guard)
-        self._pending = PendingCommands(book, observer, commands, self._guard)
+        self._pending = PendingCommands(book, peer, observer, commands, self._guard)
         self._looks_only = looks_only
         self._closing = threading.Event()
         self._due = threading.Event()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
+from stopgo.bridge.mavlink.auto.commanded_standstill import stand
+from stopgo.bridge.mavlink.auto.confirmed_commands import SHOWS_S, ConfirmedCommands, Denied
 from stopgo.bridge.mavlink.auto.list_guard import ListGuard
 from stopgo.bridge.mavlink.auto.logbook import Logbook, PendingCommand
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.autopilots.kind import AUTO
 from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
@@ -18,9 +20,10 @@ class PendingCommands:
     """Decides on pending commands, and sends them."""
 
     def __init__(
-        self, book: Logbook, observer: Observer, commands: ConfirmedCommands, guard: ListGuard
+        self, book: Logbook, peer: Peer, observer: Observer, commands: ConfirmedCommands, guard: ListGuard
     ) -> None:
         self._book = book
+        self._peer = peer
         self._observer = observer
         self._commands = commands
         self._guard = guard
@@ -59,6 +62,8 @@ class PendingCommands:
     def send(self, pending: PendingCommand, listed: ListedMission) -> None:
         """Send a command; a refused one holds the run. It is pending no more after either.
 
+        HOLD is sent until the vehicle reports a standstill: another station may command AUTO meanwhile.
+
         Raises
         ------
         OutcomeUnknown, RobotUnreachable
@@ -66,7 +71,7 @@ class PendingCommands:
         """
         try:
             if pending.command == "hold":
-                self._commands.hold()
+                stand(self._peer, patience_s=SHOWS_S, working=self._commands.working)
             else:
                 self._commands.jump(listed.sequence(pending.place))
         except Denied as denied:

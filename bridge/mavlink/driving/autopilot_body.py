@@ -9,7 +9,7 @@ from pathlib import Path
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.mavlink_base import MavlinkBase
-from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
+from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger, check_trigger
 from stopgo.bridge.mavlink.driving.onboard_autopilot import on_board
 from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 from stopgo.bridge.robot.robot_hardware import Body
@@ -34,6 +34,7 @@ class AutopilotBody:
     def __call__(self, clock: Clock) -> Iterator[Body]:
         url, key = read_link(self.url, self.signing_key, insecure=self.insecure, option="--controller")
         with on_board(url, signing_key=key, vehicle=self.vehicle, timeout_s=self.patience_s) as autopilot:
+            check_trigger(autopilot, self.trigger)
             base = MavlinkBase(autopilot, clock=clock, arm=self.arm)
             scanner = MavlinkScanner(autopilot, clock=clock, trigger=self.trigger)
 

@@ -11,6 +11,7 @@ from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who
 from stopgo.mission.document import Point
 from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.failsafes import RECENT_S, Failsafe, failsafe_of
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.telemetry import (
     Message,
@@ -53,6 +54,7 @@ class NewestMessages(MessageQueue):
         self._newest: dict[str, tuple[float, Message]] = {}
         self._counts: Counter[str] = Counter()
         self._longest_s = 1.0 / POSE_HZ
+        self._failsafe: tuple[float, Failsafe] | None = None
 
     def put(self, message: Message) -> None:
         now_s = time.monotonic()
@@ -61,6 +63,15 @@ class NewestMessages(MessageQueue):
             gap_s = min(self.age_s(POSE[0]), LATEST_S)
             self._longest_s = max(gap_s, self._longest_s * FORGETS)
         self._newest[message.get_type()] = (now_s, message)
+        failsafe = failsafe_of(message.text) if message.get_type() == "STATUSTEXT" else None
+        if failsafe is not None:
+            self._failsafe = (now_s, failsafe)
+
+    @property
+    def recent_failsafe(self) -> Failsafe | None:
+        """The failsafe that a text has just reported."""
+        at_s, failsafe = self._failsafe or (-math.inf, None)
+        return failsafe if time.monotonic() - at_s < RECENT_S else None
 
     def take_counts(self) -> Counter[str]:
         """Number of messages of each type since the last call."""

@@ -1,7 +1,8 @@
 """A scanner that a MAVLink vehicle triggers as a camera or by a script; a scan counts only with its file.
 
 CAMERA_IMAGE_CAPTURED confirms a scan (`stopgo.mission.mavlink.captures`). A message with a number that was
-reported before repeats an older scan's result.
+reported before repeats an older scan's result. A scan during which the vehicle moved has failed, whatever
+the scanner reports: another station may have driven it.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
 from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
 from stopgo.bridge.mavlink.vehicle_link.messages import request
-from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who, sender
 from stopgo.mission.document import Mission, Scan
-from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.mavlink.captures import Picture, picture_of, result_of
 from stopgo.mission.mavlink.enums import CommandResult, MessageId
@@ -23,6 +24,8 @@ from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.stop_numbers import numbers_of
 from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.mavlink.writing import SCAN_MESSAGE
+from stopgo.mission.run.events import Pose
+from stopgo.mission.run.scan_motion import ScanMotion
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 TriggerCommand = tuple[int, tuple[float, ...]]
@@ -30,14 +33,43 @@ TriggerCommand = tuple[int, tuple[float, ...]]
 ScanTrigger = Literal["camera", "script"]
 TRIGGERS: tuple[ScanTrigger, ...] = ("camera", "script")
 
+TOLERANCE_M = 0.05
+"""Tolerance of a position during the scan of a stop that no mission has."""
 LOOK_S = 0.2
-"""Interval at which an interruption is checked."""
+"""Interval at which interruption and motion are checked."""
 AGAIN_S = 3.0
 """Interval at which a result is requested again: it may have been lost on the link."""
 COUNT_S = 1.0
 """Time that the camera may take to report its number of pictures."""
+EVERY_COMPONENT = 0
+NO_MESSAGE = 0.0
+"""Number of a script message that means nothing: the scans' number is `SCAN_MESSAGE`."""
 BUSY_S = 1.0
 """Interval between two tries of a trigger, while an older scan is under way."""
+
+
+class StandstillWatch:
+    """Watches one vehicle during a scan; `why` says why the scan is spoilt, empty if it is not."""
+
+    def __init__(self, autopilot: OnboardAutopilot, tolerance_m: float) -> None:
+        self._autopilot = autopilot
+        self._motion = ScanMotion(tolerance_m)
+        self._boots = autopilot.peer.boots
+        self._look()
+
+    def why(self) -> str:
+        """Look at the vehicle once more."""
+        if self._autopilot.peer.boots != self._boots:
+            return "the autopilot was restarted during the scan"
+        self._look()
+        return self._motion.why
+
+    def _look(self) -> None:
+        """Take the present pose, in the vehicle's own frame; a late one says nothing."""
+        telemetry = self._autopilot.telemetry
+        if not telemetry.is_late:
+            x, y = telemetry.position()
+            self._motion.take(Pose(x=x, y=y, heading=telemetry.yaw()), telemetry.speed())
 
 
 class MavlinkScanner:
@@ -51,25 +83,35 @@ class MavlinkScanner:
         self._clock = clock
         self._trigger = trigger
         self._numbers: dict[str, int] = {}
+        self._tolerances_m: dict[str, float] = {}
+        self._camera: Who | None = None
+        """The component that reports the scans, once it has reported one."""
         self._reported: set[Picture] = set()
         """Pictures that were reported; each counts once, however often it is reported."""
         self._last_number = 0
         """The capture number of the last trigger."""
 
     def take(self, mission: Mission) -> None:
-        """Trigger with the numbers of this mission's stops."""
-        ids = (file_name(stop.id) for stop in mission.stops)
+        """Trigger with the numbers of this mission's stops; any component may be its scanner."""
+        self._camera = None
+        ids = tuple(file_name(stop.id) for stop in mission.stops)
         self._numbers = dict(zip(ids, numbers_of(mission), strict=True))
+        self._tolerances_m = dict(zip(ids, (stop.tolerance_m for stop in mission.stops), strict=True))
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         until_s = self._now_s() + scan.timeout_s
+        watch = StandstillWatch(self._autopilot, self._tolerances_m.get(stop_of(label), TOLERANCE_M))
         with self._autopilot.peer.wire.waiting("CAMERA_IMAGE_CAPTURED") as waiting:
             next_index = self._next_index(waiting)
             command = self._trigger_command(label, scan, next_index)
             refused = self._send_trigger(command, waiting, until_s, interrupt)
             if refused:
                 return ScanFailed(reason=refused)
-            captured = self._await_picture(waiting, next_index, until_s, interrupt)
+            captured = self._await_picture(waiting, next_index, until_s, interrupt, watch)
+        spoilt = watch.why()
+        if spoilt:
+            self._end_spoilt(captured is None)
+            return ScanFailed(reason=spoilt)
         if captured is not None:
             return result_of(captured)
         if interrupt.is_set():
@@ -82,14 +124,29 @@ class MavlinkScanner:
         """Always unknown: a camera's last picture does not show which of two triggers it followed."""
         return None
 
+    def _end_spoilt(self, under_way: bool) -> None:
+        """Have the vehicle stop scanning and stand, unless somebody has switched its mode."""
+        if under_way:
+            self._break_off()
+        if not self._autopilot.control.mode_change():
+            self._autopilot.control.stop()
+
     def _next_index(self, waiting: MessageQueue) -> int | None:
         """Lowest index of the next picture, if the camera reports it; all reports until now are old."""
-        status = self._ask(MessageId.CAMERA_CAPTURE_STATUS)
+        status = None if self._has_own_component else self._ask(MessageId.CAMERA_CAPTURE_STATUS)
         if status is not None:
             return int(status.image_count)
+        if self._has_own_component:
+            self._discard_old(waiting)
+            return None
         last = self._ask(MessageId.CAMERA_IMAGE_CAPTURED)
         self._discard_old(waiting)
         return None if last is None else int(last.image_index) + 1
+
+    @property
+    def _has_own_component(self) -> bool:
+        """True if the scanner is no part of the autopilot, whose count of pictures is another one then."""
+        return self._camera not in (None, self._autopilot.peer.who)
 
     def _ask(self, number: int) -> Message | None:
         try:
@@ -130,11 +187,16 @@ class MavlinkScanner:
             self._discard_old(waiting)
 
     def _await_picture(
-        self, waiting: MessageQueue, next_index: int | None, until_s: float, interrupt: Event
+        self,
+        waiting: MessageQueue,
+        next_index: int | None,
+        until_s: float,
+        interrupt: Event,
+        watch: StandstillWatch,
     ) -> Message | None:
-        """The first report of a new picture; `None` if the time is up or the scan was interrupted."""
+        """The first report of a new picture; `None` if there is none in time, or the scan ends early."""
         asked_s = self._now_s()
-        while not interrupt.is_set() and (left := until_s - self._now_s()) > 0:
+        while not (interrupt.is_set() or watch.why()) and (left := until_s - self._now_s()) > 0:
             message = waiting.get(min(LOOK_S, left))
             if message is not None and self._is_new(message, next_index):
                 return message
@@ -145,11 +207,16 @@ class MavlinkScanner:
 
     def _is_new(self, message: Message, next_index: int | None) -> bool:
         """True at the first report of a picture of this vehicle; the picture counts as reported then."""
-        picture = picture_of(message)
-        if message.get_srcSystem() != self._autopilot.peer.who.system or picture in self._reported:
+        picture, who = picture_of(message), sender(message)
+        other = self._camera not in (None, who)
+        if who.system != self._autopilot.peer.who.system or other or picture in self._reported:
             return False
         self._reported.add(picture)
-        return next_index is None or message.image_index >= next_index
+        counted = next_index is not None and who == self._autopilot.peer.who
+        if counted and message.image_index < (next_index or 0):
+            return False
+        self._camera = who
+        return True
 
     def _discard_old(self, waiting: MessageQueue) -> None:
         """Take all reports so far as reports of older scans."""
@@ -157,8 +224,10 @@ class MavlinkScanner:
             self._reported.add(picture_of(message))
 
     def _request_picture(self, index: int) -> None:
+        """Request it of the component that has it, or of each while that is not known."""
         peer = self._autopilot.peer
-        peer.send(request(peer.who, MessageId.CAMERA_IMAGE_CAPTURED, index))
+        camera = self._camera or Who(peer.who.system, EVERY_COMPONENT)
+        peer.send(request(camera, MessageId.CAMERA_IMAGE_CAPTURED, index))
 
     def _break_off(self) -> None:
         """Command the vehicle to stop scanning; its answer changes nothing here."""
@@ -166,6 +235,27 @@ class MavlinkScanner:
 
     def _now_s(self) -> float:
         return self._clock.now_ns() / 1e9
+
+
+def check_trigger(autopilot: OnboardAutopilot, trigger: ScanTrigger) -> None:
+    """Check that the autopilot takes the trigger's command, by a message that no script reads as a scan.
+
+    Raises
+    ------
+    InputError
+        If it does not. Without an answer nothing is known, and the first scan shows it.
+    """
+    if trigger != "script":
+        return
+    try:
+        ack = autopilot.peer.command(Command.DO_SEND_SCRIPT_MESSAGE, NO_MESSAGE, patience_s=COMMAND_S)
+    except OutcomeUnknown:
+        return
+    if ack.result == CommandResult.UNSUPPORTED:
+        raise InputError(
+            f"--trigger script: {autopilot.peer} does not take DO_SEND_SCRIPT_MESSAGE as a command"
+            " (ArduPilot may know it as a mission item only); use --trigger camera"
+        )
 
 
 def stop_of(label: str) -> str:

@@ -15,6 +15,7 @@ from stopgo.bridge.mavlink.vehicle_link.messages import command_long
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.autopilots.kind import Mode
 from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.failsafes import UNNAMED
 from stopgo.mission.mavlink.items import Command
 
 TICK_S = 0.1
@@ -81,7 +82,14 @@ class ModeControl:
         ours = self._stop_pending.is_set() and mode == self._modes.hold
         if ours or self.known_mode in (None, mode):
             return ""
-        return f"somebody switched the autopilot to {self._modes.name(mode)}"
+        return f"{self._author()} switched the autopilot to {self._modes.name(mode)}"
+
+    def _author(self) -> str:
+        """Who changed the mode: a failsafe, if the autopilot reports one, else somebody."""
+        failsafe = self._newest.recent_failsafe
+        if failsafe is not None:
+            return str(failsafe)
+        return UNNAMED if self._kind.in_failsafe(self._peer.heartbeat) else "somebody"
 
     def accept_mode(self) -> None:
         """Take the reported mode as known: an operator who commands to go on knows it.

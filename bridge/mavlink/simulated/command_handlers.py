@@ -18,6 +18,7 @@ from stopgo.mission.mavlink.autopilots.kind import Mode, ModeName
 from stopgo.mission.mavlink.enums import CommandResult, MessageId, ModeFlag
 from stopgo.mission.mavlink.items import Command, MavFrame
 from stopgo.mission.mavlink.telemetry import Message
+from stopgo.mission.mavlink.writing import SCAN_MESSAGE
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 REJECTED, UNSUPPORTED = CommandResult.TEMPORARILY_REJECTED, CommandResult.UNSUPPORTED
@@ -246,9 +247,11 @@ def _capture(vehicle: Vehicle, command: ReceivedCommand) -> int:
 
 
 def _script_message(vehicle: Vehicle, command: ReceivedCommand) -> int:
-    """DO_SEND_SCRIPT_MESSAGE: param2 is the number, param3 the seconds."""
+    """DO_SEND_SCRIPT_MESSAGE: param1 is the message, param2 the number, param3 the seconds."""
     if Command.DO_SEND_SCRIPT_MESSAGE not in vehicle.autopilot.commands:
         return int(UNSUPPORTED)
+    if command.whole(0) != SCAN_MESSAGE:
+        return int(ACCEPTED)
     return _scan(vehicle, command, command.whole(1, 0), command.params[2])
 
 

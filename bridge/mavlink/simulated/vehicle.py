@@ -295,6 +295,9 @@ class Vehicle:
         for restart in self._mishaps.by("restart", up_s):
             self.reboot()
             self.time.prolong_silence(round(restart.amount * 1e9))
+        for failsafe in self._mishaps.by("failsafe", up_s):
+            self.text(self.autopilot.failsafe_texts[int(failsafe.amount)])
+            self.set_mode("hold")
 
     def _end_scan(self) -> None:
         message, why = self.camera.end(self.now_ns, self.time.boot_ms)

@@ -12,12 +12,15 @@ from stopgo.mission.errors import InputError
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
     "beside", "finish", "scanner", "unsigned", "unplaced", "camera", "jump", "gap", "restart",
+    "failsafe",
 ]  # fmt: skip
 
 
 MOST_JITTER_MS = 60_000
 RESULTS = range(15)
 """MAV_MISSION_RESULT without OPERATION_CANCELLED, by which a vehicle refuses no item."""
+CAUSES = range(6)
+"""Causes of a failsafe, in the order of `Autopilot.failsafe_texts`."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ FAULTS: dict[VehicleFaultKind, str] = {
     "jump": "N seconds after it was switched on, its estimated position jumps by AMOUNT metres, for good",
     "gap": "N seconds after it was switched on, nothing is sent or received for AMOUNT seconds",
     "restart": "N seconds after it was switched on, it reboots, and takes AMOUNT seconds more for that",
+    "failsafe": "N seconds after it was switched on, a failsafe holds it; AMOUNT is the cause: 0 battery,"
+    " 1 remote control, 2 ground station, 3 geofence, 4 crash, 5 position estimate",
     "unplaced": "its origin came too soon: it reports it, but no position on earth (N means nothing)",
     "camera": "its scanner reports scans as a component of its own, 100 (N means nothing)",
     "unsigned": "it signs nothing, though it has a key; it accepts only signed messages (N means nothing)",
@@ -119,6 +124,7 @@ def _nonsense(fault: VehicleFault) -> str | None:
         "beside": metres, "finish": metres, "jump": metres,
         "jitter": (at > MOST_JITTER_MS, f"N is milliseconds, 0 to {MOST_JITTER_MS}, such as jitter@300"),
         "gap": (amount == 0, f"AMOUNT is seconds, more than 0, such as gap@{at}=2"),
+        "failsafe": (amount not in CAUSES, f"AMOUNT is the cause, 0 to {CAUSES[-1]}, such as {kind}@{at}=3"),
         "nack": (amount not in RESULTS, f"{results}, such as nack@{at}=5"),
     }  # fmt: skip
     wrong, why = rules.get(kind, (False, ""))

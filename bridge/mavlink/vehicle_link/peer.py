@@ -72,6 +72,10 @@ class Ack:
         return enum_name("MAV_RESULT", self.result)
 
 
+OF_THE_PAST = frozenset({"CAMERA_IMAGE_CAPTURED"})
+"""Messages that contain the time of an earlier event, not of their sending."""
+
+
 class Newest(MessageQueue):
     """The newest message of each type from one vehicle, and the number of its restarts.
 
@@ -102,7 +106,7 @@ class Newest(MessageQueue):
         self.heard_s = time.monotonic()
         self.messages[message.get_type()] = message
         now_ms = getattr(message, "time_boot_ms", None)
-        if now_ms is not None:
+        if now_ms is not None and message.get_type() not in OF_THE_PAST:
             self.clock = message.get_msgId()
             self._count_boots(now_ms)
 

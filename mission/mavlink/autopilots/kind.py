@@ -246,6 +246,11 @@ class Autopilot:
     steering: Steering = Steering((), unknown_steering)
     whole_bytewise: bool = False
     """A whole number's four bytes are in PARAM_VALUE unchanged; else it is sent as a float."""
+    failsafe_texts: tuple[str, ...] = (
+        "Battery 1 is low 10.50V used 1200 mAh", "Radio Failsafe", "GCS Failsafe", "Polygon fence breached",
+        "Crash: Going to HOLD", "EKF failsafe",
+    )  # fmt: skip
+    """Texts of its failsafes: battery, remote control, ground station, geofence, crash, position estimate."""
 
     def why_no_pivot(self, values: Mapping[str, float]) -> str:
         """Return why it cannot turn on the spot, by its steering parameters; empty if it can."""

@@ -156,4 +156,8 @@ PX4 = Autopilot(
     modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, behaviour=BEHAVIOUR,
     steering=Steering(("CA_AIRFRAME",), car_steering),
     parameters=PARAMETERS, whole_bytewise=True,
+    failsafe_texts=(
+        "Critical battery", "Manual control lost", "Connection to ground station lost", "Geofence breached",
+        "Crash detected", "No valid local position estimate",
+    ),
 )  # fmt: skip

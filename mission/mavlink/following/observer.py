@@ -12,7 +12,9 @@ from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.captures import STEPS_M, Capture, Picture, capture_of
 from stopgo.mission.mavlink.enums import MissionState, ModeFlag
+from stopgo.mission.mavlink.failsafes import RECENT_S, UNNAMED, Failsafe, failsafe_of
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.scan_watch import ScanWatch
 from stopgo.mission.mavlink.following.steps import Observation
 from stopgo.mission.mavlink.local_frame import LocalFrame, VehicleOrigin, is_other_site, local_frame
 from stopgo.mission.mavlink.read_back import point_at
@@ -36,6 +38,7 @@ JUMP_SLACK_S = 1.0
 USED_MESSAGES = (
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
     "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
+    "STATUSTEXT",
 )  # fmt: skip
 """Messages that are used."""
 NONE_YET: Picture = (-1, -1)
@@ -98,6 +101,9 @@ class Observer:
         """The last jump, as far as the vehicle has not gone back behind it."""
         self._mode_began_ns = 0
         """Time when the vehicle was first in its present mode."""
+        self._scan_watch = ScanWatch()
+        self._failsafe: tuple[Failsafe, int] | None = None
+        """The failsafe that a text reported last, and when."""
         self.fix: Fix | None = None
         self.battery = 1.0
         """0 to 1, as last reported."""
@@ -216,7 +222,18 @@ class Observer:
             scan=None if report is None else report.capture.result,
             stood=_stood(report, arrived),
             is_jumped=self._is_jumped(run, listed),
+            failsafe=self._failsafe_text(), moved=self._moved(run, listed),
         )  # fmt: skip
+
+    def _moved(self, run: Run, listed: ListedMission) -> str:
+        stops = listed.stops
+        return self._scan_watch.why(listed, stops[run.at].stop) if run.at < len(stops) else ""
+
+    def _failsafe_text(self) -> str:
+        """Return the failsafe that may have caused the present mode; empty if none is reported."""
+        if self._failsafe is not None and self._failsafe[1] > self._mode_began_ns - RECENT_S * 1e9:
+            return str(self._failsafe[0])
+        return UNNAMED if self._autopilot.in_failsafe(self._newest["HEARTBEAT"].message) else ""
 
     def place(self, listed: ListedMission) -> int:
         """Return the index in the list of the current item; the list's length once all is done."""
@@ -257,6 +274,8 @@ class Observer:
 
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         work = (message.seq, message.mission_state == MissionState.COMPLETE)
+        if listed is not None:
+            self._scan_watch.take_item(listed, self.place(listed), same=self._work == work)
         if self._work == work:
             return
         if self._work is not None and listed is not None:
@@ -304,11 +323,16 @@ class Observer:
         self._fix(Pose(x=x, y=y, heading=heading), speed, attitude.message.yawspeed, now_ns)
 
     def _fix(self, pose: Pose, speed: float, yaw_rate: float, now_ns: int) -> None:
+        self._scan_watch.take_pose(pose, speed)
         self.fix = Fix(pose, speed, stands_still(speed=speed, yaw_rate=yaw_rate), now_ns)
 
     def _take_battery(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         charge = charge_of(message.battery_remaining)
         self.battery = self.battery if charge is None else charge
+
+    def _take_text(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
+        failsafe = failsafe_of(message.text)
+        self._failsafe = self._failsafe if failsafe is None else (failsafe, now_ns)
 
     def _take_capture(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         capture = capture_of(message, None if listed is None else listed.sent)
@@ -370,4 +394,5 @@ HANDLERS: dict[str, Callable[[Observer, Message, ListedMission | None, int], Non
     "SYS_STATUS": Observer._take_battery,
     "BATTERY_STATUS": Observer._take_battery,
     "CAMERA_IMAGE_CAPTURED": Observer._take_capture,
+    "STATUSTEXT": Observer._take_text,
 }

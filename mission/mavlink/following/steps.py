@@ -59,6 +59,10 @@ class Observation:
     """True if no scanner report, with its pose, is expected any more."""
     is_jumped: bool = False
     """True if somebody has made a later item the current one before the current stop's waits were over."""
+    failsafe: str = ""
+    """Failsafe that put it in its present mode, with its cause; empty if it reports none."""
+    moved: str = ""
+    """How the vehicle moved during the scan at the current stop; empty if it stood, as far as known."""
     is_ours: bool = True
     """True if the vehicle's list is known to be the one that was sent; before that no stop is done."""
 
@@ -108,7 +112,7 @@ def _ends_scan(run: Run, listed: ListedMission, observed: Observation) -> Change
     """Return the end of a scan: a paused vehicle still ends it."""
     if run.stop_state == "VERIFYING":
         return _verified(run, listed, observed)
-    if run.stop_state == "SCANNING" and isinstance(observed.scan, ScanResult):
+    if run.stop_state == "SCANNING" and isinstance(observed.scan, ScanResult) and not observed.moved:
         return _ended(run, listed, observed, observed.scan)
     return None
 
@@ -174,17 +178,31 @@ def _scanned(run: Run, listed: ListedMission, observed: Observation, items: Stop
     """Take the scanner's report when it comes; the stop is done when its wait is over."""
     if observed.place <= items.at:
         return Change(changed(run, stop_state="NAVIGATING"))
+    if observed.moved:
+        return _failed(run, listed, observed, items, ScanFailed(reason=observed.moved))
     if isinstance(observed.scan, ScanResult):
         return _ended(run, listed, observed, observed.scan)
     if isinstance(observed.scan, ScanFailed):
-        left = observed.place >= items.after
-        tried = _last_try(run, listed.mission.stops[run.at]) if left else run
-        return runs.scan_ended(tried, listed.mission, observed.scan)
+        return _failed(run, listed, observed, items, observed.scan)
+    return _late(run, listed, observed, items)
+
+
+def _late(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
+    """Leave a stop without a report of its scan, once none is expected any more."""
     if observed.place < items.after or not (observed.report_overdue and observed.is_ours):
         return None
     if observed.is_jumped:
         return _jumped(run, listed)
     return _unconfirmed(run, listed, observed.stood, "no scan report from the vehicle")
+
+
+def _failed(
+    run: Run, listed: ListedMission, observed: Observation, items: StopItems, scan: ScanFailed
+) -> Change:
+    """End a failed scan, or one during which the vehicle moved; a stop that was left has no tries left."""
+    left = observed.place >= items.after
+    tried = _last_try(run, listed.mission.stops[run.at]) if left else run
+    return runs.scan_ended(tried, listed.mission, scan)
 
 
 def _last_try(run: Run, stop: Stop) -> Run:
@@ -194,6 +212,8 @@ def _last_try(run: Run, stop: Stop) -> Run:
 
 def _scan_over(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
     """Verify a reported scan once its wait is over."""
+    if observed.moved:
+        return _failed(run, listed, observed, items, ScanFailed(reason=observed.moved))
     return None if items.at < observed.place < items.after else _verified(run, listed, observed)
 
 
@@ -245,12 +265,17 @@ def taken_over(
     going = run.state in ("RUNNING", "HOMING")
     if going and not observed.drives and observed.place < listed.end:
         why = "disarmed" if observed.mode == "AUTO" else f"mode {observed.mode}"
-        return runs.paused(run, f"{why}, by {by}", stands=observed.mode == "HOLD")
+        return runs.paused(run, f"{why}, by {_author(observed, by)}", stands=observed.mode == "HOLD")
     if run.state in ("PAUSED", "HELD") and observed.drives and observed.place < listed.end:
         return runs.resumed(run, by)
     if run.state == "PAUSED" and observed.place >= listed.end:  # it went on unseen, to the end
         return runs.resumed(run, by)
     return None
+
+
+def _author(observed: Observation, by: str) -> str:
+    """Return who changed the mode: a failsafe, unless somebody is known to have commanded it."""
+    return observed.failsafe if observed.failsafe and by == SOMEBODY else by
 
 
 def run_on_vehicle(run: Run, items: int | None) -> Run:

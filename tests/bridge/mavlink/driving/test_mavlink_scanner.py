@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from threading import Event
 from typing import Any
 
+import pytest
+
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, stop_of
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
@@ -25,11 +27,13 @@ SCAN = Scan(profile="default", duration_s=2.0, timeout_s=1.0)
 GOOD = ScanResult(file="scan-1.e57", size=1600, points=100, sha256=SHA)
 
 
-def captured(index: int, *, url: str = URL, result: int = 1, boot_ms: int = 5000, system: int = 1) -> Message:
+def captured(
+    index: int, *, url: str = URL, result: int = 1, boot_ms: int = 5000, system: int = 1, component: int = 1
+) -> Message:
     message = dialect.MAVLink_camera_image_captured_message(
         boot_ms, 0, 0, 0, 0, 0, 0, (1.0, 0.0, 0.0, 0.0), index, result, url.encode()
     )
-    message._header.srcSystem = system
+    message._header.srcSystem, message._header.srcComponent = system, component
     return message
 
 
@@ -38,7 +42,11 @@ class Camera:
 
     def __init__(self, *tells: Message, taken: int | None = None, acks: tuple[int, ...] = (0,)) -> None:
         self.who = Who(1, 1)
-        self.peer, self.wire, self.telemetry = self, self, self
+        self.peer, self.wire, self.telemetry, self.control = self, self, self, self
+        self.boots, self.is_late = 0, False
+        self.poses: list[tuple[float, float, float, float]] = [(0.0, 0.0, 0.0, 0.0)]
+        """North, east, yaw and speed at each look; the last one stays."""
+        self.switched, self.stops = "", 0
         self.orders: list[tuple[int, tuple[float, ...]]] = []
         self.asked: list[Message] = []
         self.answers: Callable[[Message], Message | None] = lambda request: None
@@ -72,6 +80,24 @@ class Camera:
 
     def why_unknown(self) -> str:
         return ""
+
+    def position(self) -> tuple[float, float]:
+        return self.poses[0][:2]
+
+    def yaw(self) -> float:
+        return self.poses[0][2]
+
+    def speed(self) -> float:
+        present = self.poses[0]
+        if len(self.poses) > 1:  # the last of the three that are asked at each look
+            self.poses.pop(0)
+        return present[3]
+
+    def mode_change(self) -> str:
+        return self.switched
+
+    def stop(self) -> None:
+        self.stops += 1
 
     def _tell(self) -> None:
         for message in self._tells:
@@ -158,6 +184,82 @@ def test_an_interrupted_scan_is_broken_off() -> None:
         dialect.MAV_CMD_IMAGE_START_CAPTURE,
         dialect.MAV_CMD_IMAGE_STOP_CAPTURE,
     ]
+
+
+@pytest.mark.parametrize(
+    ("poses", "why"),
+    [
+        ([(0.0, 0.0, 0.0, 0.0), (0.0, 0.06, 0.0, 0.0)], "the vehicle moved 0.06 m during the scan"),
+        ([(0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.1, 0.0)], "the vehicle turned 6° during the scan"),
+        (
+            [(0.0, 0.0, 0.0, 0.0), *[(0.0, 0.0, 0.0, 0.2)] * 4],
+            "the vehicle moved at 0.20 m/s during the scan",
+        ),
+    ],
+)
+def test_a_scan_while_the_vehicle_moves_has_failed_and_the_vehicle_must_stand(
+    poses: list[tuple[float, float, float, float]], why: str
+) -> None:
+    camera = Camera(captured(4), taken=4)
+    camera.poses = poses
+    camera._tells = []
+    slow = Scan(profile="default", duration_s=2.0, timeout_s=30.0)
+    scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
+    scanner.take(site_mission())
+    assert scanner.scan("run-s2-1", slow, interrupt=Event()) == ScanFailed(reason=why)
+    assert camera.orders[-1][0] == dialect.MAV_CMD_IMAGE_STOP_CAPTURE and camera.stops == 1
+
+
+def test_an_operator_who_has_switched_the_mode_keeps_the_vehicle_after_a_spoilt_scan() -> None:
+    camera = Camera(captured(4), taken=4)
+    camera.poses, camera.switched = [(0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)], "to MANUAL"
+    assert isinstance(scan(camera), ScanFailed) and camera.stops == 0
+
+
+def test_a_position_that_wanders_within_the_tolerance_and_one_fast_report_are_noise() -> None:
+    camera = Camera(captured(4), taken=4)
+    camera.poses = [(0.0, 0.0, 0.0, 0.0), (0.04, 0.0, 0.0, 0.2), (0.0, 0.02, 0.05, 0.0)]
+    assert scan(camera) == GOOD
+
+
+def test_a_scan_during_which_the_autopilot_restarts_has_failed() -> None:
+    camera = Camera(captured(4), taken=4)
+    told = camera._tell
+
+    def restart() -> None:
+        camera.boots = 1
+        told()
+
+    camera._tell = restart  # type: ignore[method-assign]
+    assert scan(camera) == ScanFailed(reason="the autopilot was restarted during the scan")
+
+
+def test_a_scanner_of_its_own_component_is_asked_itself_and_not_measured_by_the_autopilots_count() -> None:
+    camera = Camera(captured(0, component=100), taken=4)
+    scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
+    slow = Scan(profile="default", duration_s=2.0, timeout_s=60.0)
+    assert scanner.scan("run-s1-1", slow, interrupt=Event()) == GOOD
+    camera._taken = 14  # the autopilot counted a command that was repeated ten times
+    camera.answers = lambda request: captured(1, component=100, boot_ms=9000)
+    assert scanner.scan("run-s2-1", slow, interrupt=Event()) == GOOD
+    assert {request.target_component for request in camera.asked} == {100}
+
+
+def test_while_no_component_has_reported_a_scan_each_is_asked() -> None:
+    camera = Camera(taken=4)
+    camera.answers = lambda request: captured(0, component=100)
+    slow = Scan(profile="default", duration_s=2.0, timeout_s=60.0)
+    scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
+    assert scanner.scan("run-s1-1", slow, interrupt=Event()) == GOOD
+    assert {request.target_component for request in camera.asked} == {0}
+
+
+def test_another_scanner_of_the_vehicle_is_not_the_one_that_counts() -> None:
+    camera = Camera(captured(4), taken=4)
+    scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
+    assert scanner.scan("run-s1-1", SCAN, interrupt=Event()) == GOOD
+    camera._tells = [captured(9, component=101)]
+    assert scanner.scan("run-s2-1", SCAN, interrupt=Event()) == ScanFailed(reason="no result within 1 s")
 
 
 def test_a_stop_is_found_in_its_label_whatever_its_id() -> None:

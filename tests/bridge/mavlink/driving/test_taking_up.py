@@ -190,3 +190,18 @@ def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) 
         vehicle.on()
         held = until(reports, lambda report: isinstance(report, Held))
         assert "restarted and is disarmed; arm it, or start stopgo robot with --arm" in held.reason
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_a_failsafe_that_holds_the_vehicle_is_named_and_not_taken_for_somebody(
+    tmp_path: Path, profile: str
+) -> None:
+    faults = VehicleFaults((VehicleFault("failsafe", 6, 3.0),))
+    with rover(tmp_path, profile, faults=faults) as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
+        station.push(site_mission(stops=5))
+        station.command("start")
+        until(station.reports(), is_state("HELD"))
+        held = events_of(station)[-1]
+    assert isinstance(held, Held)
+    assert "the autopilot's failsafe (geofence: " in held.reason
+    assert "somebody" not in held.reason

@@ -6,7 +6,7 @@ import pytest
 
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.messages import station_beat
-from stopgo.bridge.mavlink.vehicle_link.peer import found, reached
+from stopgo.bridge.mavlink.vehicle_link.peer import Newest, found, reached
 from stopgo.bridge.mavlink.vehicle_link.url import read_url
 from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
@@ -162,3 +162,15 @@ def test_a_clock_that_goes_back_is_a_new_boot() -> None:
         while waiting.get(5.0).time_boot_ms > 10_000:
             pass
         assert peer.boots == 1
+
+
+def test_an_older_picture_reported_again_is_no_restart() -> None:
+    newest = Newest(Who(1, 1))
+    for message in (
+        dialect.MAVLink_attitude_message(60_000, 0, 0, 0, 0, 0, 0),
+        dialect.MAVLink_camera_image_captured_message(5000, 0, 0, 0, 0, 0, 0, (1, 0, 0, 0), 0, 1, b""),
+        dialect.MAVLink_attitude_message(60_100, 0, 0, 0, 0, 0, 0),
+    ):
+        message._header.srcSystem, message._header.srcComponent = 1, 1
+        newest.put(message)
+    assert newest.boots == 0

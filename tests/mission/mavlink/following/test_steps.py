@@ -193,3 +193,12 @@ def test_a_mission_that_somebody_has_cleared_does_not_lie_ready() -> None:
     for items in (None, 14):
         assert run_on_vehicle(ready, items) == ready
     assert run_on_vehicle(going(), 0) == going()
+
+
+@pytest.mark.parametrize("stop_state", ["SCANNING", "VERIFYING"])
+def test_a_scan_during_which_the_vehicle_moved_has_failed(stop_state: str) -> None:
+    mine, items = listed(), listed().stops[1]
+    observed = seen(items.scan + 1, pose=S2_AT, scan=SCAN, moved="the vehicle moved 0.40 m during the scan")
+    words, run = after(going(stop_state=stop_state, scan=SCAN), mine, observed)
+    assert words == ["Failed S2", "Held"] and "moved 0.40 m during the scan" in run.reason
+    assert after(going(stop_state="SCANNING", state="PAUSED"), mine, observed)[0] == []
