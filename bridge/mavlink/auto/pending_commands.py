@@ -71,7 +71,7 @@ class PendingCommands:
         """
         try:
             if pending.command == "hold":
-                stand(self._peer, patience_s=SHOWS_S, working=self._commands.working)
+                stand(self._peer, patience_s=SHOWS_S)
             else:
                 self._commands.jump(listed.sequence(pending.place))
         except Denied as denied:

@@ -156,7 +156,7 @@ def test_a_hold_that_the_run_requires_is_sent_before_it_is_stored(command: Any, 
 
     commands: Any = Commands()
     nothing: Any = None
-    pending = PendingCommands(nothing, nothing, commands, nothing)
+    pending = PendingCommands(nothing, nothing, nothing, commands, nothing)
     pending.hold_before_storing(PendingCommand(command=command, place=0, since_ns=0))
     pending.hold_before_storing(None)
     assert calls == sent

@@ -42,6 +42,8 @@ class NoHands:
 
     def ask_for_telemetry(self) -> None: ...
 
+    def send_hold(self) -> None: ...
+
 
 @pytest.fixture(scope="module")
 def log() -> list[Any]:
