@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from stopgo.mission.document import Mission, Scan
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.telemetry import Message, local_speed, mission_id_of
 from stopgo.mission.mavlink.translate import translate
-from tests.bridge.mavlink.auto.site import KINDS, Site, real_tour, until
+from tests.bridge.mavlink.auto.site import KINDS, PATIENCE_S, Site, real_tour, until
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -25,7 +26,6 @@ pytestmark = pytest.mark.usefixtures("own_time")
 PROFILES = ["ardupilot", "px4"]
 OTHER = Who(255, 190)
 AUTO = {"ardupilot": (10, 0), "px4": (4, 4)}
-MOST_ASKED = 2000
 LONG = Scan(profile="default", duration_s=20.0, timeout_s=40.0)
 
 
@@ -53,8 +53,11 @@ def stands(peer: Peer) -> bool:
 
 
 def comes_to_a_stand(peer: Peer) -> bool:
-    """True once the vehicle stands; asked a bounded number of times."""
-    return any(stands(peer) for _ in range(MOST_ASKED))
+    """True once the vehicle stands; asked seldom, because each question keeps the vehicle busy."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not (there := stands(peer)) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return there
 
 
 @pytest.mark.parametrize("profile", PROFILES)
