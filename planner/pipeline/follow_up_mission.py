@@ -167,10 +167,16 @@ def top_up(
     if planned.settings.minimise == "time":
         driven = least_time_route(driven, done=done)
     mission = assemble(driven)
+    return _follow_up(mission, planned.mission, evidence, _coverage_alone(known, mission))
+
+
+def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
+    """Return the coverage of a mission's own stops, for one view of each target."""
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))
-    alone = once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once))
-    return _follow_up(mission, planned.mission, evidence, alone.whole.coverage or 0.0)
+    return (
+        once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage or 0.0
+    )
 
 
 def _must_cover_alone(mission: Mission) -> None:
