@@ -74,6 +74,8 @@ class Poses:
     truth: bool = False
     """True for a simulator's true poses; they are never used as the robot's own estimate."""
     oddities: tuple[str, ...] = ()
+    restarts_ns: tuple[int, ...] = ()
+    """Times of the first data after each restart of the robot, where the log tells it."""
 
     @property
     def seconds(self) -> float:
