@@ -291,7 +291,8 @@ def _filtered(tables: _Tables, name: str) -> Poses | None:
             part = (ns >= since_ns) & (ns < until_ns)
             xy[part] += from_geodetic(origin, Geodetic(lat=later.lat, lon=later.lon), RULE)
     rank = LOCAL if origin is not None else WITHOUT_ORIGIN
-    return poses_of(name, "local", ns, xy, heading, rank=rank, origin=origin, rule=RULE)
+    height = -tables.numbers(name, "PD")[mine] if tables.has(name, "PD") else None
+    return poses_of(name, "local", ns, xy, heading, rank=rank, origin=origin, rule=RULE, height=height)
 
 
 def _origins(tables: _Tables) -> list[tuple[int, SiteOrigin]]:

@@ -74,6 +74,8 @@ class Poses:
     truth: bool = False
     """True for a simulator's true poses; they are never used as the robot's own estimate."""
     oddities: tuple[str, ...] = ()
+    height: FloatArray | None = None
+    """Heights (n,), metres upwards from any level; None where the source has none."""
     restarts_ns: tuple[int, ...] = ()
     """Times of the first data after each restart of the robot, where the log tells it."""
 
@@ -169,7 +171,14 @@ class FieldLog:
 
 
 def poses_of(
-    source: str, frame: str, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike, **more: Any
+    source: str,
+    frame: str,
+    ns: ArrayLike,
+    xy: ArrayLike,
+    heading: ArrayLike,
+    *,
+    height: ArrayLike | None = None,
+    **more: Any,
 ) -> Poses | None:
     """Return the finite poses in order of time; None if there is none.
 
@@ -193,9 +202,10 @@ def poses_of(
         )
         order = order[~astray]
     headings = frozen(np.asarray(heading, float)[order])
+    heights = None if height is None else frozen(np.asarray(height, float)[order])
     return Poses(
         source, frame, frozen(times[order], np.int64), frozen(positions[order]), headings,
-        **{"oddities": oddities, **more},
+        **{"oddities": oddities, "height": heights, **more},
     )  # fmt: skip
 
 

@@ -181,10 +181,10 @@ class _TopicSorter:
 
     def _of(self, column: PoseColumns) -> Iterator[Poses]:
         for frame in column.frames:
-            stamps, logged, xy, heading = column.of_frame(frame)
+            stamps, logged, xyz, heading = column.of_frame(frame)
             ns = logged if self.reading.stamps == "log" else np.where(stamps == 0, logged, stamps)
             track = poses_of(
-                column.topic, frame, ns, xy, heading,
+                column.topic, frame, ns, xyz[:, :2], heading, height=xyz[:, 2],
                 robot=_namespace(column.topic), rank=_rank(column.topic, column.msgtype, frame),
             )  # fmt: skip
             if track is not None:

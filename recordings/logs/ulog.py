@@ -150,7 +150,10 @@ def _local(log: Any, name: str, local: dict[str, Any], offset_us: int, *, truth:
     xy[~valid] = np.nan
     heading = np.pi / 2 - _yaw(log, local)
     ns = _ns(local, offset_us)
-    return poses_of(name, "local", ns, xy, heading, rank=1, origin=_origin(local), rule="px4", truth=truth)
+    height = -np.asarray(local["z"], float) if "z" in local else None
+    return poses_of(
+        name, "local", ns, xy, heading, rank=1, origin=_origin(local), rule="px4", truth=truth, height=height
+    )
 
 
 def _yaw(log: Any, columns: dict[str, Any]) -> FloatArray:

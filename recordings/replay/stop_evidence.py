@@ -26,6 +26,10 @@ LEAST_GAP_S = 1.0
 """Time without poses from which on the robot was not seen."""
 BROKEN_NS = 3 * 10**9
 """Longest break between two standstills at one stop that jumping poses may have made."""
+LEVEL_M = 2.0
+"""Difference of heights above which a stop is on another level."""
+START_NS = 2 * 10**9
+"""Time from the begin of a log whose height is the start's."""
 NEIGHBOURS = 4
 """Number of visits around a stop whose common offset is its uncertainty."""
 
@@ -53,7 +57,26 @@ def _evidence(replay: Replay, number: int, item: StopComparison, unsure_m: float
         return StopEvidence(item, "unknown", "no pose in the log; the robot's own log may have it")
     if unsure_m > (item.tolerance_m or 0.0):
         return StopEvidence(item, "unknown", DRIFTS)
+    climbed_m = climb_m(replay, number)
+    if abs(climbed_m) > LEVEL_M and not item.outside_text:
+        where = f"{abs(climbed_m):.1f} m {'higher' if climbed_m > 0 else 'lower'} than at the start"
+        return StopEvidence(item, "unknown", f"the robot was {where}; a log of its storey would tell it")
     return StopEvidence(item, "no" if item.outside_text else "yes")
+
+
+def climb_m(replay: Replay, stop: int) -> float:
+    """Return the height of the last standstill at a stop over the begin of the log; 0 where it has none."""
+    source, standstills = replay.placed.source, replay.at(stop)
+    if source.height is None or not standstills or not np.isfinite(source.height).any():
+        return 0.0
+    offset = replay.placed.alignment.time_offset_ns
+    standstill = standstills[-1].standstill
+    there = (source.ns + offset >= standstill.begin_ns) & (source.ns + offset <= standstill.end_ns)
+    start = source.ns <= source.ns[0] + START_NS
+    heights = [source.height[mask & np.isfinite(source.height)] for mask in (start, there)]
+    if not all(len(values) for values in heights):
+        return 0.0
+    return float(np.median(heights[1]) - np.median(heights[0]))
 
 
 DRIFTS = (

@@ -53,6 +53,18 @@ def test_one_stop_that_was_missed_by_a_little_is_told_where_the_others_hold() ->
     assert "s05: position error 80 mm" in drive_verdict(found).text
 
 
+@pytest.mark.parametrize("climb", [3.2, -3.2, 1.0])
+def test_a_robot_that_changed_its_storey_did_not_visit_the_stops_of_the_other(climb: float) -> None:
+    drive = driven(MISSION)
+    track = logged(drive)
+    seconds = (track.ns - BEGIN_NS) / 1e9
+    height = np.clip((seconds - drive.halts[3].end_s) / 5, 0, 1) * climb + 7.0
+    judged = drive_verdict(replay(log_of(track, height=height), MISSION, THERE))
+    assert judged.answer == ("yes" if climb == 1.0 else "unknown")
+    assert ("3.2 m higher than at the start" in judged.text) == (climb == 3.2)
+    assert ("s05" in judged.text, "s04" in judged.text) == (climb != 1.0, False)
+
+
 def test_poses_that_are_missing_during_a_stop_do_not_tell_that_nobody_was_there() -> None:
     drive = driven(MISSION)
     halt = drive.halts[4]
