@@ -24,7 +24,7 @@ REAL = (
     "turtlebot3.bag", "rosbag2-pose/rosbag2_test_0.db3", "rosbag2-split-mcap/wbag_0.mcap", "crawler.tlog",
     "rover-stop-and-go.BIN", "px4.ulg",
 )  # fmt: skip
-PLACES = size(short=8, full=160)
+PLACES = size(short=8, full=56)
 MISSION = wandering(1)
 Damage = Callable[[bytearray, random.Random], None]
 

@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as changed
 
+from stopgo.mission.document import sealed
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.drive_verdict import drive_verdict
@@ -102,3 +104,28 @@ def test_rare_poses_do_not_tell_that_a_standstill_was_too_short() -> None:
     found = replay(log_of(Track.of(track.ns[rare], track.xy[rare], track.heading[rare])), MISSION, THERE)
     assert drive_verdict(found).answer == "unknown"
     assert found.extra == ()
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_poses_every_five_seconds_are_never_a_no(seed: int) -> None:
+    mission = wandering(seed)
+    track = logged(driven(mission))
+    rare = Track.of(track.ns[::50], track.xy[::50], track.heading[::50])
+    judged = drive_verdict(replay(log_of(rare), mission, Placing(align="first")))
+    assert judged.answer != "no"
+    assert "not at a stop" not in judged.text
+
+
+def test_stops_that_were_visited_in_another_order_were_visited() -> None:
+    """The fourth and fifth stop change places."""
+    stops = list(MISSION.stops)
+    before, one, other, behind = ((stop.x, stop.y) for stop in stops[2:6])
+    stops[3:6] = [
+        changed(stops[4], approach=(before, other)),
+        changed(stops[3], approach=(other, one)),
+        changed(stops[5], approach=(one, behind)),
+    ]
+    drive = driven(sealed(changed(MISSION, stops=tuple(stops))))
+    judged = drive_verdict(replay(log_of(logged(drive)), MISSION, THERE))
+    assert judged.answer == "yes"
+    assert "9 of 9 stops" in judged.text
