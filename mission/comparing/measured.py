@@ -11,6 +11,9 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
 from stopgo.mission.stages.coverage_totals import CoverageTotals
 from stopgo.mission.stages.figures import Shares
 
+LEAST_VISIBLE = 0.5
+"""Metres, or units, of an element that must have been visible before it is called absent."""
+
 
 @dataclass(frozen=True, eq=False)
 class Unplanned:
@@ -47,6 +50,39 @@ class Measured:
     histogram: IntArray
     """Points by element and deviation (elements, k)."""
     unplanned: tuple[Unplanned, ...]
+    misplaced_m: tuple[float, ...] | None = None
+    """Of the surveying scanner's clouds, how far each lies off the floor: 0 on it, NaN if it fits nowhere.
+
+    None for a laser in the log: it navigates, and its points decide nothing.
+    """
+
+    @property
+    def decides(self) -> bool:
+        """True for clouds of the surveying scanner."""
+        return self.misplaced_m is not None
+
+    @property
+    def placing_text(self) -> str:
+        """Why the clouds cannot be compared with the floor; empty if all lie on it."""
+        off = [away for away in self.misplaced_m or () if away != 0]
+        if not off:
+            return ""
+        shifted = [away for away in off if np.isfinite(away)]
+        how = f"they fit it if shifted by {max(shifted):.1f} m" if shifted else "no shift fits them to it"
+        count = f"{len(off)} of {len(self.misplaced_m or ())} clouds"
+        return f"{count} do not lie on the floor ({how}); clouds in the drawing's frame would tell it"
+
+    def absent(self, visible: BoolArray) -> tuple[str, ...]:
+        """Return the elements without a point, though much of them was visible: units (n,)."""
+        amount = np.where(visible & self.ledger.visible, self.ledger.weight, 0)
+        size = len(self.ledger.elements)
+        could = np.bincount(self.ledger.element, amount, minlength=size) * self.ledger.scale
+        did = np.bincount(self.ledger.element, amount * self.hit, minlength=size)
+        return tuple(
+            item.id
+            for k, item in enumerate(self.ledger.elements)
+            if could[k] >= LEAST_VISIBLE and did[k] == 0
+        )
 
     @cached_property
     def shares(self) -> Shares:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from stopgo.mission.comparing.acquired import Acquired, Certainty
@@ -35,6 +35,12 @@ class Judgement:
     @property
     def text(self) -> str:
         return " ".join((f"{self.headline}.", *self.sentences))
+
+
+def exit_code_of(judgements: Iterable[Judgement]) -> int:
+    """Return the exit code of several runs together: one `no` decides, then what cannot be told."""
+    codes = {judgement.exit_code for judgement in judgements}
+    return next((code for code in (EXIT_CODES["no"], EXIT_CODES["unknown"]) if code in codes), 0)
 
 
 def judge(comparison: Comparison) -> Judgement:

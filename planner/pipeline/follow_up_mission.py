@@ -129,7 +129,12 @@ def _views(space: NavigableSpace, lines: SightLines, poses: ScanPoses) -> list[I
 
 
 def top_up(
-    planned: PlannedFloor, poses: ScanPoses, *, obstacles: Sequence[Polygon] = (), evidence: str = ""
+    planned: PlannedFloor,
+    poses: ScanPoses,
+    *,
+    obstacles: Sequence[Polygon] = (),
+    evidence: str = "",
+    measured: BoolArray | None = None,
 ) -> Mission | None:
     """Return the smallest follow-up mission that reaches the required coverage; None if nothing is missing.
 
@@ -140,6 +145,8 @@ def top_up(
     ----------
     evidence
         Added to the text that the follow-up mission's id is hashed from, such as a log's digest.
+    measured
+        True for units that need no scan (n,), instead of those visible from the poses.
 
     Raises
     ------
@@ -148,14 +155,9 @@ def top_up(
     InputError
         When the mission is one of several that divide a floor: the others cover the rest.
     """
-    share = planned.mission.share
-    if share is not UNSET:
-        raise InputError(
-            f"{planned.mission.name}: divides its floor with {share.of - 1} more; a follow-up mission needs "
-            "a floor that one mission covers alone"
-        )
+    _must_cover_alone(planned.mission)
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
-    seen, done = _with_poses(known, poses)
+    seen, done = _with_poses(known, poses, measured)
     selection = select_follow_up(seen, done)
     if not len(selection.chosen):
         return None
@@ -163,10 +165,24 @@ def top_up(
     if planned.settings.minimise == "time":
         driven = least_time_route(driven, done=done)
     mission = assemble(driven)
+    return _follow_up(mission, planned.mission, evidence, _coverage_alone(known, mission))
+
+
+def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
+    """Return the coverage of a mission's own stops, for one view of each target."""
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))
-    alone = once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once))
-    return _follow_up(mission, planned.mission, evidence, alone.whole.coverage or 0.0)
+    return (
+        once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage or 0.0
+    )
+
+
+def _must_cover_alone(mission: Mission) -> None:
+    if mission.share is not UNSET:
+        raise InputError(
+            f"{mission.name}: divides its floor with {mission.share.of - 1} more; a follow-up mission needs "
+            "a floor that one mission covers alone"
+        )
 
 
 def _with(floor: FloorPlan, obstacles: Sequence[Polygon]) -> FloorPlan:
@@ -178,10 +194,20 @@ def _with(floor: FloorPlan, obstacles: Sequence[Polygon]) -> FloorPlan:
     return replace(floor, elements=(*floor.elements, *found))
 
 
-def _with_poses(planned: PlannedFloor, poses: ScanPoses) -> tuple[Visibility, IntArray]:
-    """Return the visibility with a row added for each scan pose, and the numbers of these rows."""
+def _with_poses(
+    planned: PlannedFloor, poses: ScanPoses, measured: BoolArray | None
+) -> tuple[Visibility, IntArray]:
+    """Return the visibility with a row added for each scan pose, and the numbers of these rows.
+
+    Where clouds show what was measured, each row has that instead.
+    """
     seen, space = planned.seen, planned.space
-    views = _views(space, SightLines(space), poses)
+    if measured is None:
+        views = _views(space, SightLines(space), poses)
+    else:
+        start = planned.mission.start
+        poses = np.tile((start.x, start.y, start.heading), (int(ledger_of(seen).asked.max()), 1))
+        views = [np.flatnonzero(measured & seen.visible)] * len(poses)
     joined = _joined(seen.candidates, poses)
     units = [*(seen.seen_by(row) for row in range(seen.rows)), *views]
     whole = visibility_of(joined, units, method=seen.method)

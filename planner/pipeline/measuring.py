@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -12,8 +13,9 @@ from scipy.spatial import cKDTree
 from stopgo.mission.comparing.measured import Measured, Unplanned
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, bounds, frozen
 from stopgo.mission.stages import NavigableSpace
-from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
 from stopgo.planner.geometry.shapes import local_origin, to_shape
+from stopgo.planner.pipeline.cloud_registration import misplaced_m
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, hull_of
 
 TOLERANCE_M = 0.05
@@ -21,6 +23,8 @@ TOLERANCE_M = 0.05
 WIDEST_M = 0.3
 """Points farther from a face than this do not belong to it."""
 BINS = 60
+ABOVE = ("beams",)
+"""Kinds of elements above the heights at which clouds are compared."""
 CELL_M = 0.1
 LEAST_SWEEPS = 3
 """An object hit in fewer sweeps at one position may be a person who walks by."""
@@ -34,24 +38,37 @@ def measured(
     *,
     tolerance: float = TOLERANCE_M,
     least_sweeps: int = LEAST_SWEEPS,
+    surveyed: bool = False,
 ) -> Measured:
     """Compare sweeps of points (n, 2) in the mission's frame with the floor, one after another.
 
     A point belongs to the nearest unit; its error is its distance from the face. Points far from every
-    drawn element, in `least_sweeps` sweeps or more, are an unplanned obstacle.
+    drawn element, in `least_sweeps` sweeps or more, are an unplanned obstacle. Clouds of the surveying
+    scanner (`surveyed`) must lie on the floor, and need not hit what is above their heights.
     """
     counts = _SweepCounts(planned.space, tolerance)
+    misplaced = []
     for points in sweeps:
         counts.add(points)
+        away_m = misplaced_m(points, counts.units, tolerance) if surveyed else None
+        misplaced += [] if away_m is None else [away_m]
+    ledger = ledger_of(planned.seen)
     return Measured(
-        ledger=ledger_of(planned.seen),
+        ledger=_at_scan_height(ledger) if surveyed else ledger,
         hit=frozen(counts.hit, np.bool_),
         tolerance_m=tolerance,
         points=counts.points,
         edges_m=frozen(counts.edges),
         histogram=frozen(counts.histogram, np.int64),
         unplanned=tuple(_unplanned(counts, planned.space, least_sweeps)),
+        misplaced_m=tuple(misplaced) if surveyed else None,
     )
+
+
+def _at_scan_height(ledger: CoverageTotals) -> CoverageTotals:
+    """Return the totals without elements that lie above head height."""
+    above = np.array([item.kind in ABOVE for item in ledger.elements], bool)
+    return replace(ledger, visible=frozen(ledger.visible & ~above[ledger.element], np.bool_))
 
 
 class _SweepCounts:
@@ -60,7 +77,7 @@ class _SweepCounts:
     def __init__(self, space: NavigableSpace, tolerance: float) -> None:
         targets = space.targets
         self._targets, self._tolerance = targets, tolerance
-        self._tree = cKDTree(targets.unit_xy)
+        self.units = cKDTree(targets.unit_xy)
         along = targets.b - targets.a
         self._along = along / np.maximum(np.hypot(*along.T), 1e-12)[:, None]
         self.hit: BoolArray = np.zeros(targets.total, bool)
@@ -79,7 +96,7 @@ class _SweepCounts:
         self.points += len(points)
         if not len(points):
             return
-        distance, unit = self._tree.query(
+        distance, unit = self.units.query(
             points, distance_upper_bound=WIDEST_M + self._targets.unit_length.max()
         )
         near = np.isfinite(distance)

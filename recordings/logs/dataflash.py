@@ -54,6 +54,7 @@ GPS_EPOCH_S = 315_964_800
 LEAP_S = 18
 """Seconds by which GPS time is ahead of UTC since 2017."""
 TICK_EVERY = 200_000
+ITEM_COLUMNS = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt")
 EKF_ORIGIN = 0
 """Type of the ORGN rows that contain the filter's origin."""
 RULE = "ardupilot"
@@ -183,9 +184,10 @@ def _describe(
     kind = _kind(name, form, columns.split(","))
     if number == FMT or kind is None or kind.dtype.itemsize != length:
         return
+    if name in WANTED and scan.kinds.setdefault(name, kind) != kind:
+        return
     lengths[number], names[number] = length, name
     if name in WANTED:
-        scan.kinds[name] = kind
         wanted[number] = scan.offsets.setdefault(name, array("q"))
 
 
@@ -233,8 +235,10 @@ class _Tables:
         return np.asarray(rows[column], float) * scale
 
     def has(self, name: str, *columns: str) -> bool:
+        """Return True if there are messages of a kind, with their time and these columns of numbers."""
         rows = self.rows(name)
-        return rows is not None and not {"TimeUS", *columns} - set(rows.dtype.names or ())
+        fields: Any = {} if rows is None else rows.dtype.fields or {}
+        return all(column in fields and fields[column][0].kind in "iuf" for column in ("TimeUS", *columns))
 
     def ns(self, name: str) -> IntArray:
         """Return the time of each message of a kind (n,)."""
@@ -287,7 +291,8 @@ def _filtered(tables: _Tables, name: str) -> Poses | None:
             part = (ns >= since_ns) & (ns < until_ns)
             xy[part] += from_geodetic(origin, Geodetic(lat=later.lat, lon=later.lon), RULE)
     rank = LOCAL if origin is not None else WITHOUT_ORIGIN
-    return poses_of(name, "local", ns, xy, heading, rank=rank, origin=origin, rule=RULE)
+    height = -tables.numbers(name, "PD")[mine] if tables.has(name, "PD") else None
+    return poses_of(name, "local", ns, xy, heading, rank=rank, origin=origin, rule=RULE, height=height)
 
 
 def _origins(tables: _Tables) -> list[tuple[int, SiteOrigin]]:
@@ -335,7 +340,7 @@ def _bearing_at(tables: _Tables, ns: IntArray) -> FloatArray:
 
 def _uploads(tables: _Tables) -> Iterator[LoggedMission]:
     """Yield logged missions, each from its item 0 (home) on."""
-    if not tables.has("CMD", "CTot", "CNum", "CId"):
+    if not tables.has("CMD", "CTot", *ITEM_COLUMNS):
         return
     rows, ns = tables.rows("CMD"), tables.ns("CMD")
     assert rows is not None
@@ -386,9 +391,8 @@ def _remarks(tables: _Tables) -> Iterator[Remark]:
             tables.ns("MODE").tolist(), tables.numbers("MODE", "ModeNum").tolist(), strict=True
         ):
             yield Remark(ns, "mode", ARDUPILOT.modes.name(Mode(int(mode))))
-    if tables.has("MSG", "Message"):
-        rows = tables.rows("MSG")
-        assert rows is not None
+    rows = tables.rows("MSG") if tables.has("MSG") else None
+    if rows is not None and "Message" in (rows.dtype.names or ()) and rows["Message"].dtype.kind == "S":
         for ns, text in zip(tables.ns("MSG").tolist(), rows["Message"].tolist(), strict=True):
             yield Remark(ns, "text", text.decode("utf-8", "replace"))
     for name in ("CAM", "TRIG"):
@@ -400,7 +404,7 @@ def _remarks(tables: _Tables) -> Iterator[Remark]:
 def _executed(tables: _Tables) -> Iterator[Remark]:
     """Yield items when the vehicle began them: MISE rows, before ArduPilot 4.6 single CMD rows."""
     for name in ("MISE", "CMD"):
-        rows = tables.rows(name) if tables.has(name, "CTot", "CNum", "CId") else None
+        rows = tables.rows(name) if tables.has(name, "CTot", *ITEM_COLUMNS) else None
         if rows is None:
             continue
         begun = _listings(rows["CNum"].astype(int).tolist())[1] if name == "CMD" else range(len(rows))

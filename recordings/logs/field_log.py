@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
 from stopgo.mission.frames.transform import SiteOrigin
-from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.run.events import AnyEvent
 from stopgo.recordings.logs.clock_steps import mended_times
@@ -74,6 +74,10 @@ class Poses:
     truth: bool = False
     """True for a simulator's true poses; they are never used as the robot's own estimate."""
     oddities: tuple[str, ...] = ()
+    height: FloatArray | None = None
+    """Heights (n,), metres upwards from any level; None where the source has none."""
+    restarts_ns: tuple[int, ...] = ()
+    """Times of the first data after each restart of the robot, where the log tells it."""
 
     @property
     def seconds(self) -> float:
@@ -167,7 +171,14 @@ class FieldLog:
 
 
 def poses_of(
-    source: str, frame: str, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike, **more: Any
+    source: str,
+    frame: str,
+    ns: ArrayLike,
+    xy: ArrayLike,
+    heading: ArrayLike,
+    *,
+    height: ArrayLike | None = None,
+    **more: Any,
 ) -> Poses | None:
     """Return the finite poses in order of time; None if there is none.
 
@@ -183,10 +194,18 @@ def poses_of(
     order = np.flatnonzero(finite)[np.argsort(times[finite], kind="stable")]
     if not len(order):
         return None
+    astray = _astray(times[order], positions[order])
+    if astray.any():
+        oddities = (
+            *oddities,
+            f"{int(astray.sum())} of {len(order)} poses lie far from both neighbours; left out",
+        )
+        order = order[~astray]
     headings = frozen(np.asarray(heading, float)[order])
+    heights = None if height is None else frozen(np.asarray(height, float)[order])
     return Poses(
         source, frame, frozen(times[order], np.int64), frozen(positions[order]), headings,
-        **{"oddities": oddities, **more},
+        **{"oddities": oddities, "height": heights, **more},
     )  # fmt: skip
 
 
@@ -196,6 +215,17 @@ GAP_S = 1.0
 """Shortest gap that is reported; it must also be ten times as long as usual."""
 JUMP_M, JUMP_M_S = 0.5, 5.0
 """Distance and speed from which on the step between two poses is a jump."""
+
+
+def _astray(ns: IntArray, xy: FloatArray) -> BoolArray:
+    """True for poses (n, 2) to which the robot would have jumped, and back to where it was."""
+    astray = np.zeros(len(ns), bool)
+    if len(ns) > 2:
+        limit = np.maximum(JUMP_M, JUMP_M_S * np.diff(ns) / 1e9)
+        jump = np.hypot(*np.diff(xy, axis=0).T) > limit
+        near = np.hypot(*(xy[2:] - xy[:-2]).T) <= limit[1:] + limit[:-1]
+        astray[1:-1] = jump[1:] & jump[:-1] & near
+    return astray
 
 
 def oddities_of(ns: IntArray, xy: FloatArray, finite: np.ndarray) -> tuple[str, ...]:

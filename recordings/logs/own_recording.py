@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from stopgo.mission.errors import InputError
 from stopgo.recordings.embedded.reading import read_recording
@@ -23,8 +24,7 @@ def read_run_recording(path: Path, reading: Reading) -> FieldLog:
         raise InputError(f"{path}: contains no run; give the recording of a run")
     run = recording.logs[-1]
     track = run.poses
-    poses = (
-        poses_of("robot", SITE, track.ns, track.xy, track.heading, robot=run.robot) if len(track) else None
-    )
+    about: dict[str, Any] = {"robot": run.robot, "restarts_ns": track.restarts_ns}
+    poses = poses_of("robot", SITE, track.ns, track.xy, track.heading, **about) if len(track) else None
     stationary = poses_of_events(run.events)
     return own_log(path, "stopgo recording", run.events, recording.missions, poses, stationary)

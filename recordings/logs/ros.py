@@ -25,6 +25,7 @@ SIMULATED_BELOW_NS = 10**18
 NOT_THE_ROBOT = ("goal", "target", "setpoint", "initialpose", "plan", "desired", "reference")
 """Words in the names of topics that contain goals, not the robot's pose."""
 TICK_EVERY = 20_000
+LATEST_NS = (1 << 63) - 1
 
 
 def read_ros(path: Path, reading: Reading) -> FieldLog:
@@ -109,6 +110,9 @@ class _TopicSorter:
 
     def take(self, topic: Topic, ns: int, raw: bytes) -> None:
         self.counts[topic] += 1
+        if not 0 <= ns <= LATEST_NS:
+            self.faults[f"{topic.name}: a time of logging that is no date"] += 1
+            return
         self.logged = [min(self.logged[0], ns), max(self.logged[1], ns)] if self.logged else [ns, ns]
         handler = self._handler_of(topic)
         if handler is None:
@@ -177,10 +181,10 @@ class _TopicSorter:
 
     def _of(self, column: PoseColumns) -> Iterator[Poses]:
         for frame in column.frames:
-            stamps, logged, xy, heading = column.of_frame(frame)
+            stamps, logged, xyz, heading = column.of_frame(frame)
             ns = logged if self.reading.stamps == "log" else np.where(stamps == 0, logged, stamps)
             track = poses_of(
-                column.topic, frame, ns, xy, heading,
+                column.topic, frame, ns, xyz[:, :2], heading, height=xyz[:, 2],
                 robot=_namespace(column.topic), rank=_rank(column.topic, column.msgtype, frame),
             )  # fmt: skip
             if track is not None:

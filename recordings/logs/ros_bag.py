@@ -131,6 +131,7 @@ def _raising_damage() -> Iterator[None]:
 
 def _damage() -> tuple[type[Exception], ...]:
     """Return the exceptions that reading a damaged file raises, also those of rosbags' own SQLite."""
+    from backports.zstd import ZstdError
     from rosbags.highlevel import AnyReaderError
     from rosbags.rosbag1 import ReaderError as Error1
     from rosbags.rosbag2 import ReaderError as Error2
@@ -138,7 +139,7 @@ def _damage() -> tuple[type[Exception], ...]:
 
     apsw = sys.modules.get("apsw")
     of_database = () if apsw is None else (apsw.Error,)
-    return (AnyReaderError, Error1, Error2, TypesysError, *LOW_LEVEL, *of_database)
+    return (AnyReaderError, Error1, Error2, TypesysError, ZstdError, *LOW_LEVEL, *of_database)
 
 
 LOW_LEVEL = (

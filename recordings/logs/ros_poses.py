@@ -25,6 +25,7 @@ class Stamped(NamedTuple):
     frame: str
     x: float
     y: float
+    z: float
     quaternion: tuple[float, float, float, float]
     """x, y, z, w."""
 
@@ -51,7 +52,7 @@ def _from_cdr(raw: bytes, child: bool) -> Stamped:
         at = _next(at, 4)
         at += 4 + struct.unpack_from(f"{order}I", raw, at)[0]
     values = struct.unpack_from(f"{order}7d", raw, _next(at - 4, 8) + 4)
-    return Stamped(seconds * 10**9 + nanoseconds, frame, values[0], values[1], values[3:])
+    return Stamped(seconds * 10**9 + nanoseconds, frame, values[0], values[1], values[2], values[3:])
 
 
 def _next(at: int, size: int) -> int:
@@ -66,7 +67,7 @@ def _from_ros1(raw: bytes, child: bool) -> Stamped:
     if child:
         at += 4 + struct.unpack_from("<I", raw, at)[0]
     values = struct.unpack_from("<7d", raw, at)
-    return Stamped(seconds * 10**9 + nanoseconds, frame, values[0], values[1], values[3:])
+    return Stamped(seconds * 10**9 + nanoseconds, frame, values[0], values[1], values[2], values[3:])
 
 
 def _from_message(message: Any) -> Stamped:
@@ -77,7 +78,12 @@ def _from_message(message: Any) -> Stamped:
     position, rotation = pose.position, pose.orientation
     stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
     return Stamped(
-        stamp, header.frame_id, position.x, position.y, (rotation.x, rotation.y, rotation.z, rotation.w)
+        stamp,
+        header.frame_id,
+        position.x,
+        position.y,
+        position.z,
+        (rotation.x, rotation.y, rotation.z, rotation.w),
     )
 
 
@@ -105,7 +111,7 @@ class PoseColumns:
         x, y, z, w = pose.quaternion
         self.stamp_ns.append(pose.stamp_ns)
         self.logged_ns.append(logged_ns)
-        self.values.extend((pose.x, pose.y, x, y, z, w))
+        self.values.extend((pose.x, pose.y, pose.z, x, y, z, w))
         number = self.frames.setdefault(pose.frame.lstrip("/"), len(self.frames))
         self.in_frame.append(number)
 
@@ -121,11 +127,11 @@ class PoseColumns:
         return lambda data: _from_message(self.decode(data))
 
     def of_frame(self, frame: str) -> tuple[np.ndarray, np.ndarray, FloatArray, FloatArray]:
-        """Return stamps, log times, positions (n, 2) and headings (n,) in a frame."""
+        """Return stamps, log times, positions (n, 3) and headings (n,) in a frame."""
         in_frame = np.array(self.in_frame, np.int64) == self.frames[frame]
-        values = np.array(self.values).reshape(-1, 6)[in_frame]
+        values = np.array(self.values).reshape(-1, 7)[in_frame]
         stamps, logged = (np.array(times, np.int64)[in_frame] for times in (self.stamp_ns, self.logged_ns))
-        return stamps, logged, values[:, :2], headings_of(values[:, 2:])
+        return stamps, logged, values[:, :3], headings_of(values[:, 3:])
 
 
 def headings_of(quaternions: FloatArray) -> FloatArray:

@@ -63,7 +63,12 @@ class _Loss:
             self.lines.append(line)
 
     def __str__(self) -> str:
-        return "; ".join([self.why, *self.lines])
+        more = len(self.lines) - LOSSES_NAMED
+        rest = [f"and {more} more losses"] if more > 0 else []
+        return "; ".join([self.why, *self.lines[:LOSSES_NAMED], *rest])
+
+
+LOSSES_NAMED = 3
 
 
 class _FoundChunk(NamedTuple):
@@ -345,23 +350,29 @@ def _rows(connection: sqlite3.Connection, statement: str, path: Path, loss: _Los
     try:
         return connection.execute(statement).fetchall()
     except sqlite3.DatabaseError as error:
-        loss.add(f"{path.name}: {error}")
+        reason = " ".join(str(error).split())[:120]
+        loss.add(f"{path.name}: {reason}")
         return []
 
 
 def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> Iterator[Raw]:
-    """Yield rows in order; after an unreadable one, the search continues in growing steps."""
+    """Yield rows in order; after an unreadable one, the search continues in growing steps.
+
+    Damaged pages return rows again, or out of order: each row is used once, so that the search ends.
+    """
     after, step, last = 0, 1, 0
     while step < FARTHEST_ROW:
         try:
             for row in connection.execute(
                 "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? ORDER BY id", (after,)
             ):
+                if not after < row[0] < LAST_ROW:
+                    raise sqlite3.DatabaseError("rows out of order")
                 if step > 1:
                     loss.add(f"{path.name}: rows {last + 1} to {row[0] - 1} cannot be read")
                 after, step, last = row[0], 1, row[0]
-                if None not in row:
-                    yield int(row[1]), int(row[2]), bytes(row[3])
+                if tuple(map(type, row)) == MESSAGE_ROW:
+                    yield row[1:]
         except sqlite3.DatabaseError:
             after, step = after + step, step * 2
         else:
@@ -371,3 +382,5 @@ def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> It
 
 
 FARTHEST_ROW = 1 << 40
+LAST_ROW = 1 << 62
+MESSAGE_ROW = (int, int, int, bytes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
@@ -63,7 +64,7 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
     table = np.array(rows)
     ns = np.rint(table[:, 0] * 1e9).astype(np.int64)
     name = "EuRoC" if euroc else "TUM"
-    track = poses_of(name, "trajectory", ns, table[:, 1:3], headings_of(table[:, 4:]))
+    track = poses_of(name, "trajectory", ns, table[:, 1:3], headings_of(table[:, 4:]), height=table[:, 3])
     return _log(path, f"{name} trajectory", track, len(rows), lost, ns)
 
 
@@ -124,6 +125,7 @@ PLACES = (
     ("lat", "lon"),
     ("latitude", "longitude"),
 )
+HEIGHTS = ("z", "z_m", "pz", "pos_z")
 TURNS: dict[str, Callable[[float], float]] = {
     **dict.fromkeys(("heading", "yaw", "theta", "heading_rad", "yaw_rad"), float),
     **dict.fromkeys(("heading_deg", "yaw_deg", "theta_deg"), lambda degrees: float(np.radians(degrees))),
@@ -141,6 +143,7 @@ class _Columns:
         at = {re.sub(r"[\s\[\]()]+", "_", name.lower()).strip("_"): k for k, name in enumerate(names)}
         self.time = next((name for name in TIMES if name in at), "")
         self.position: tuple[str, ...] = next((pair for pair in PLACES if set(pair) <= at.keys()), ())
+        self.height = next((name for name in HEIGHTS if name in at), "")
         self.turn = next((name for name in TURNS if name in at), "")
         self.quaternion: tuple[str, ...] = next(
             (names for names in QUATERNIONS if set(names) <= at.keys()), ()
@@ -158,13 +161,14 @@ class _Columns:
         return (self.time, *self.position)
 
     def row(self, cells: list[str]) -> tuple[int, Numbers] | None:
-        """Return the time in ns, then x and y, and the heading in radians (NaN without one)."""
+        """Return the time in ns, then x, y, heading in radians and height (NaN without one)."""
         try:
             ns = self._ns(cells[self.at[self.time]])
             if abs(ns) > LATEST_S * 1e9:
                 return None
             x, y = (float(cells[self.at[name]]) for name in self.position)
-            return ns, (x, y, self._heading(cells))
+            height = float(cells[self.at[self.height]]) if self.height else math.nan
+            return ns, (x, y, self._heading(cells), height)
         except (ValueError, IndexError, OverflowError):
             return None
 
@@ -187,7 +191,8 @@ class _Columns:
         table = np.array(rows)
         if self.position[0].startswith("lat"):
             return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]))
-        return poses_of("CSV", "table", ns, table[:, :2], table[:, 2])
+        height = table[:, 3] if self.height else None
+        return poses_of("CSV", "table", ns, table[:, :2], table[:, 2], height=height)
 
 
 def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: np.ndarray) -> FieldLog:

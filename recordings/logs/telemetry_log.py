@@ -241,9 +241,9 @@ class _Vehicle:
 
     kind: str = "generic"
     attitude: list[tuple[int, float]] = field(default_factory=list)
-    local: list[tuple[int, float, float]] = field(default_factory=list)
+    local: list[tuple[int, float, float, float]] = field(default_factory=list)
     earth: list[tuple[int, float, float, float]] = field(default_factory=list)
-    odometry: list[tuple[int, float, float, float]] = field(default_factory=list)
+    odometry: list[tuple[int, float, float, float, float]] = field(default_factory=list)
     origin: SiteOrigin | None = None
     mode: str = ""
     boots: int = 0
@@ -313,7 +313,7 @@ class _VehicleSorter:
         vehicle.boot_ms = message.time_boot_ms
 
     def _local_position_ned(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
-        vehicle.local.append((packet.ns, message.y, message.x))
+        vehicle.local.append((packet.ns, message.y, message.x, -message.z))
 
     def _global_position_int(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         bearing = np.nan if message.hdg == UNKNOWN_BEARING else message.hdg / 100
@@ -322,7 +322,7 @@ class _VehicleSorter:
     def _odometry(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         w, x, y, z = message.q
         yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        vehicle.odometry.append((packet.ns, message.y, message.x, np.pi / 2 - yaw))
+        vehicle.odometry.append((packet.ns, message.y, message.x, np.pi / 2 - yaw, -message.z))
 
     def _gps_global_origin(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         vehicle.origin = SiteOrigin(
@@ -458,15 +458,16 @@ def _name(number: int) -> str:
 def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
     rule = autopilot_named(vehicle.kind).rule
     if vehicle.local:
-        ns, xy = _columns(vehicle.local)
+        ns, table = _columns(vehicle.local)
         heading = np.pi / 2 - _yaw_at(vehicle, ns)
         rank = 1 if vehicle.origin is not None or not vehicle.earth else WITHOUT_ORIGIN
         yield poses_of(
             "LOCAL_POSITION_NED",
             "local",
             ns,
-            xy,
+            table[:, :2],
             heading,
+            height=table[:, 2],
             robot=robot,
             rank=rank,
             origin=vehicle.origin,
@@ -474,7 +475,9 @@ def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
         )
     if vehicle.odometry:
         ns, table = _columns(vehicle.odometry)
-        yield poses_of("ODOMETRY", "odometry", ns, table[:, :2], table[:, 2], robot=robot, rank=3)
+        yield poses_of(
+            "ODOMETRY", "odometry", ns, table[:, :2], table[:, 2], height=table[:, 3], robot=robot, rank=3
+        )
     if vehicle.earth:
         ns, table = _columns(vehicle.earth)
         yield fixes_of("GLOBAL_POSITION_INT", rule, ns, table[:, :2], table[:, 2], robot=robot, rank=2)

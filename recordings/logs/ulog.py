@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ WANTED = [
     "vehicle_status", "vehicle_command", "battery_status", "camera_capture", "camera_trigger",
     "vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth",
 ]  # fmt: skip
+QUATERNION = tuple(f"q[{k}]" for k in range(4))
 LARGE = 200 << 20
 """File size in bytes from which on only wanted messages are read into memory."""
 NAVIGATION = {
@@ -67,7 +70,8 @@ def _opened(path: Path) -> Any:
 
     only = WANTED if path.stat().st_size > LARGE else None
     try:
-        log = ULog(str(path), only, disable_str_exceptions=True)
+        with redirect_stdout(io.StringIO()):  # it prints damage, where a command prints its answer
+            log = ULog(str(path), only, disable_str_exceptions=True)
     except (
         ULogException,
         TypeError,
@@ -80,6 +84,7 @@ def _opened(path: Path) -> Any:
     ) as error:
         reason = " ".join(str(error).split())[:80]
         raise InputError(f"{path}: cannot be read as a PX4 ULog ({reason}); incomplete copy?") from None
+    log.data_list[:] = [data for data in log.data_list if "timestamp" in data.data]
     if not log.data_list:
         raise InputError(f"{path}: no readable message; incomplete copy?")
     return log
@@ -99,21 +104,24 @@ def _dropouts(log: Any) -> tuple[str, ...]:
 
 
 def _invalid(log: Any) -> tuple[str, ...]:
-    local = _columns(log, "vehicle_local_position")
-    if local is None or "xy_valid" not in local or local["xy_valid"].any():
+    local = _columns(log, "vehicle_local_position", "x", "xy_valid")
+    if local is None or local["xy_valid"].any():
         return ()
     return (f"vehicle_local_position: none of its {len(local['x'])} positions is marked valid",)
 
 
-def _columns(log: Any, name: str) -> dict[str, Any] | None:
-    found = [data.data for data in log.data_list if data.name == name and data.multi_id == 0]
-    return found[0] if found and len(found[0]["timestamp"]) else None
+def _columns(log: Any, name: str, *needed: str) -> dict[str, Any] | None:
+    """Return a topic's columns; None if it has no message, or lacks one of the columns."""
+    for data in log.data_list:
+        if data.name == name and data.multi_id == 0 and len(data.data["timestamp"]):
+            return data.data if data.data.keys() >= set(needed) else None
+    return None
 
 
 def _since_1970_us(log: Any) -> int:
     """Return the offset from boot time to 1970, if a GPS receiver gave the date; else 0."""
-    gps = _columns(log, "vehicle_gps_position")
-    if gps is None or "time_utc_usec" not in gps:
+    gps = _columns(log, "vehicle_gps_position", "time_utc_usec")
+    if gps is None:
         return 0
     dated = np.flatnonzero(gps["time_utc_usec"] > 0)
     return int(gps["time_utc_usec"][dated[0]]) - int(gps["timestamp"][dated[0]]) if len(dated) else 0
@@ -125,10 +133,10 @@ def _ns(columns: dict[str, Any], offset_us: int) -> np.ndarray:
 
 def _poses(log: Any, offset_us: int) -> Iterator[Poses | None]:
     for name, truth in (("vehicle_local_position", False), ("vehicle_local_position_groundtruth", True)):
-        local = _columns(log, name)
+        local = _columns(log, name, "x", "y")
         if local is not None:
             yield _local(log, name, local, offset_us, truth=truth)
-    placed = _columns(log, "vehicle_global_position")
+    placed = _columns(log, "vehicle_global_position", "lat", "lon")
     if placed is not None:
         degrees = np.stack([placed["lat"], placed["lon"]], axis=-1)
         ns = _ns(placed, offset_us)
@@ -142,7 +150,10 @@ def _local(log: Any, name: str, local: dict[str, Any], offset_us: int, *, truth:
     xy[~valid] = np.nan
     heading = np.pi / 2 - _yaw(log, local)
     ns = _ns(local, offset_us)
-    return poses_of(name, "local", ns, xy, heading, rank=1, origin=_origin(local), rule="px4", truth=truth)
+    height = -np.asarray(local["z"], float) if "z" in local else None
+    return poses_of(
+        name, "local", ns, xy, heading, rank=1, origin=_origin(local), rule="px4", truth=truth, height=height
+    )
 
 
 def _yaw(log: Any, columns: dict[str, Any]) -> FloatArray:
@@ -150,16 +161,16 @@ def _yaw(log: Any, columns: dict[str, Any]) -> FloatArray:
     for name in ("heading", "yaw"):
         if name in columns:
             return np.asarray(columns[name], float)
-    attitude = _columns(log, "vehicle_attitude")
+    attitude = _columns(log, "vehicle_attitude", *QUATERNION)
     if attitude is None:
         return np.full(len(columns["timestamp"]), np.nan)
-    w, x, y, z = (np.asarray(attitude[f"q[{k}]"], float) for k in range(4))
+    w, x, y, z = (np.asarray(attitude[name], float) for name in QUATERNION)
     yaw = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
     return np.interp(columns["timestamp"], attitude["timestamp"], yaw)
 
 
 def _origin(local: dict[str, Any]) -> SiteOrigin | None:
-    if "ref_lat" not in local or not local["xy_global"].any():
+    if not {"ref_lat", "ref_lon", "xy_global"} <= local.keys() or not local["xy_global"].any():
         return None
     last = int(np.flatnonzero(local["xy_global"])[-1])
     lat, lon = float(local["ref_lat"][last]), float(local["ref_lon"][last])
@@ -168,14 +179,14 @@ def _origin(local: dict[str, Any]) -> SiteOrigin | None:
 
 
 def _remarks(log: Any, offset_us: int) -> Iterator[Remark]:
-    status = _columns(log, "vehicle_status")
-    if status is not None and "nav_state" in status:
+    status = _columns(log, "vehicle_status", "nav_state")
+    if status is not None:
         states = status["nav_state"].astype(int)
         changed = np.flatnonzero(np.concatenate([[True], np.diff(states) != 0]))
         for ns, state in zip(_ns(status, offset_us)[changed].tolist(), states[changed].tolist(), strict=True):
             known = NAVIGATION.get(state)
             yield Remark(ns, "mode", PX4.modes.name(Mode(*known)) if known else f"nav_state {state}")
-    command = _columns(log, "vehicle_command")
+    command = _columns(log, "vehicle_command", "command")
     if command is not None:
         for ns, number in zip(_ns(command, offset_us).tolist(), command["command"].tolist(), strict=True):
             yield Remark(ns, "command", Item(int(number), 0).name)
@@ -188,8 +199,8 @@ def _remarks(log: Any, offset_us: int) -> Iterator[Remark]:
 
 
 def _battery(log: Any, offset_us: int) -> Iterator[tuple[int, float]]:
-    battery = _columns(log, "battery_status")
-    if battery is not None and "remaining" in battery:
+    battery = _columns(log, "battery_status", "remaining")
+    if battery is not None:
         for ns, fraction in zip(_ns(battery, offset_us).tolist(), battery["remaining"].tolist(), strict=True):
             if 0 <= fraction <= 1:
                 yield ns, float(fraction)

@@ -25,6 +25,10 @@ from stopgo.recordings.page.words import shown, tag
 
 MOST_LABELS = 300
 """Number of stops above which only stops that need attention are named."""
+FOOT = 0.035
+"""Height of the strip with scale bar and north arrow, as a fraction of the floor's size."""
+BARS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+"""Lengths of the scale bar."""
 SLACK_M = 0.5
 """Largest distance in metres of a name outside its room's bounds."""
 STANDSTILL_EVENTS = (Held, Paused, LinkLost)
@@ -46,6 +50,8 @@ def plan_picture(
         *_paths(mission, comparison, frame),
         *beneath(frame),
         *_marks(mission, comparison, frame),
+        *_scale_bar(frame),
+        *_north(mission, frame),
     ]
     return tag("svg", *layers, class_="plan", viewBox=frame.view, role="img", aria_label="plan of the floor")
 
@@ -70,7 +76,7 @@ class PictureFrame:
         margin = 0.02 * size
         paper = PaperMap((left - margin, high + margin), (0.0, 0.0))
         return cls(
-            paper, right - left + 2 * margin, high - low + 2 * margin,
+            paper, right - left + 2 * margin, high - low + 2 * margin + FOOT * size,
             min(0.013 * size, 0.35 * _spacing(mission)),
         )  # fmt: skip
 
@@ -101,6 +107,29 @@ class PictureFrame:
 def is_closed(line: FloatArray) -> bool:
     """True if a line (n, 2) ends where it begins."""
     return len(line) > 2 and bool(np.allclose(line[0], line[-1]))
+
+
+def _scale_bar(frame: PictureFrame) -> Iterator[str]:
+    """Yield a bar of a round length, below the floor."""
+    length = max((m for m in BARS_M if m <= frame.width / 3), default=BARS_M[0])
+    size, x, y = 2.5 * frame.least, 0.02 * frame.width, frame.height - 0.01 * frame.width
+    yield stroke(f"M{x:.3f} {y - size / 2:.3f}V{y:.3f}H{x + length:.3f}V{y - size / 2:.3f}", INK, 1.5)
+    yield tag(
+        "text", f"{length:g} m", x=f"{x + length + size / 2:.3f}", y=f"{y:.3f}", font_size=f"{size:.3f}"
+    )
+
+
+def _north(mission: Mission, frame: PictureFrame) -> Iterator[str]:
+    """Yield an arrow to true north, if the mission's georeference gives it."""
+    if mission.georeference is None:
+        return
+    bearing = np.radians(mission.georeference.heading_deg)  # of +y, clockwise from north
+    size = 2.5 * frame.least
+    x, y = frame.width - 2 * size, frame.height - 1.2 * size
+    dx, dy = -np.sin(bearing) * size, -np.cos(bearing) * size
+    head = f"M{x + dx:.3f} {y + dy:.3f}L{x - dy / 3:.3f} {y + dx / 3:.3f}L{x + dy / 3:.3f} {y - dx / 3:.3f}Z"
+    yield tag("path", tag("title", "true north"), d=head, fill=INK)
+    yield tag("text", "N", x=f"{x + size / 2:.3f}", y=f"{y + size / 2:.3f}", font_size=f"{size:.3f}")
 
 
 def _spacing(mission: Mission) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
-from stopgo.mission.comparing.run_verdict import judge
+from stopgo.mission.comparing.run_verdict import exit_code_of, judge
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.stages.sight import Sight
@@ -85,8 +85,7 @@ class Review:
         """2 if a file cannot be read, else the code of the worst run."""
         if self.faults:
             return InputError.exit_code
-        codes = {judge(comparison).exit_code for comparison in self.comparisons}
-        return next((code for code in (1, 3) if code in codes), 0)
+        return exit_code_of(map(judge, self.comparisons))
 
     @property
     def check_code(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
 
 from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
@@ -20,6 +21,8 @@ from stopgo.recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VE
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
 
+FIRST_DATE_NS, LAST_DATE_NS = 10**18, 4 * 10**18
+"""Times from 2001 to 2096: others are no dates."""
 MOST_ELEMENTS = 40
 """Limit of listed elements; those with the least coverage come first."""
 
@@ -124,9 +127,19 @@ def _plan_shares(shares: Sequence[Share], what: str) -> str:
 # ---- a run ----
 
 
+def _when_and_who(comparison: Comparison) -> str:
+    """Return date and robot of a run; a clock that was never set has no date."""
+    began_ns = comparison.log.began_ns or 0
+    when = "date unknown (its clock was not set)"
+    if FIRST_DATE_NS <= began_ns < LAST_DATE_NS:
+        when = f"{datetime.fromtimestamp(began_ns // 10**9, UTC):%Y-%m-%d %H:%M} UTC"
+    return f"{when}, robot {comparison.log.robot or 'without a name'}"
+
+
 def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iterator[str]:
     if not alone:
         yield tag("h2", shown(f"Run {comparison.run_id or 'without a name'}"))
+    yield tag("p", shown(_when_and_who(comparison)))
     judgement = subject.judgement(comparison)
     words = shown(" " + " ".join(judgement.sentences))
     yield tag("div", tag("b", shown(f"{judgement.headline}.")), words, class_="band",

@@ -29,7 +29,7 @@ h1 small { font-weight: normal; color: #5a5e66; font-size: 13px; }
 .tiles { display: flex; flex-wrap: wrap; gap: 8px; margin-bottom: 12px; }
 .tile { border: 1px solid #c9ccd2; border-radius: 6px; padding: 8px 12px; min-width: 130px; }
 .tile b { display: block; font-size: 21px; line-height: 1.2; } .tile small { color: #5a5e66; }
-.states { display: flex; height: 18px; font-size: 10px; overflow: hidden; border-radius: 3px; }
+.states { display: flex; height: 18px; font-size: 11px; overflow: hidden; border-radius: 3px; }
 .states div { overflow: hidden; white-space: nowrap; padding: 1px 3px; border-right: 1px solid #fff; }
 .legend { font-size: 12px; color: #333; margin: 6px 0 10px; }
 .legend svg { vertical-align: -2px; margin: 0 4px 0 12px; }
@@ -50,7 +50,7 @@ ul { margin: 0; padding-left: 20px; } code { font-size: 12px; word-break: break-
   h2 { break-after: avoid; } tr, .tile, .band, figure, svg.plan { break-inside: avoid; }
   thead { display: table-header-group; }
   .run { break-before: page; } .run:first-of-type { break-before: auto; }
-  svg.plan { max-height: 170mm; } .scroll { overflow: visible; } code { font-size: 6.5px; }
+  svg.plan { max-height: 170mm; } .scroll { overflow: visible; } code { font-size: 9.5px; }
   .band { font-size: 13px; padding: 8px 12px; } .tile { min-width: 0; padding: 4px 8px; }
   .tile b { font-size: 14px; } .plots svg { width: 58mm; height: auto; } .plots { gap: 3mm; }
   .columns { gap: 0 8mm; } .bar { width: 90px; } h2 { font-size: 13px; margin: 12px 0 4px; } }

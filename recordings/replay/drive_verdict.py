@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison import DONE, StopComparison
+from stopgo.mission.comparing.measured import Measured
 from stopgo.mission.comparing.run_verdict import Judgement, named
 from stopgo.mission.run.events import Settled
 from stopgo.mission.stages.figures import percent
@@ -29,15 +31,32 @@ def drive_verdict(replay: Replay) -> Judgement:
         answer = "unknown"
     else:
         answer = "yes" if replay.sight is None or replay.sight.enough else "no"
-    return DriveJudgement(answer, tuple(_sentences(replay, evidence, apart)))
+    clouds = _answer_of_clouds(replay.measured)
+    by_clouds = clouds == "no" and answer != "no"
+    if answer != "no" and clouds != "yes":
+        answer = clouds
+    return DriveJudgement(answer, tuple(_sentences(replay, evidence, apart)), by_clouds)
 
 
+def _answer_of_clouds(measured: Measured | None) -> Certainty:
+    """Return no if the scanner's clouds show less than required, unknown if they do not lie on the floor."""
+    if measured is None or not measured.decides:
+        return "yes"
+    if measured.placing_text or not measured.misplaced_m:
+        return "unknown"
+    return "no" if measured.shares.short else "yes"
+
+
+@dataclass(frozen=True)
 class DriveJudgement(Judgement):
-    """Verdict on how a mission was driven; it does not say whether the scans succeeded."""
+    """Verdict on how a mission was driven; only clouds say whether the scans succeeded."""
+
+    by_clouds: bool = False
+    """True if the mission was driven as planned, and the clouds show less than required."""
 
     @property
     def headline(self) -> str:
-        return HEADLINES[self.answer]
+        return "Not measured as planned" if self.by_clouds else HEADLINES[self.answer]
 
 
 def missing(replay: Replay) -> list[StopComparison]:
@@ -66,8 +85,7 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
             far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
             yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
     yield from (f"{line}." for line in apart)
-    if replay.sight is not None:
-        yield from _coverage_sentences(replay.sight)
+    yield from _floor_sentences(replay)
     if replay.extra:
         yield f"{len(replay.extra)} standstills were not at a stop."
     if replay.inferred:
@@ -76,11 +94,35 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
         yield f"The log is damaged; this is the result of the readable part: {replay.log.lost}."
 
 
+def _floor_sentences(replay: Replay) -> Iterator[str]:
+    """Yield what was visible and measured of the floor, if it was given."""
+    if replay.sight is not None:
+        yield from _coverage_sentences(replay.sight)
+    if replay.measured is not None and replay.measured.decides:
+        yield from _cloud_sentences(replay.measured, replay.sight)
+
+
 def _coverage_sentences(sight: AsDriven) -> Iterator[str]:
     whole = sight.shares.whole
     for share in (whole, *(share for share in sight.shares.short if share is not whole)):
         name, least = share.name if share is not whole else "what is visible", percent(share.required)
         yield f"Of {name}, {percent(share.coverage)} was visible; {least} is required."
+
+
+def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str]:
+    if measured.placing_text:
+        yield f"What was measured cannot be told: {measured.placing_text}."
+        return
+    if not measured.misplaced_m:
+        yield "What was measured cannot be told: the clouds have too few points at the heights of walls."
+        return
+    whole = measured.shares.whole
+    for share in (whole, *(share for share in measured.shares.short if share is not whole)):
+        name, least = share.name if share is not whole else "what is visible", percent(share.required)
+        yield f"Of {name}, {percent(share.coverage)} was measured; {least} is required."
+    absent = () if sight is None else measured.absent(sight.driven)
+    if absent:
+        yield f"No point lies on {named(absent)}, although it was visible: not built, or hidden."
 
 
 def _scans_text(replay: Replay) -> str:

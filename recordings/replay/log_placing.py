@@ -130,7 +130,7 @@ def _track(source: Poses) -> tuple[Track, bool]:
     measured = np.isfinite(source.heading)
     turns = bool(measured.mean() > 0.5)
     heading = source.heading if measured.all() else _filled_headings(source, measured if turns else None)
-    return Track.of(source.ns, source.xy, heading), turns
+    return Track.of(source.ns, source.xy, heading, restarts_ns=source.restarts_ns), turns
 
 
 def _filled_headings(source: Poses, measured: np.ndarray | None) -> FloatArray:
@@ -201,8 +201,9 @@ def _by_georeference(log: FieldLog, source: Poses, mission: Mission) -> Alignmen
 
 
 def _moved(track: Track, by: Alignment, offset_ns: int) -> Track:
+    restarts = (ns + offset_ns for ns in track.restarts_ns)
     xy = by.transform.points(track.xy)
-    return Track.of(track.ns + offset_ns, xy, track.heading + by.heading)
+    return Track.of(track.ns + offset_ns, xy, track.heading + by.heading, restarts_ns=restarts)
 
 
 def _truth(log: FieldLog, source: Poses, mission: Mission, offset_ns: int) -> Track | None:

@@ -83,12 +83,15 @@ def smoothed_track(track: Track, matches: tuple[Match, ...]) -> Track:
     ]
     rows += [_row(track, k) for k in (0, -1) if moving[k]]  # a mean lies after the begin of the path
     standing_poses = np.array([row[1:] for row in rows]).reshape(-1, 3)
-    ns, means = _means(track.ns[moving], track.xy[moving], np.unwrap(track.heading)[moving])
+    ns, means = _means(
+        track.ns[moving], track.xy[moving], np.unwrap(track.heading)[moving], track.restarts_ns
+    )
     all_ns = np.concatenate([ns, np.array([row[0] for row in rows], np.int64)])
     return Track.of(
         all_ns,
         np.concatenate([means[:, :2], standing_poses[:, :2]]),
         np.concatenate([means[:, 2], standing_poses[:, 2]]),
+        restarts_ns=track.restarts_ns,
     )
 
 
@@ -97,11 +100,14 @@ def _row(track: Track, index: int) -> tuple[int, float, float, float]:
     return int(track.ns[index]), x, y, float(track.heading[index])
 
 
-def _means(ns: IntArray, xy: FloatArray, heading: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return times and x, y, heading (n, 3) averaged over intervals of SMOOTHED_S."""
+def _means(
+    ns: IntArray, xy: FloatArray, heading: FloatArray, restarts_ns: tuple[int, ...]
+) -> tuple[IntArray, FloatArray]:
+    """Return times and x, y, heading (n, 3) averaged over intervals of SMOOTHED_S, none across a restart."""
     if not len(ns):
         return ns, np.empty((0, 3))
     index = ((ns - ns[0]) / (SMOOTHED_S * 1e9)).astype(np.int64)
+    index += np.searchsorted(np.sort(np.array(restarts_ns, np.int64)), ns, side="right")
     _, first, many = np.unique(index, return_index=True, return_counts=True)
     table = np.column_stack([(ns - ns[0]).astype(float), xy, heading])
     means = np.add.reduceat(table, first, axis=0) / many[:, None]

@@ -178,6 +178,8 @@ def _measured_json(found: Measured) -> dict[str, Any]:
         "tolerance_m": found.tolerance_m,
         "points": found.points,
         "share": found.shares.whole.coverage,
+        "required": found.shares.whole.required if found.decides else None,
+        "misplaced_m": [round(away, 3) if math.isfinite(away) else None for away in found.misplaced_m or ()],
         "elements": [
             {"id": name, "points": count, "mean_m": mean, "rms_m": rms}
             for name, count, mean, rms in found.deviations

@@ -120,7 +120,9 @@ class _Bins:
         occupied = np.flatnonzero(many)
         means = sums[occupied] / many[occupied, None]
         every = np.arange(count)
-        filled = np.stack([np.interp(every, occupied, column) for column in means.T], axis=-1)
+        filled = _without_spikes(
+            np.stack([np.interp(every, occupied, column) for column in means.T], axis=-1)
+        )
         noise = _noise(means)
         blind = _blind(occupied, means[:, :2], step / 1e9, BLIND_M + SIGMAS * float(noise[:2].max()))
         return cls(int(track.ns[0]), step, filled[:, :2], filled[:, 2], noise, blind, turns)
@@ -131,6 +133,14 @@ class _Bins:
     def ns(self, index: int) -> int:
         """Return the begin of a bin."""
         return self.begin_ns + index * self.step_ns
+
+
+def _without_spikes(values: FloatArray) -> FloatArray:
+    """Return each column's (n, k) medians of three: a single wrong pose interrupts no standstill."""
+    medians = values.copy()
+    if len(values) > 2:
+        medians[1:-1] = np.median(np.stack([values[:-2], values[1:-1], values[2:]]), axis=0)
+    return medians
 
 
 def _blind(occupied: IntArray, xy: FloatArray, step_s: float, reach: float) -> BoolArray:

@@ -6,7 +6,7 @@ elsewhere all the time. Gaps, a log that begins late or ends early, and drift le
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -24,6 +24,12 @@ from stopgo.recordings.replay.replayed import Replay
 
 LEAST_GAP_S = 1.0
 """Time without poses from which on the robot was not seen."""
+BROKEN_NS = 3 * 10**9
+"""Longest break between two standstills at one stop that jumping poses may have made."""
+LEVEL_M = 2.0
+"""Difference of heights above which a stop is on another level."""
+START_NS = 2 * 10**9
+"""Time from the begin of a log whose height is the start's."""
 NEIGHBOURS = 4
 """Number of visits around a stop whose common offset is its uncertainty."""
 
@@ -51,7 +57,26 @@ def _evidence(replay: Replay, number: int, item: StopComparison, unsure_m: float
         return StopEvidence(item, "unknown", "no pose in the log; the robot's own log may have it")
     if unsure_m > (item.tolerance_m or 0.0):
         return StopEvidence(item, "unknown", DRIFTS)
+    climbed_m = climb_m(replay, number)
+    if abs(climbed_m) > LEVEL_M and not item.outside_text:
+        where = f"{abs(climbed_m):.1f} m {'higher' if climbed_m > 0 else 'lower'} than at the start"
+        return StopEvidence(item, "unknown", f"the robot was {where}; a log of its storey would tell it")
     return StopEvidence(item, "no" if item.outside_text else "yes")
+
+
+def climb_m(replay: Replay, stop: int) -> float:
+    """Return the height of the last standstill at a stop over the begin of the log; 0 where it has none."""
+    source, standstills = replay.placed.source, replay.at(stop)
+    if source.height is None or not standstills or not np.isfinite(source.height).any():
+        return 0.0
+    offset = replay.placed.alignment.time_offset_ns
+    standstill = standstills[-1].standstill
+    there = (source.ns + offset >= standstill.begin_ns) & (source.ns + offset <= standstill.end_ns)
+    start = source.ns <= source.ns[0] + START_NS
+    heights = [source.height[mask & np.isfinite(source.height)] for mask in (start, there)]
+    if not all(len(values) for values in heights):
+        return 0.0
+    return float(np.median(heights[1]) - np.median(heights[0]))
 
 
 DRIFTS = (
@@ -71,14 +96,39 @@ def _unseen(replay: Replay, number: int, item: StopComparison) -> str:
         return "" if _over(replay) else "the log ends before; a log that goes on would tell it"
     if not before and not at and _begins_late(replay):
         return "the log begins after the start of the mission; an earlier log would tell it"
-    if any(possible_s(track, match) >= least_stay_s(stop) for match in at):
-        return "poses are too rare to tell how long it stood; another source of poses would tell it"
+    longer = _possibly_longer(track, at, least_stay_s(stop))
+    return longer or _unseen_between(replay, item, stop, before, after)
+
+
+def _unseen_between(
+    replay: Replay, item: StopComparison, stop: Stop, before: Sequence[Match], after: Sequence[Match]
+) -> str:
+    """Return why a visit between those before and after could have happened unseen; empty if it did not."""
+    track = replay.run.poses
     begin = max((match.standstill.end_ns for match in before), default=int(track.ns[0]))
     end = min((match.standstill.begin_ns for match in after), default=int(track.ns[-1]))
     longest_s = longest_gap_s(track, begin, max(begin, end))
     if longest_s >= max(LEAST_GAP_S, least_stay_s(stop)):
         return f"{longest_s:.0f} s without poses on the way; another source of poses would tell it"
     return DRIFTS if item.outcome == "skipped" and _may_have_drifted(replay, stop, begin, end) else ""
+
+
+def _possibly_longer(track: Track, at: Sequence[Match], least_s: float) -> str:
+    """Return why a standstill may have been longer than the log shows; empty if it was not."""
+    slack_ns = int(LEAST_GAP_S * 1e9)
+    if any(match.standstill.end_ns + slack_ns >= track.ns[-1] for match in at):
+        return "the log ends while the robot is stationary there; a log that goes on would tell it"
+    if any(match.standstill.begin_ns - slack_ns <= track.ns[0] for match in at):
+        return "the log begins while the robot is stationary there; an earlier log would tell it"
+    begin_ns = None
+    for one, other in pairwise(at):
+        broken = other.standstill.begin_ns - one.standstill.end_ns <= BROKEN_NS
+        begin_ns = (begin_ns or one.standstill.begin_ns) if broken else None
+        if begin_ns is not None and (other.standstill.end_ns - begin_ns) / 1e9 >= least_s:
+            return "its poses jump while it is stationary; another source of poses would tell it"
+    if any(possible_s(track, match) >= least_s for match in at):
+        return "poses are too rare to tell how long it stood; another source of poses would tell it"
+    return ""
 
 
 def possible_s(track: Track, match: Match) -> float:

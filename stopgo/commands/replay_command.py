@@ -316,7 +316,8 @@ def _print_json(items: list[dict[str, Any]], name: str) -> None:
 
 
 def _exit_code(replays: list[Replay]) -> int:
-    """Return the exit code of the worst replay."""
+    """Return the exit code of all replays."""
+    from stopgo.mission.comparing.run_verdict import exit_code_of
     from stopgo.recordings.replay.drive_verdict import drive_verdict
 
-    return max(drive_verdict(item).exit_code for item in replays)
+    return exit_code_of(map(drive_verdict, replays))

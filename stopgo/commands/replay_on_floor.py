@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from stopgo.mission.errors import InputError
+
 if TYPE_CHECKING:
     from stopgo.mission.comparing.measured import Measured
     from stopgo.mission.document import Mission
@@ -29,7 +31,7 @@ def _measured(planned: PlannedFloor, replay: Replay, clouds: Path | None) -> Mea
     from stopgo.recordings.replay.placed_sweeps import placed_sweeps
 
     if clouds is not None:
-        return measured(planned, levels(clouds_in(clouds)), least_sweeps=1)
+        return measured(planned, levels(clouds_in(clouds)), least_sweeps=1, surveyed=True)
     found = measured(planned, placed_sweeps(replay))
     return found if found.points else None
 
@@ -48,7 +50,12 @@ def follow_up_of(replays: list[Replay], planned: PlannedFloor) -> Mission | None
         if replay.measured is not None
         for item in replay.measured.unplanned
     ]
-    return top_up(planned, scanned_from, obstacles=obstacles, evidence=evidence)
+    clouds = [item.measured for item in replays if item.measured is not None and item.measured.decides]
+    for found in clouds:
+        if found.placing_text:
+            raise InputError(f"--clouds: {found.placing_text}; no follow-up mission can be planned")
+    done = np.any([found.hit | ~found.ledger.visible for found in clouds], axis=0) if clouds else None
+    return top_up(planned, scanned_from, obstacles=obstacles, evidence=evidence, measured=done)
 
 
 def write_follow_up(mission: Mission | None, path: Path) -> None:
@@ -56,7 +63,7 @@ def write_follow_up(mission: Mission | None, path: Path) -> None:
     from stopgo.mission.files.mission_json import write
 
     if mission is None:
-        typer.echo(f"{path}: not written: all required targets were visible", err=True)
+        typer.echo(f"{path}: not written: all required targets were visible, or measured", err=True)
         return
     write(mission, path)
     typer.echo(f"{path}: {len(mission.stops)} follow-up stops", err=True)

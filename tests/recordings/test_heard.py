@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.station.watch import hand_over
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Mission
-from stopgo.mission.run.events import StateReport
+from stopgo.mission.run.events import Aborted, Event, Finished, StateReport
 from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.drawing import entities
 from stopgo.recordings.embedded.reading import read_recording
@@ -38,6 +39,21 @@ def test_what_was_heard_decides_how_watching_ends(
     heard, state = heard_run(mission, sight, skips=skips)
     assert print_comparison(heard, state, as_json=False) == code
     assert ("Not acquired. 57.1 %" in capsys.readouterr().out) == bool(skips)
+
+
+def test_an_aborted_run_is_judged_by_its_scans(capsys: pytest.CaptureFixture[str]) -> None:
+    mission, sight = planned()
+    heard = RunCollector(None, (sight,))
+    heard.mission(mission)
+    for report in run.reports(mission):
+        if isinstance(report, Finished):
+            common = {name: getattr(report, name) for name in Event.__struct_fields__}
+            hand_over(heard, Aborted(**common, reason="abort by ann"))
+        else:
+            hand_over(heard, report)
+    _, state = heard_run(mission, sight)
+    assert print_comparison(heard, replace(state, state="ABORTED"), as_json=False) == 0
+    assert "The run was aborted: abort by ann." in capsys.readouterr().out
 
 
 def test_a_plan_of_another_mission_is_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,15 +15,18 @@ from stopgo.command_line import main
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.document import Mission, sealed
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import Finished, Paused, Resumed, Skipped
 from stopgo.mission.run.run_log import Alignment
 from stopgo.recordings.embedded.floor_lines import FloorLines
 from stopgo.recordings.page import ReportSubject, report_html
+from stopgo.recordings.page.floor_picture import plan_picture
 from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.page.words import number, shown
 from tests.mission.comparing.test_compare import START, planned, run, visit
 from tests.mission.comparing.told import told
+from tests.recordings.run import BEGAN_NS
 
 NASTY = '<script>alert(1)</script> "&\x1b[31m\x00'
 
@@ -83,6 +86,35 @@ def test_a_gap_in_the_poses_is_dashed_and_told() -> None:
     )
     assert gap.get("d") is not None
     assert driven.get("d") is not None
+
+
+def test_a_run_has_its_date_and_its_robot() -> None:
+    subject = skipping()
+    (comparison,) = subject.comparisons
+    dated = tuple(
+        msgspec.structs.replace(event, robot_ns=BEGAN_NS + event.robot_ns % 10**15)
+        for event in comparison.log.events
+    )
+    log = replace(comparison.log, events=dated, robot="r1")
+    page = words(report_html(replace(subject, comparisons=(replace(comparison, log=log),))))
+    assert re.search(r"2026-11-\d\d \d\d:\d\d UTC, robot r1", page)
+    old = replace(log, events=tuple(msgspec.structs.replace(event, robot_ns=5) for event in dated))
+    page = words(report_html(replace(subject, comparisons=(replace(comparison, log=old),))))
+    assert "date unknown" in page
+
+
+def test_the_plan_has_a_scale_bar_and_true_north() -> None:
+    """The site's +y axis points east: north is to the left."""
+    subject = skipping()
+    (comparison,) = subject.comparisons
+    site = SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=90.0)
+    mission = msgspec.structs.replace(comparison.mission, georeference=site)
+    drawn = plan_picture(subject, replace(comparison, missions=(mission,)))
+    assert re.search(r">\d+ m</text>", drawn)
+    tip, left, right = re.findall(r"[ML]([\d.]+) ([\d.]+)", drawn[: drawn.index("<title>true north")])[-3:]
+    assert float(tip[0]) < float(left[0]) == float(right[0])
+    assert float(left[1]) != float(right[1])
+    assert "true north" not in plan_picture(subject, comparison)
 
 
 def test_a_bar_marks_the_required_coverage() -> None:

@@ -15,9 +15,11 @@ import shapely
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import read
-from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, planned_floor, top_up
+from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, as_driven, planned_floor, top_up
 from stopgo.planner.pipeline.measuring import measured
 from stopgo.recordings.logs.field_log import FieldLog, Sweep
+from stopgo.recordings.replay.drive_verdict import DriveJudgement, drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.placed_sweeps import placed_sweeps
 from stopgo.recordings.replay.replayed import Replay
@@ -148,3 +150,56 @@ def test_points_of_nowhere_show_nothing(planned: PlannedFloor, points: np.ndarra
     found = measured(planned, [points])
     assert not found.hit.any()
     assert found.unplanned == ()
+
+
+def wall_points(planned: PlannedFloor, *, without: str = "") -> np.ndarray:
+    """A point on every unit, of all elements or all but one."""
+    targets = planned.space.targets
+    names = np.array([item.id for item in planned.space.floor.elements])
+    return targets.unit_xy[names[targets.element[targets.unit_segment]] != without]
+
+
+def judged(planned: PlannedFloor, *clouds: np.ndarray) -> DriveJudgement:
+    """The verdict on the drive of the whole mission, with clouds."""
+    found = measured(planned, clouds, least_sweeps=1, surveyed=True)
+    driven_well = scanned(planned)
+    sight = as_driven(planned, driven_well.scanned_from)
+    return drive_verdict(driven_well.with_sight(sight).with_measured(found))
+
+
+def test_clouds_that_show_everything_leave_the_verdict(planned: PlannedFloor) -> None:
+    found = judged(planned, wall_points(planned))
+    assert (found.answer, found.headline) == ("yes", "Driven as planned")
+    assert "Of what is visible, 100.0 % was measured" in found.text
+
+
+def test_missing_clouds_are_a_no(planned: PlannedFloor) -> None:
+    points = wall_points(planned)
+    found = judged(planned, points[points[:, 0] < points[:, 0].mean()])
+    assert (found.answer, found.headline) == ("no", "Not measured as planned")
+
+
+@pytest.mark.parametrize("move", [(0.2, 0.0), (0.2, -0.2), (100.0, 0.0)])
+def test_clouds_that_do_not_lie_on_the_floor_tell_nothing(
+    planned: PlannedFloor, move: tuple[float, float]
+) -> None:
+    points = wall_points(planned)
+    found = judged(planned, points, points + move)
+    assert (found.answer, found.exit_code) == ("unknown", 3)
+    assert "1 of 2 clouds do not lie on the floor" in found.text
+
+
+def test_a_wall_that_was_never_built_is_named(planned: PlannedFloor) -> None:
+    lengths = {item.name: item.seen for item in ledger_of(planned.seen).by_element(planned.seen.visible)}
+    least = min((name for name in lengths if lengths[name] >= 0.5), key=lambda name: lengths[name])
+    assert f"No point lies on {least}," in judged(planned, wall_points(planned, without=least)).text
+
+
+def test_a_follow_up_mission_scans_what_the_clouds_lack(planned: PlannedFloor) -> None:
+    shown = np.zeros(planned.space.targets.total, bool)
+    everything = scanned(planned).scanned_from
+    assert top_up(planned, everything) is None
+    further = top_up(planned, everything, measured=shown)
+    assert further is not None
+    assert len(further.stops) >= len(planned.mission.stops) - 1
+    assert top_up(planned, everything, measured=~shown) is None

@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as changed
 
+from stopgo.mission.document import sealed
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.drive_verdict import drive_verdict
@@ -53,6 +55,18 @@ def test_one_stop_that_was_missed_by_a_little_is_told_where_the_others_hold() ->
     assert "s05: position error 80 mm" in drive_verdict(found).text
 
 
+@pytest.mark.parametrize("climb", [3.2, -3.2, 1.0])
+def test_a_robot_that_changed_its_storey_did_not_visit_the_stops_of_the_other(climb: float) -> None:
+    drive = driven(MISSION)
+    track = logged(drive)
+    seconds = (track.ns - BEGIN_NS) / 1e9
+    height = np.clip((seconds - drive.halts[3].end_s) / 5, 0, 1) * climb + 7.0
+    judged = drive_verdict(replay(log_of(track, height=height), MISSION, THERE))
+    assert judged.answer == ("yes" if climb == 1.0 else "unknown")
+    assert ("3.2 m higher than at the start" in judged.text) == (climb == 3.2)
+    assert ("s05" in judged.text, "s04" in judged.text) == (climb != 1.0, False)
+
+
 def test_poses_that_are_missing_during_a_stop_do_not_tell_that_nobody_was_there() -> None:
     drive = driven(MISSION)
     halt = drive.halts[4]
@@ -90,3 +104,28 @@ def test_rare_poses_do_not_tell_that_a_standstill_was_too_short() -> None:
     found = replay(log_of(Track.of(track.ns[rare], track.xy[rare], track.heading[rare])), MISSION, THERE)
     assert drive_verdict(found).answer == "unknown"
     assert found.extra == ()
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_poses_every_five_seconds_are_never_a_no(seed: int) -> None:
+    mission = wandering(seed)
+    track = logged(driven(mission))
+    rare = Track.of(track.ns[::50], track.xy[::50], track.heading[::50])
+    judged = drive_verdict(replay(log_of(rare), mission, Placing(align="first")))
+    assert judged.answer != "no"
+    assert "not at a stop" not in judged.text
+
+
+def test_stops_that_were_visited_in_another_order_were_visited() -> None:
+    """The fourth and fifth stop change places."""
+    stops = list(MISSION.stops)
+    before, one, other, behind = ((stop.x, stop.y) for stop in stops[2:6])
+    stops[3:6] = [
+        changed(stops[4], approach=(before, other)),
+        changed(stops[3], approach=(other, one)),
+        changed(stops[5], approach=(one, behind)),
+    ]
+    drive = driven(sealed(changed(MISSION, stops=tuple(stops))))
+    judged = drive_verdict(replay(log_of(logged(drive)), MISSION, THERE))
+    assert judged.answer == "yes"
+    assert "9 of 9 stops" in judged.text

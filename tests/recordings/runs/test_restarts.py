@@ -15,6 +15,7 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.command_line import main
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Mission
+from stopgo.mission.files.mission_json import write
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.world import Field
@@ -120,3 +121,8 @@ def test_a_killed_robot_drove_what_it_drove(
     assert watched.log.poses.length_m == pytest.approx(truth_m, abs=0.05)
     assert watched.cross_track.greatest_m == pytest.approx(reviewed["greatest_beside_route_m"], abs=2e-3)
     assert any("clock went back" in note for note in watched.log.source.notes)
+    write(mission, tmp_path / "mission.json")
+    assert main(["replay", "--json", str(path), "--mission", str(tmp_path / "mission.json")]) == 0
+    replayed = json.loads(capsys.readouterr().out)
+    assert replayed["way"]["driven_m"] == pytest.approx(truth_m, rel=0.01)
+    assert [gap["restarted"] for gap in replayed["run"]["gaps"]] == [True]

@@ -1,0 +1,44 @@
+"""Registration of clouds to the floor: the shift by which a cloud would lie on it."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stopgo.mission.geometry import FloatArray
+
+SAMPLE = 2_000
+"""Number of points that are examined of each cloud."""
+LEAST_POINTS = 50
+"""Fewer points of a cloud tell nothing."""
+FARTHEST_M, STEP_M = 0.5, 0.1
+"""Range and step of the shifts that are tried, in x and y."""
+BETTER = 1.2
+"""A shift counts if it puts this many times as many points on drawn elements."""
+LEAST_ON_FLOOR = 0.3
+"""Fraction of a cloud's points on drawn elements, below which it is not registered to the floor."""
+
+
+def misplaced_m(points: FloatArray, units: cKDTree, tolerance_m: float) -> float | None:
+    """Return how far a cloud (n, 2) lies off the floor, metres: 0 if it lies on it, NaN if no shift helps.
+
+    None means that it has too few points.
+    """
+    if len(points) < LEAST_POINTS:
+        return None
+    sample = points[:: max(1, len(points) // SAMPLE)]
+    steps = np.arange(-FARTHEST_M, FARTHEST_M + STEP_M / 2, STEP_M)
+    shifts = np.array([(0.0, 0.0), *product(steps, steps)])
+    near = [_on_floor(sample + shift, units, tolerance_m) for shift in shifts]
+    best = int(np.argmax(near))
+    if near[best] > BETTER * near[0] and near[best] >= LEAST_ON_FLOOR:
+        return float(np.hypot(*shifts[best]))
+    return 0.0 if near[0] >= LEAST_ON_FLOOR else float("nan")
+
+
+def _on_floor(points: FloatArray, units: cKDTree, tolerance_m: float) -> float:
+    """Return the fraction of points that lie on a unit."""
+    distance, _ = units.query(points, distance_upper_bound=tolerance_m)
+    return float(np.isfinite(distance).mean())

@@ -1,0 +1,149 @@
+"""Logs damaged at many places: every format is read or refused in one line, and no verdict turns for it."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.recordings.logs import listing, read_log
+from stopgo.recordings.replay.drive_verdict import drive_verdict
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replaying import replay
+from tests.faults.sizes import size
+from tests.recordings.logs.writing import ODOMETRY, Messages, write_bag
+from tests.recordings.replay.driving import Odd, driven, logged, wandering
+
+LOGS = Path(__file__).parents[3] / "shared" / "data" / "logs"
+REAL = (
+    "turtlebot3.bag", "rosbag2-pose/rosbag2_test_0.db3", "rosbag2-split-mcap/wbag_0.mcap", "crawler.tlog",
+    "rover-stop-and-go.BIN", "px4.ulg",
+)  # fmt: skip
+PLACES = size(short=8, full=56)
+MISSION = wandering(1)
+Damage = Callable[[bytearray, random.Random], None]
+
+
+def flip(data: bytearray, chance: random.Random) -> None:
+    data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+
+
+def flip_many(data: bytearray, chance: random.Random) -> None:
+    for _ in range(50):
+        flip(data, chance)
+
+
+def flip_in_head(data: bytearray, chance: random.Random) -> None:
+    data[chance.randrange(min(len(data), 4000))] ^= 1 << chance.randrange(8)
+
+
+def flip_in_tail(data: bytearray, chance: random.Random) -> None:
+    data[-1 - chance.randrange(min(len(data), 4000))] ^= 1 << chance.randrange(8)
+
+
+def truncate(data: bytearray, chance: random.Random) -> None:
+    del data[chance.randrange(1, len(data)) :]
+
+
+def cut_out(data: bytearray, chance: random.Random) -> None:
+    at = chance.randrange(len(data))
+    del data[at : at + chance.randrange(1, 5000)]
+
+
+def overwrite(data: bytearray, chance: random.Random) -> None:
+    at = chance.randrange(len(data))
+    count = min(len(data) - at, chance.randrange(1, 5000))
+    data[at : at + count] = chance.randbytes(count)
+
+
+def clear(data: bytearray, chance: random.Random) -> None:
+    at = chance.randrange(len(data))
+    count = min(len(data) - at, chance.randrange(1, 5000))
+    data[at : at + count] = bytes(count)
+
+
+DAMAGES: tuple[Damage, ...] = (
+    flip, flip_many, flip_in_head, flip_in_tail, truncate, cut_out, overwrite, clear
+)  # fmt: skip
+
+
+def damaged(path: Path, target: Path, number: int) -> Path:
+    data, chance = bytearray(path.read_bytes()), random.Random(f"{path.name} {number}")
+    DAMAGES[number % len(DAMAGES)](data, chance)
+    target.write_bytes(data)
+    return target
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.skipif(not LOGS.is_dir(), reason="../shared/data/logs is not here")
+@pytest.mark.parametrize("name", REAL)
+def test_a_damaged_log_is_read_or_refused_in_one_line(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / Path(name).name
+    found: Counter[str] = Counter()
+    for number in range(PLACES):
+        damaged(LOGS / name, path, number)
+        try:
+            log = read_log(path)
+            listing.as_text(log)
+            listing.as_json(log)
+            sum(len(sweep.xyz) for sweep in log.sweeps())
+            found["read"] += 1
+        except InputError as error:
+            assert str(path) in str(error)
+            assert "\n" not in str(error)
+            assert len(str(error)) < 600
+            found["refused"] += 1
+    assert found["read"] > found["refused"]
+    assert capsys.readouterr().out == ""
+
+
+def text_of(rows: np.ndarray, head: str, line: str) -> str:
+    return head + "".join(line.format(*row) for row in rows)
+
+
+def written(folder: Path, suffix: str, odd: Odd) -> Path:
+    """A log of a drive in one format, of which every byte is known."""
+    track = logged(driven(MISSION, odd))
+    rows = np.column_stack([track.ns / 1e9, track.xy, track.heading])
+    if suffix == ".csv":
+        path = folder / "whole.csv"
+        path.write_text(text_of(rows, "time,x,y,heading\n", "{:.3f},{:.4f},{:.4f},{:.5f}\n"))
+        return path
+    if suffix == ".tum":
+        path = folder / "whole.tum"
+        turns = np.column_stack([rows[:, :3], np.sin(rows[:, 3] / 2), np.cos(rows[:, 3] / 2)])
+        path.write_text(text_of(turns, "", "{:.3f} {:.4f} {:.4f} 0 0 0 {:.6f} {:.6f}\n"))
+        return path
+    messages = Messages(suffix != ".bag")
+    poses = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)
+    told = [("/odom", ODOMETRY, ns, messages.odometry(ns, (x, y, turn))) for ns, (x, y), turn in poses]
+    path = write_bag(folder / f"whole{suffix}", told)
+    return path if path.is_file() else next(path.glob(f"*{suffix}"))
+
+
+def answer(path: Path) -> str:
+    """Verdict on the drive; `refused` if there is none."""
+    try:
+        return drive_verdict(replay(read_log(path), MISSION, Placing(align="first"))).answer
+    except (InputError, NegativeResult) as error:
+        assert "\n" not in str(error)
+        return "refused"
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("suffix", [".csv", ".tum", ".mcap", ".db3", ".bag"])
+@pytest.mark.parametrize("odd, whole, never", [(Odd(), "yes", "no"), (Odd(frozenset({4})), "no", "yes")])
+def test_damage_turns_no_verdict(tmp_path: Path, suffix: str, odd: Odd, whole: str, never: str) -> None:
+    path = written(tmp_path, suffix, odd)
+    assert answer(path) == whole
+    found = [
+        (number, answer(damaged(path, tmp_path / f"damaged{suffix}", number))) for number in range(PLACES)
+    ]
+    assert [number for number, told in found if told == never] == []
