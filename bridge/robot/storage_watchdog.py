@@ -38,7 +38,7 @@ class StorageWatchdog:
             self._standing = ExitStack()
             self._standing.enter_context(self._control.standing())
             late_s = f"{ANSWERS_WITHIN_S:g} s"
-            self._say(f"the journal has not answered for {late_s}: the robot stands until it does")
+            self._say(f"the journal has not answered for {late_s}: the robot is stationary until it does")
         elif not late and self._standing is not None:
             standing, self._standing = self._standing, None
             self._say("the journal answers again: the robot continues")

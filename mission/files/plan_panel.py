@@ -72,7 +72,7 @@ def facts_of(
         ),
         ("Stops", _stops(mission, selection)),
         ("Coverage", _coverage(mission, selection)),
-        ("Clearances", f"d_sec {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
+        ("Clearances", f"stop {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
         ("Route", _way(route, shared) + f", {robot.speed:g} m/s"),
         ("Planned time", _times([schedule(item).total_s for item in shared or (mission,)])),
         *_least_time(route, shared),
@@ -109,7 +109,7 @@ def _stops(mission: Mission, selection: Selection) -> str:
 
 
 def _coverage(mission: Mission, selection: Selection) -> str:
-    seen = f"{100 * selection.coverage:.1f} % of what is in sight"
+    seen = f"{100 * selection.coverage:.1f} % of what is visible"
     return f"{seen}, {_required(selection.required)}" if mission.share is UNSET else f"{seen}, by these alone"
 
 
@@ -137,7 +137,7 @@ def _least_time(route: Route, shared: Sequence[Mission]) -> list[tuple[str, str]
 
 
 def _required(share: float) -> str:
-    return f"asked {100 * share:g} %"
+    return f"required {100 * share:g} %"
 
 
 def legend_height(entries: list[tuple[str, str]]) -> float:
@@ -150,9 +150,9 @@ def legend_entries(route: Route, mission: Mission, shared: Sequence[Mission] = (
     openings = {state.passable for state in space.openings}
     any_view = not limits_in_words(mission.limits)
     some: list[tuple[str, str, bool]] = [
-        ("seen", "seen by the stops", True),
-        ("unseen", "in sight, not seen" if any_view else "can be seen so, is not", True),
-        ("hidden", "out of sight" if any_view else "cannot be seen so", True),
+        ("seen", "covered by the stops", True),
+        ("unseen", "visible, not covered" if any_view else "within limits, not covered", True),
+        ("hidden", "not visible" if any_view else "not within limits", True),
         ("passable", "opening, passable", True in openings),
         ("blocked", "opening, not passable", False in openings),
         ("stop", "stop, and its heading", bool(mission.stops)),
@@ -161,7 +161,7 @@ def legend_entries(route: Route, mission: Mission, shared: Sequence[Mission] = (
         *((f"way {k}", f"{letter(k)}: {share_in_words(item)}", True) for k, item in enumerate(shared)),
         ("way", "route", bool(mission.stops) and not shared),
         ("back", _back_words(route), mission.return_ is not None and not shared),
-        ("thin", "its way back", any(item.return_ is not None for item in shared)),
+        ("thin", "its path back", any(item.return_ is not None for item in shared)),
         *_network_entries(mission),
     ]
     kinds = [(kind, kind) for kind in floor_look.kinds_of(space.floor)]
@@ -174,7 +174,7 @@ def _network_entries(mission: Mission) -> list[tuple[str, str, bool]]:
         return []
     return [
         ("pair", "scans that register", len(network.overlaps) > len(network.bridges)),
-        ("bridge", "without it they fall apart", bool(network.bridges)),
+        ("bridge", "their only connection", bool(network.bridges)),
     ]
 
 

@@ -213,7 +213,7 @@ _COLOURS = (
     "- route yellow, return path dark yellow; run purple",
     "- grey: stops and legs that a revision has withdrawn during a run",
     "- openings: white passable, orange-red not",
-    "- candidates: yellow kept, reddish dropped; point at one for the reason",
+    "- candidates: yellow usable, reddish dropped; point at one for the reason",
     "- walls grey, columns orange, beams purple, stairs teal, windows and railings blue, holes rose",
 )
 

@@ -54,9 +54,7 @@ def _evidence(replay: Replay, number: int, item: StopComparison, unsure_m: float
     return StopEvidence(item, "no" if item.outside_text else "yes")
 
 
-DRIFTS = (
-    "the poses drift by more than the tolerance; poses matched to a map, or a scan at the stop, would tell it"
-)
+DRIFTS = "the poses drift by more than the tolerance; give poses matched to a map, or a scan at the stop"
 
 
 def _unseen(replay: Replay, number: int, item: StopComparison) -> str:
@@ -68,16 +66,16 @@ def _unseen(replay: Replay, number: int, item: StopComparison) -> str:
     after = [match for match in replay.matches if match.stop is not None and match.stop > number]
     at = [match for match in replay.matches if match.stop == number]
     if not after and not at:
-        return "" if _over(replay) else "the log ends before; a log that goes on would tell it"
+        return "" if _over(replay) else "the log ends before; give a log that continues"
     if not before and not at and _begins_late(replay):
-        return "the log begins after the start of the mission; an earlier log would tell it"
+        return "the log begins after the start of the mission; give an earlier log"
     if any(possible_s(track, match) >= least_stay_s(stop) for match in at):
-        return "poses are too rare to tell how long it stood; another source of poses would tell it"
+        return "poses are too rare to measure the standstill; give another source of poses"
     begin = max((match.standstill.end_ns for match in before), default=int(track.ns[0]))
     end = min((match.standstill.begin_ns for match in after), default=int(track.ns[-1]))
     longest_s = longest_gap_s(track, begin, max(begin, end))
     if longest_s >= max(LEAST_GAP_S, least_stay_s(stop)):
-        return f"{longest_s:.0f} s without poses on the way; another source of poses would tell it"
+        return f"{longest_s:.0f} s without poses on the path; give another source of poses"
     return DRIFTS if item.outcome == "skipped" and _may_have_drifted(replay, stop, begin, end) else ""
 
 

@@ -113,7 +113,7 @@ def _unfiltered(lines: GreyBytes, step: int) -> GreyBytes:
     for row in range(rows):
         kind, line = int(lines[row, 0]), lines[row, 1:]
         if kind > 4:
-            raise ValueError(f"row {row} is filtered in a way PNG does not know")
+            raise ValueError(f"row {row} has a filter that PNG does not define")
         _unfilter(kind, line, above=out[row], into=out[row + 1], step=step)
     return out[1:, step:]
 
