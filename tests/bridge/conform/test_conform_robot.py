@@ -295,7 +295,7 @@ class WantsPiecesInOrder(Inbox):
         ("controller", GoesOnByItself, "nothing moves by itself after a restart: PAUSED", "it is RUNNING"),
         ("agent", ReadsStrictly, "fields that are not known are passed over", "to be passed over"),
         ("agent", ReadsNothing, "messages that are cut off are Malformed", "answered with Info"),
-        ("agent", LosesEvents, "a run goes stop by stop to FINISHED", "tells ['Arrived', 'Scanned']"),
+        ("agent", LosesEvents, "a run goes stop by stop to FINISHED", "reports ['Arrived', 'Scanned']"),
         ("agent", TellsAllStops, "110 stops are reported in a small state, without gaps", "a state "),
         ("agent", SaysNothingOfItself, "the state is published at least every second", "0 states came"),
         ("inbox", TakesDamage, "a damaged chunk is found at the commit: `digest`", "Rejected malformed"),

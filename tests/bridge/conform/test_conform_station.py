@@ -161,7 +161,7 @@ def _parameters(details: dict[str, Any]) -> dict[str, str]:
         (NeverLooksBack, "done only when the state reports so", "reports another mission"),
         (NewNonceEachTime, "a commit is repeated under its nonce", "under 2 nonces"),
         (ReadsInfoStrictly, "fields that are not known are passed over", "cannot be started"),
-        (LeavesGaps, "poses that were missed are requested", "are not asked for"),
+        (LeavesGaps, "poses that were missed are requested", "are not requested"),
         (CountsInWords, "every chunk, then the commit, then a look", "a chunk's number: 'first'"),
         (SeesOneOfTwo, "two boots: no command, both paused", "though two robots"),
     ],
@@ -252,4 +252,4 @@ def test_a_station_that_does_nothing_passes_nothing() -> None:
 
     found = verdicts(Idle())
     assert {one.outcome for one in found.values()} == {"not tried"}
-    assert "the station was to start and asked nothing (exit code 1)" in str(found.values())
+    assert "the station was to start and sent no query (exit code 1)" in str(found.values())
