@@ -150,7 +150,7 @@ def an_abort_ends_a_run(bench: RobotBench) -> None:
     bench.wait_for_state("ABORTED")
 
 
-def a_stop_counts_whatever_it_names(bench: RobotBench) -> None:
+def a_stop_counts_always(bench: RobotBench) -> None:
     _started(bench)
     stops: tuple[tuple[Verb, str], ...] = (("pause", "PAUSED"), ("abort", "ABORTED"))
     for verb, state in stops:
@@ -318,7 +318,7 @@ RUNS: tuple[Requirement[RobotBench], ...] = tuple(
         ("Commands", "a start that comes again is carried out once", a_start_is_carried_out_once),
         ("Commands", "RUNNING to ABORTED: commands as in the table", orders_mean_what_the_table_says),
         ("Commands", "an abort that knows nothing ends a run", an_abort_ends_a_run),
-        ("Commands", "a stop counts whatever run, mission or state it names", a_stop_counts_whatever_it_names),
+        ("Commands", "a stop counts whatever run, mission or state it names", a_stop_counts_always),
         ("Commands", "anybody may pause; only the commander resumes", anybody_may_pause),
         ("Messages", "110 stops are reported in a small state, without gaps", a_long_run_is_told_in_little),
         ("Pushing a mission", "a new revision during a run waits", a_revision_waits_for_the_next_stop),

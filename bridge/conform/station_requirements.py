@@ -66,7 +66,7 @@ def an_order_is_for_one_boot_and_state(bench: StationBench) -> None:
     must(len(order.cmd_id) >= 16, "cmd_id is too short to be nobody else's")
 
 
-def an_order_is_repeated_under_its_id(bench: StationBench) -> None:
+def an_order_keeps_its_id(bench: StationBench) -> None:
     bench.ready()
     with bench.faults(_first("/cmd/start", lost)):
         code = bench.does("start")
@@ -354,7 +354,11 @@ STATION_REQUIREMENTS: tuple[Requirement[StationBench], ...] = tuple(
     Requirement(section, text, test)
     for section, text, test in (
         ("Commands", "a command names boot, clock and state as reported", an_order_is_for_one_boot_and_state),
-        ("Commands", "an answer lost: the same command again, under its id", an_order_is_repeated_under_its_id),
+        (
+            "Commands",
+            "an answer lost: the same command again, under its id",
+            an_order_keeps_its_id,
+        ),
         ("Commands", "no answer: reported as unknown, one id", silence_is_unknown),
         ("Commands", "a late answer makes no second command", a_late_answer_counts),
         ("Commands", "a refusal is reported, and not tried again", a_refusal_is_told_and_left_at_that),

@@ -66,7 +66,7 @@ def facts_of(
         ("Date", date),
         ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
         *(
-            [("Seen", ", ".join(told.values()))]
+            [("Limits", ", ".join(told.values()))]
             if (told := limits_in_words(mission.limits, brief=True))
             else []
         ),
@@ -105,7 +105,7 @@ def share_in_words(mission: Mission) -> str:
 def _stops(mission: Mission, selection: Selection) -> str:
     if mission.share is not UNSET:
         return f"{len(mission.stops)} of this {mission.share.kind}"
-    return f"{len(mission.stops)}, of {selection.among} at least {selection.bound}"
+    return f"{len(mission.stops)}, lower bound {selection.bound} over {selection.among}"
 
 
 def _coverage(mission: Mission, selection: Selection) -> str:
@@ -288,7 +288,7 @@ SHARE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
 STOP_COLUMNS = ("x m", "y m", "heading °", "units", "new", "arrives")
 STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 
-SHARE_HEAD = Row(("coverage", "all", "visible", "seen", "seen %"), SHARE_EDGES, bold=True, to_left=True)
+SHARE_HEAD = Row(("coverage", "all", "visible", "covered", "covered %"), SHARE_EDGES, bold=True, to_left=True)
 
 
 def shared_rows(missions: Sequence[Mission]) -> list[Row]:
