@@ -168,7 +168,7 @@ def _shown(value: Any) -> str:
 def _stop_table(mission: Mission | None) -> list[str]:
     if mission is None or not mission.stops:
         return []
-    lines = ["## Stops", "", "| stop | x m | y m | units seen | new |", "|---|---|---|---|---|"]
+    lines = ["## Stops", "", "| stop | x m | y m | units covered | new |", "|---|---|---|---|---|"]
     names = ("stop", "x m", "y m", "units", "new")
     rows = (stop.cells for stop in stop_list(mission))
     return [*lines, *(f"| {' | '.join(row[name] for name in names)} |" for row in rows), ""]
@@ -179,7 +179,7 @@ def _coverage_table(figures: Figures | None) -> list[str]:
     if figures is None:
         return []
     unit = figures.unit
-    lines = ["## Coverage", "", f"| | all, {unit} | visible | seen | share |", "|---|---|---|---|---|"]
+    lines = ["## Coverage", "", f"| | all, {unit} | visible | covered | coverage |", "|---|---|---|---|---|"]
     for share in (figures.whole, *figures.kinds, *figures.rooms):
         lines.append(f"| {' | '.join((plain(share.name), *share.cells))} |")
     if figures.quality is not None:
