@@ -1,4 +1,4 @@
-"""Evidence of a log for and against each stop: yes, no, or it cannot be told, with the reason.
+"""Evidence of a log for and against each stop: yes, no or undecided, with the reason.
 
 Yes needs poses within tolerance whose own uncertainty is below it. No needs poses that show the robot
 elsewhere all the time. Gaps, a log that begins late or ends early, and drift leave it open.
@@ -30,7 +30,7 @@ NEIGHBOURS = 4
 
 @dataclass(frozen=True)
 class StopEvidence:
-    """Answer for one stop, with the reason why it cannot be told."""
+    """Answer for one stop, with the reason if it is undecided."""
 
     item: StopComparison
     answer: Certainty
