@@ -143,6 +143,6 @@ def _check(places: list[Point], form: Format, mission: Mission) -> None:
         off = math.dist((stop.x, stop.y), place)
         if not off <= min(form.tolerance, QUANTUM):
             raise StopgoError(
-                f"{form.title}: stop {stop.id} reads back {off:.6f} m off; nothing is kept, "
+                f"{form.title}: stop {stop.id} reads back {off:.6f} m off; the file was not saved, "
                 "please report this"
             )
