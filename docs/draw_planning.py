@@ -215,10 +215,10 @@ def draw_navigable(drawn: PartPlan) -> str:
 
 
 def draw_candidates(drawn: PartPlan) -> str:
-    """Candidates that are kept, and why the others are not."""
+    """Usable candidates, and why the others are not."""
     window, found = Window(), drawn.candidates
     looks = {
-        KEPT: (SEEN, "kept"),
+        KEPT: (SEEN, "usable"),
         TOO_CLOSE: (MISSED, "closer than d_sec to an element"),
         AT_EDGE: ("#e07b00", "too near a floor edge"),
         IN_HOLE: ("#111111", "in a hole"),
@@ -348,7 +348,7 @@ def disc(x: float, y: float, words: str) -> str:
 
 
 def draw_route(drawn: PartPlan) -> str:
-    """The way over the stops, in the area the robot's centre may drive in."""
+    """The route over the stops, in the area the robot's centre may drive in."""
     window, driven = Window(), drawn.route
     legs = (line_data(window(leg)) for leg in driven.approaches if len(leg) > 1)
     x, y = window.at(driven.start[:2])
@@ -363,7 +363,7 @@ def draw_route(drawn: PartPlan) -> str:
     legend = [
         (circle(0.0, 0.0, 9.0, fill="#111111") + circle(0.0, 0.0, 6.0, fill="#ffffff"), "start"),
         (disc(0.0, 0.0, "2"), "stop, in the order of driving"),
-        (stroke(stroke=WAY, stroke_width=2.5), "way"),
+        (stroke(stroke=WAY, stroke_width=2.5), "route"),
         (swatch(fill=DRIVE), "where the robot's centre may drive"),
     ]
     return picture(window, layers, legend)

@@ -97,7 +97,7 @@ def plan(
     from stopgo.planner.floors import read_floor as read
 
     if given is not None and changes:
-        raise TypeError(f"give settings, or parameters by name, not both: {', '.join(changes)}")
+        raise TypeError(f"give `settings`, or parameters by name, not both: {', '.join(changes)}")
     used = settings(**changes) if given is None else given
     if isinstance(floor, str | Path):
         floor = read(Path(floor), options_of(used))

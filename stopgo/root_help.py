@@ -54,7 +54,7 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
 
 _HEAD = """\
 Usage: stopgo COMMAND ...    or  stopgo COMMAND --help
-Plan where a laser scanner stands, and drive a robot there.
+Plan the stops of a laser scanner; drive a robot to them.
 """
 _FOOT = "Also: --version --install-completion --show-completion"
 

@@ -111,7 +111,7 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "rows twice": ("selector", "def f(cover, settings): return [0, 0], 1", "gave a row twice"),
     "no rows": ("selector", "def f(cover, settings): return [0.5], 1", "rows holds 0.5, not whole numbers"),
     "half a tour": ("router", "def f(lengths, *, seed): return [0]", "order has the shape"),
-    "stays": ("router", "def f(lengths, *, seed): return [0] * len(lengths)", "order visits a point twice"),
+    "stays": ("router", "def f(lengths, *, seed): return [0] * len(lengths)", "route visits a point twice"),
     "old signature": ("router", "def f(lengths): return []", "TypeError: f.. got an unexpected"),
     "no ways": ("graph", "def f(space, points): return 3", "gave a int, not a Ways"),
     "through the wall": (

@@ -429,7 +429,7 @@ StationCommand = Annotated[
     typer.Option(
         "--command",
         metavar="COMMAND",
-        help="Makes the station act; {what} becomes `push FILE`, `start`, … Else you are asked.",
+        help="Makes the station act; {what} becomes `push FILE`, `start`, … Else stopgo asks you.",
     ),
 ]
 ActionTime = Annotated[

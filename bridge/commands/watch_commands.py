@@ -34,7 +34,7 @@ Follow the robot's run until it ends, gaps filled from its journal; Ctrl-C leave
 
 Then print every stop as planned and as driven and, with the plan, the coverage of the scans.
 Ends with 0 when the scans have the required coverage, also of an aborted run, 1 when they covered less
-(without the plan: when a stop was left out), 3 when it cannot be told, as without confirmed
+(without the plan: when a stop was left out), 3 when it is undecided, as without confirmed
 scans, and 2 when the run is complete and its recording is not, as on a full disk. While a
 vehicle is watched over MAVLink, this command does what the mission says for a stop that failed.
 
@@ -106,7 +106,7 @@ def print_comparison(collector: RunCollector, state: StateReport, *, as_json: bo
     elif comparison is not None:
         print_text(comparison_text(comparison))
     if comparison is None:
-        say("the run is over, but no event or no mission of it was received: its scans cannot be told")
+        say("the run is over, but no event or no mission of it was received: its scans are unknown")
         return EXIT_CODES["unknown"]
     if collector.sights and comparison.acquired is None:
         say("--plan: belongs to another mission than the run; the coverage of the scans is not known")

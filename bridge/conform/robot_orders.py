@@ -66,7 +66,7 @@ def an_answer_is_stored(bench: RobotBench) -> None:
     first = bench.ask_raw(key, encode(order))
     ready(bench)
     again = bench.ask_raw(key, encode(order))
-    must(first is not None and first == again, "the same order again got another answer")
+    must(first is not None and first == again, "the same command again got another answer")
 
 
 def an_id_is_for_one_order(bench: RobotBench) -> None:
@@ -110,7 +110,7 @@ def what_was_meant_is_heeded(bench: RobotBench) -> None:
 def an_older_fence_is_fenced(bench: RobotBench) -> None:
     ready(bench)
     lease = bench.info().lease
-    must(lease is not None, "after a push Info tells of no lease")
+    must(lease is not None, "after a push Info reports no lease")
     assert lease is not None
     must(lease.commander == bench.commander, f"after a push {lease.commander} holds the lease")
     bench.commands.must_refuse(bench.commands.order("skip", fence=lease.fence - 1), "fenced")
@@ -156,14 +156,14 @@ def taking_over_is_recorded(bench: RobotBench) -> None:
 
 
 ORDERS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement("Orders", text, test)
+    Requirement("Commands", text, test)
     for text, test in (
-        ("READY: every order but `start` is `wrong_state`", ready_refuses),
-        ("the same order again gets the stored answer", an_answer_is_stored),
-        ("another order under a used id: `id_reused`", an_id_is_for_one_order),
-        ("orders too late, too long, of another boot: `expired`", late_orders_are_expired),
+        ("READY: every command except `start` is `wrong_state`", ready_refuses),
+        ("the same command again gets the stored answer", an_answer_is_stored),
+        ("another command under a used id: `id_reused`", an_id_is_for_one_order),
+        ("commands too late, too long, of another boot: `expired`", late_orders_are_expired),
         ("`pause` and `abort` are never late", a_stop_is_never_late),
-        ("what an order was meant for is heeded", what_was_meant_is_heeded),
+        ("a command counts only for its intended state", what_was_meant_is_heeded),
         ("an older fence: `fenced`", an_older_fence_is_fenced),
         ("without the lease: `not_the_commander`", another_is_not_the_commander),
         ("`pause` and `abort` need no lease", anybody_may_stop),
@@ -171,5 +171,5 @@ ORDERS: tuple[Requirement[RobotBench], ...] = tuple(
     )
 )
 IDLE: tuple[Requirement[RobotBench], ...] = (
-    Requirement("Orders", "IDLE: every order is `no_mission`", idle_has_no_mission),
+    Requirement("Commands", "IDLE: every command is `no_mission`", idle_has_no_mission),
 )

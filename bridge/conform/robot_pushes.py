@@ -213,7 +213,7 @@ PUSHES: tuple[Requirement[RobotBench], ...] = tuple(
     for text, test in (
         ("chunks may come in any order", chunks_come_in_any_order),
         ("a chunk may come twice", chunks_may_come_twice),
-        ("`begin` tells which chunks are held", begin_reports_held_chunks),
+        ("`begin` reports the chunks that are stored", begin_reports_held_chunks),
         ("a chunk that is missing: `incomplete`", a_missing_chunk_is_incomplete),
         ("chunks of another size, number or transfer are rejected", chunks_that_do_not_fit_are_rejected),
         ("a damaged chunk is found at the commit: `digest`", damage_is_found),

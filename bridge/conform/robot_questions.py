@@ -48,14 +48,14 @@ def info_names_the_robot(bench: RobotBench) -> None:
     info = bench.info()
     must(info.protocol == VERSION, f"Info.protocol is {info.protocol}, on keys of version {VERSION}")
     must(info.robot == bench.keys.robot, f"Info.robot is {info.robot}, on keys of {bench.keys.robot}")
-    must(info.boot_id and info.state.boot_id == info.boot_id, "Info and its state tell different boots")
+    must(info.boot_id and info.state.boot_id == info.boot_id, "Info and its state report different boots")
 
 
 def boot_is_the_one_of_info(bench: RobotBench) -> None:
     if bench.ask_raw(bench.keys.boot) is None:
         raise NotTried("not answered; a router's rules let nobody but robots ask it: try it without a router")
     booted = bench.ask_for(Booted, bench.keys.boot)
-    must(booted.boot_id == bench.info().boot_id, "boot and info tell different boots")
+    must(booted.boot_id == bench.info().boot_id, "boot and info report different boots")
 
 
 def clock_and_state_go_on(bench: RobotBench) -> None:
@@ -74,7 +74,7 @@ def state_is_told_every_second(bench: RobotBench) -> None:
     told = [read(raw, StateReport, "a state") for raw in bench.published.states[before:]]
     must(len(told) >= 3, f"{len(told)} states came in {STATES_S:g} s{_why(bench)}")
     grows = all(one.seq < next_.seq for one, next_ in pairwise(told))
-    must(grows, "the `seq` of the states that were told does not grow")
+    must(grows, "the `seq` of the published states does not grow")
 
 
 def _why(bench: RobotBench) -> str:
@@ -112,7 +112,7 @@ def log_comes_in_pages(bench: RobotBench) -> None:
 def poses_come_in_pages(bench: RobotBench) -> None:
     page = bench.ask_for(PosePage, bench.keys.poses, since="0")
     must(len(page.poses) <= POSE_PAGE, f"a page has {len(page.poses)} poses; at most {POSE_PAGE}")
-    must(page.boot_id == bench.info().boot_id, "poses are of another boot than info tells")
+    must(page.boot_id == bench.info().boot_id, "poses are of another boot than info reports")
     seqs = [pose.seq for pose in page.poses]
     must(seqs == sorted(set(seqs)), "the `seq` of past poses does not grow")
 
@@ -132,7 +132,7 @@ def record_tells_its_runs(bench: RobotBench) -> None:
     if not keeps_a_record(bench):
         raise NotTried(f"the robot does not name the capability `{RECORD}`")
     runs = [kept.run_id for kept in bench.ask_for(RecordIndex, bench.keys.record).runs]
-    must(len(runs) == len(set(runs)), "the record tells a run twice")
+    must(len(runs) == len(set(runs)), "the record reports a run twice")
     unknown = bench.ask_for(RecordPage, bench.keys.record, run="not-there", since="0")
     must(not unknown.entries and not unknown.newest, "there are entries of a run that never was")
 
@@ -256,11 +256,11 @@ def _fields(message: Any) -> dict[str, Any]:
 
 
 QUESTIONS: tuple[Requirement[RobotBench], ...] = (
-    Requirement("Keys", "`info` tells protocol, name and boot", info_names_the_robot),
-    Requirement("Keys", "`boot` tells the boot that `info` tells", boot_is_the_one_of_info),
+    Requirement("Keys", "`info` reports protocol, name and boot", info_names_the_robot),
+    Requirement("Keys", "`boot` reports the boot that `info` reports", boot_is_the_one_of_info),
     Requirement("Keys", "`keep` is answered with Info", keep_is_answered_with_info),
     Requirement("Keys", "the clock and the states' `seq` go on", clock_and_state_go_on),
-    Requirement("Keys", "the state is told at least every second", state_is_told_every_second),
+    Requirement("Keys", "the state is published at least every second", state_is_told_every_second),
     Requirement("Keys", "the log comes in pages of at most 100 events", log_comes_in_pages),
     Requirement("Keys", "past poses come in pages of at most 50", poses_come_in_pages),
     Requirement("Keys", "parameters are plain numbers, else Malformed", parameters_must_be_numbers),
@@ -272,8 +272,8 @@ QUESTIONS: tuple[Requirement[RobotBench], ...] = (
     Requirement("Messages", "wrong types and ranges are Malformed", wrong_types_are_malformed),
     Requirement("Messages", "what is no JSON is Malformed", what_is_no_json_is_malformed),
     Requirement("Messages", "a state is small, whatever the mission", states_are_bounded),
-    Requirement("What zenoh must be told", "a message above 1 MB does no harm", oversize_does_no_harm),
-    Requirement("The record of a run", "it tells the runs it has, each once", record_tells_its_runs),
+    Requirement("Required zenoh configuration", "a message above 1 MB does no harm", oversize_does_no_harm),
+    Requirement("The record of a run", "it reports the runs it has, each once", record_tells_its_runs),
     Requirement("Events", "numbered from 1 without gaps", log_has_no_gaps),
     Requirement("Why something was refused", "a mission that is not there: `no_mission`",
                 a_mission_that_is_not_there_is_no_mission),

@@ -44,7 +44,7 @@ def answers_outlive_a_restart(bench: RobotBench) -> None:
     first = bench.ask_raw(key, encode(order))
     late = bench.commands.order("skip")
     _restarted(bench)
-    must(bench.ask_raw(key, encode(order)) == first, "the same order after a restart got another answer")
+    must(bench.ask_raw(key, encode(order)) == first, "the same command after a restart got another answer")
     bench.commands.must_refuse(late, "expired")
 
 
@@ -59,7 +59,7 @@ def a_run_waits_after_a_restart(bench: RobotBench) -> None:
 RESTARTS: tuple[Requirement[RobotBench], ...] = (
     Requirement("Events", "a boot has an id; mission, lease, events outlive it", a_boot_has_an_id_of_its_own,
                 needed=True),
-    Requirement("Orders", "answers outlive a restart; orders of the boot before do not",
+    Requirement("Commands", "answers outlive a restart; commands of the boot before do not",
                 answers_outlive_a_restart, needed=True),
     Requirement("States of a run", "nothing moves by itself after a restart: PAUSED",
                 a_run_waits_after_a_restart, drives=True),

@@ -53,7 +53,7 @@ def a_run_goes_to_its_end(bench: RobotBench) -> None:
     mission, answer = _started(bench)
     state = bench.wait_for_state(*OVER, within_s=RUN_S)
     must(state.state == "FINISHED", f"the run ended {state.state}")
-    must(state.run_id == answer.run_id, "the answer to start and the state tell different runs")
+    must(state.run_id == answer.run_id, "the answer to start and the state report different runs")
     stops = tuple(stop.id for stop in mission.stops)
     must(state.done == stops, f"`done` is {state.done}, not {stops}")
     events = [event for event in bench.log(newest) if event.run_id == answer.run_id]
@@ -66,7 +66,7 @@ def _tells_every_step(events: list[AnyEvent], stops: tuple[str, ...]) -> None:
     must(isinstance(events[-1], Finished), "a finished run's last event is not Finished")
     for stop in stops:
         kinds = [type(event) for event in events if getattr(event, "stop", None) == stop]
-        must(kinds == [Arrived, Settled, Scanned], f"stop {stop} tells {[kind.__name__ for kind in kinds]}")
+        must(kinds == [Arrived, Settled, Scanned], f"stop {stop} reports {[kind.__name__ for kind in kinds]}")
     files = {event.file for event in events if isinstance(event, Scanned)}
     must(len(files) == len(stops), "two stops' scans have one file")
 
@@ -79,8 +79,8 @@ def _told_once_in_order(bench: RobotBench, events: list[AnyEvent]) -> None:
         mine = [number for number in numbers if number >= wanted[0]]
         return mine if mine and mine[-1] >= wanted[-1] else None
 
-    heard = bench.wait(all_heard, 5.0, "tel/event did not tell the run's last event")
-    must(heard == wanted, f"tel/event told {heard}, and the log has {wanted}")
+    heard = bench.wait(all_heard, 5.0, "tel/event did not report the run's last event")
+    must(heard == wanted, f"tel/event reported {heard}, and the log has {wanted}")
 
 
 def poses_have_no_gaps(bench: RobotBench) -> None:
@@ -97,9 +97,9 @@ def poses_have_no_gaps(bench: RobotBench) -> None:
             break
         must(seqs[-1] > since, "a page of poses does not go on behind `since`")
         since = seqs[-1]
-    must(seqs, "no poses of the run are kept")
+    must(seqs, "no poses of the run are stored")
     missing = set(range(seqs[0], seqs[-1] + 1)) - set(seqs)
-    must(not missing, f"{len(missing)} poses of the run are missing in what is kept")
+    must(not missing, f"{len(missing)} poses of the run are missing in the stored ones")
 
 
 def a_start_is_carried_out_once(bench: RobotBench) -> None:
@@ -111,7 +111,7 @@ def a_start_is_carried_out_once(bench: RobotBench) -> None:
     must(first == again, "the same start again got another answer")
     bench.commands.must_refuse(bench.commands.order("start"), "wrong_state")
     started = [event for event in bench.log(newest) if isinstance(event, Started)]
-    must(len(started) == 1, f"one start was told as {len(started)} Started")
+    must(len(started) == 1, f"one start was reported as {len(started)} Started")
     bench.end_run()
     after = bench.commands.give(order)
     must(after == first, "the same start after the run's end got another answer")
@@ -133,8 +133,8 @@ def orders_mean_what_the_table_says(bench: RobotBench) -> None:
     bench.commands.must_execute("home")
     answer = bench.commands.give(bench.commands.order("pause"))
     if answer.outcome == "refused" and bench.info().state.state in OVER:
-        raise NotTried("the way home was over before it could be paused; all before it passed")
-    must(answer.outcome == "ok", f"pause on the way home was refused: {answer.reason}")
+        raise NotTried("the path home ended before it could be paused; all before it passed")
+    must(answer.outcome == "ok", f"pause on the path home was refused: {answer.reason}")
     refuses_what_means_nothing(bench, "PAUSED homing")
     bench.commands.must_execute("resume")
     bench.wait_for_state("HOMING", *OVER)
@@ -150,7 +150,7 @@ def an_abort_ends_a_run(bench: RobotBench) -> None:
     bench.wait_for_state("ABORTED")
 
 
-def a_stop_counts_whatever_it_names(bench: RobotBench) -> None:
+def a_stop_counts_always(bench: RobotBench) -> None:
     _started(bench)
     stops: tuple[tuple[Verb, str], ...] = (("pause", "PAUSED"), ("abort", "ABORTED"))
     for verb, state in stops:
@@ -212,7 +212,7 @@ def a_long_run_is_told_in_little(bench: RobotBench) -> None:
     numbers = [event.number for event in events]
     must(numbers == list(range(newest + 1, newest + 1 + len(numbers))), "the log of the run has gaps")
     told = sum(isinstance(event, Skipped) for event in events)
-    must(told == MANY_SKIPPED, f"{MANY_SKIPPED} skips were told as {told} Skipped")
+    must(told == MANY_SKIPPED, f"{MANY_SKIPPED} skips were reported as {told} Skipped")
 
 
 def a_revision_waits_for_the_next_stop(bench: RobotBench) -> None:
@@ -278,7 +278,10 @@ def _record(bench: RobotBench, run_id: str) -> list[RecordEntry] | None:
     while len(entries) < newest:
         since = entries[-1].number if entries else 0
         page = bench.ask_for(RecordPage, bench.keys.record, run=run_id, since=str(since))
-        must(page.run_id == run_id and page.since == since, "a page tells another run or number than asked")
+        must(
+            page.run_id == run_id and page.since == since,
+            "a page is of another run or number than requested",
+        )
         must(
             len(page.entries) <= RECORD_PAGE, f"a page has {len(page.entries)} entries; at most {RECORD_PAGE}"
         )
@@ -299,27 +302,27 @@ def poses_tell_run_and_boot(bench: RobotBench) -> None:
     _, answer = _started(bench)
     bench.pose()
     told = read(bench.published.poses[-1], dict, "a pose")
-    must(told.get("boot_id") == bench.info().boot_id, "a pose tells another boot than info")
-    must(told.get("run_id") == answer.run_id, "a pose tells another run than the answer to start")
+    must(told.get("boot_id") == bench.info().boot_id, "a pose reports another boot than info")
+    must(told.get("run_id") == answer.run_id, "a pose reports another run than the answer to start")
 
 
 RUNS: tuple[Requirement[RobotBench], ...] = tuple(
     Requirement(section, text, test, drives=True)
     for section, text, test in (
-        ("Orders", "a start late, fenced or meant otherwise does not drive", a_late_start_does_not_drive),
-        ("Orders", "a start away from the mission's: `not_at_start`", a_start_from_elsewhere_is_refused),
+        ("Commands", "a start late, fenced or meant otherwise does not drive", a_late_start_does_not_drive),
+        ("Commands", "a start away from the mission's: `not_at_start`", a_start_from_elsewhere_is_refused),
         ("States of a run", "a run goes stop by stop to FINISHED", a_run_goes_to_its_end),
-        ("Events", "the way of a run is kept without gaps", poses_have_no_gaps),
-        ("Events", "a pose tells run and boot", poses_tell_run_and_boot),
+        ("Events", "the poses of a run are stored without gaps", poses_have_no_gaps),
+        ("Events", "a pose reports run and boot", poses_tell_run_and_boot),
         ("The record of a run", "every entry and pose once, and the same again", the_record_has_no_gaps),
-        ("Orders", "a start that comes again is carried out once", a_start_is_carried_out_once),
-        ("Orders", "RUNNING to ABORTED: orders as in the table", orders_mean_what_the_table_says),
-        ("Orders", "an abort that knows nothing ends a run", an_abort_ends_a_run),
-        ("Orders", "a stop counts whatever run, mission or state it names", a_stop_counts_whatever_it_names),
-        ("Orders", "anybody may pause; only the commander resumes", anybody_may_pause),
-        ("Messages", "110 stops are told in a small state, without gaps", a_long_run_is_told_in_little),
+        ("Commands", "a start that comes again is carried out once", a_start_is_carried_out_once),
+        ("Commands", "RUNNING to ABORTED: commands as in the table", orders_mean_what_the_table_says),
+        ("Commands", "an abort that knows nothing ends a run", an_abort_ends_a_run),
+        ("Commands", "a stop counts whatever run, mission or state it names", a_stop_counts_always),
+        ("Commands", "anybody may pause; only the commander resumes", anybody_may_pause),
+        ("Messages", "110 stops are reported in a small state, without gaps", a_long_run_is_told_in_little),
         ("Pushing a mission", "a new revision during a run waits", a_revision_waits_for_the_next_stop),
-        ("Pushing a mission", "a revision of the way so far: `way_differs`", a_path_that_differs_is_refused),
+        ("Pushing a mission", "a revision of the path so far: `way_differs`", a_path_that_differs_is_refused),
         ("Pushing a mission", "another mission in a run: `running`", another_mission_is_refused_during_a_run),
     )
 )  # fmt: skip

@@ -30,7 +30,7 @@ def _must_be_untrusted(bench: RobotBench, falsify: Falsifying, what: str) -> Non
 
 
 def unsigned_is_untrusted(bench: RobotBench) -> None:
-    _must_be_untrusted(bench, falsified.unsigned, "without a seal")
+    _must_be_untrusted(bench, falsified.unsigned, "without a signature")
 
 
 def wrong_signatures_are_untrusted(bench: RobotBench) -> None:
@@ -38,15 +38,15 @@ def wrong_signatures_are_untrusted(bench: RobotBench) -> None:
 
 
 def seals_are_for_one_key(bench: RobotBench) -> None:
-    _must_be_untrusted(bench, falsified.of_another_key, "with the seal of another key")
+    _must_be_untrusted(bench, falsified.of_another_key, "with the signature of another key")
 
 
 def seals_are_for_one_payload(bench: RobotBench) -> None:
-    _must_be_untrusted(bench, falsified.of_another_payload, "with the seal of other bytes")
+    _must_be_untrusted(bench, falsified.of_another_payload, "with the signature of other bytes")
 
 
 def seals_are_for_their_parameters(bench: RobotBench) -> None:
-    _must_be_untrusted(bench, falsified.of_other_parameters, "with the seal of other parameters")
+    _must_be_untrusted(bench, falsified.of_other_parameters, "with the signature of other parameters")
 
 
 def certificates_are_needed(bench: RobotBench) -> None:
@@ -70,19 +70,19 @@ def what_is_published_is_sealed(bench: RobotBench) -> None:
         bench.wait(lambda: len(bench.published.states) > before or None, bench.timeout_s, "")
     except Nonconforming:
         why = bench.link.distrusted or "none came"
-        raise Nonconforming(f"no state was heard whose seal holds ({why})") from None
+        raise Nonconforming(f"no state with a valid signature was received ({why})") from None
 
 
 SEALS: tuple[Requirement[RobotBench], ...] = tuple(
-    Requirement("Seals", text, test)
+    Requirement("Signatures", text, test)
     for text, test in (
-        ("a question without a seal: `untrusted`", unsigned_is_untrusted),
+        ("a query without a signature: `untrusted`", unsigned_is_untrusted),
         ("a wrong signature: `untrusted`", wrong_signatures_are_untrusted),
-        ("a seal counts on its own key only", seals_are_for_one_key),
-        ("a seal counts for its own bytes only", seals_are_for_one_payload),
-        ("a seal counts for its own parameters only", seals_are_for_their_parameters),
+        ("a signature is valid on its own key expression only", seals_are_for_one_key),
+        ("a signature is valid for its own bytes only", seals_are_for_one_payload),
+        ("a signature is valid for its own parameters only", seals_are_for_their_parameters),
         ("a question without a certificate: `untrusted`", certificates_are_needed),
-        ("an order in another's name: `untrusted`", orders_are_given_in_ones_own_name),
-        ("states are sealed, numbered and fresh", what_is_published_is_sealed),
+        ("a command in another's name: `untrusted`", orders_are_given_in_ones_own_name),
+        ("states are signed, numbered and fresh", what_is_published_is_sealed),
     )
 )

@@ -54,7 +54,7 @@ class StationBench:
         code = self._do(what, mission)
         if not self.link.asked:
             ended = "" if code is None else f" (exit code {code})"
-            raise NotTried(f"the station was to {what} and asked nothing{ended}; does it find the robot?")
+            raise NotTried(f"the station was to {what} and sent no query{ended}; does it find the robot?")
         return code
 
     @contextmanager

@@ -58,13 +58,15 @@ def an_order_is_for_one_boot_and_state(bench: StationBench) -> None:
     order = orders[0]
     must(order.boot_id == bench.robot.controller.boot_id, f"boot_id is {order.boot_id}, not the one of info")
     must(0 < order.valid_for_s <= LONGEST_VALID_S, f"valid_for_s is {order.valid_for_s}")
-    must(before_ns <= order.issued_ns, "issued_ns is not the clock that info told")
+    must(before_ns <= order.issued_ns, "issued_ns is not the clock that info reported")
     must(order.mission_id in (None, mission.id), "mission_id is another mission's")
-    must(order.expect_state is None or "READY" in order.expect_state, "expect_state is not the state told")
+    must(
+        order.expect_state is None or "READY" in order.expect_state, "expect_state is not the state reported"
+    )
     must(len(order.cmd_id) >= 16, "cmd_id is too short to be nobody else's")
 
 
-def an_order_is_repeated_under_its_id(bench: StationBench) -> None:
+def an_order_keeps_its_id(bench: StationBench) -> None:
     bench.ready()
     with bench.faults(_first("/cmd/start", lost)):
         code = bench.does("start")
@@ -94,7 +96,7 @@ def a_late_answer_counts(bench: StationBench) -> None:
 
     with bench.faults(_first("/cmd/start", late)):
         must_exit(bench.does("start"), DONE, "a start that was answered late is not reported as done")
-    must(len({order.cmd_id for order in bench.orders("start")}) == 1, "a late answer made a second order")
+    must(len({order.cmd_id for order in bench.orders("start")}) == 1, "a late answer made a second command")
 
 
 def a_refusal_is_told_and_left_at_that(bench: StationBench) -> None:
@@ -241,7 +243,7 @@ def an_unknown_state_is_no_hindrance(bench: StationBench) -> None:
         return encode(told)
 
     with bench.faults(_on("/info", hovering)):
-        must_exit(bench.does("status"), DONE, "a robot in a state that is not known cannot be asked")
+        must_exit(bench.does("status"), DONE, "a robot in an unknown state cannot be queried")
         must_exit(bench.does("pause"), DONE, "a robot in a state that is not known cannot be paused")
     must(bench.orders("pause"), "to a robot in a state that is not known no pause comes")
 
@@ -269,7 +271,7 @@ def missed_events_are_asked_for(bench: StationBench) -> None:
     bench.gives("start")
     with bench.faults(publish=lambda key, payload: None if key.endswith("/tel/event") else payload):
         must_exit(bench.does("watch"), DONE, "a run whose events were lost is not followed to its end")
-    must(bench.asked("log"), "events that were lost are not asked for")
+    must(bench.asked("log"), "events that were lost are not requested")
 
 
 def missed_poses_are_asked_for(bench: StationBench) -> None:
@@ -283,7 +285,7 @@ def missed_poses_are_asked_for(bench: StationBench) -> None:
 
     with bench.faults(publish=half):
         bench.does("watch")
-    must(bench.asked("poses") or bench.asked("record"), "poses that were lost are not asked for")
+    must(bench.asked("poses") or bench.asked("record"), "poses that were lost are not requested")
 
 
 def a_watch_is_known_to_the_robot(bench: StationBench) -> None:
@@ -292,7 +294,7 @@ def a_watch_is_known_to_the_robot(bench: StationBench) -> None:
     bench.link.watchers.clear()
     must_exit(bench.does("watch"), DONE, "a run that finished is not reported as done")
     must(bench.link.watchers, "no token on watch/<name> was shown")
-    must(bench.asked("keep"), "`keep` was not asked")
+    must(bench.asked("keep"), "`keep` was not requested")
 
 
 # Whom it believes
@@ -315,8 +317,8 @@ def two_of_one_name_are_stopped(bench: StationBench) -> None:
         code = bench.does("resume")
     finally:
         there = False
-    must(code != DONE, "an order to two robots of one name is reported as done")
-    must(not bench.orders("resume"), "an order was given though two robots answer to the name")
+    must(code != DONE, "a command to two robots of one name is reported as done")
+    must(not bench.orders("resume"), "a command was sent although two robots have the name")
     must(bench.orders("pause"), "two robots of one name are not paused")
 
 
@@ -351,28 +353,32 @@ def forged_answers_are_not_believed(bench: StationBench) -> None:
 STATION_REQUIREMENTS: tuple[Requirement[StationBench], ...] = tuple(
     Requirement(section, text, test)
     for section, text, test in (
-        ("Orders", "an order names boot, clock and state as told", an_order_is_for_one_boot_and_state),
-        ("Orders", "an answer lost: the same order again, under its id", an_order_is_repeated_under_its_id),
-        ("Orders", "no answer: told as unknown, one id", silence_is_unknown),
-        ("Orders", "a late answer makes no second order", a_late_answer_counts),
-        ("Orders", "a refusal is told, and not tried again", a_refusal_is_told_and_left_at_that),
-        ("Orders", "another's lease is not taken unasked", the_lease_is_not_taken_unasked),
-        ("Orders", "`pause` is sent without asking, and small", a_stop_asks_nothing_first),
+        ("Commands", "a command names boot, clock and state as reported", an_order_is_for_one_boot_and_state),
+        (
+            "Commands",
+            "an answer lost: the same command again, under its id",
+            an_order_keeps_its_id,
+        ),
+        ("Commands", "no answer: reported as unknown, one id", silence_is_unknown),
+        ("Commands", "a late answer makes no second command", a_late_answer_counts),
+        ("Commands", "a refusal is reported, and not tried again", a_refusal_is_told_and_left_at_that),
+        ("Commands", "another's lease is not taken without a request", the_lease_is_not_taken_unasked),
+        ("Commands", "`pause` is sent without asking, and small", a_stop_asks_nothing_first),
         ("Pushing a mission", "every chunk, then the commit, then a look", a_push_is_whole_and_read_back),
         ("Pushing a mission", "a cut: goes on with what is missing", a_push_goes_on_where_it_was_cut),
         ("Pushing a mission", "a commit is repeated under its nonce", a_commit_is_repeated_as_it_is),
         ("Pushing a mission", "a chunk with another hash is not committed", a_damaged_chunk_is_not_committed),
-        ("Pushing a mission", "a rejection is told, for unknown reasons too", a_rejection_is_told),
-        ("Pushing a mission", "done only when the state tells so", acceptance_is_not_believed_blindly),
+        ("Pushing a mission", "a rejection is reported, for unknown reasons too", a_rejection_is_told),
+        ("Pushing a mission", "done only when the state reports so", acceptance_is_not_believed_blindly),
         ("Messages", "fields that are not known are passed over", newer_fields_are_passed_over),
         ("Messages", "a state that is not known is no hindrance", an_unknown_state_is_no_hindrance),
         ("Events", "events that are not known are passed over", unknown_events_are_passed_over),
-        ("Events", "events that were missed are asked for", missed_events_are_asked_for),
-        ("Events", "poses that were missed are asked for", missed_poses_are_asked_for),
+        ("Events", "events that were missed are requested", missed_events_are_asked_for),
+        ("Events", "poses that were missed are requested", missed_poses_are_asked_for),
         ("Keys", "who watches shows a token and asks `keep`", a_watch_is_known_to_the_robot),
-        ("One robot, one name", "two boots: no order, both paused", two_of_one_name_are_stopped),
-        ("Seals", "questions are sealed", questions_are_sealed),
-        ("Seals", "an Info whose seal does not hold: no order", forged_states_are_not_believed),
-        ("Seals", "an answer whose seal does not hold: unknown", forged_answers_are_not_believed),
+        ("One robot, one name", "two boots: no command, both paused", two_of_one_name_are_stopped),
+        ("Signatures", "queries are signed", questions_are_sealed),
+        ("Signatures", "an Info without a valid signature: no command", forged_states_are_not_believed),
+        ("Signatures", "an answer without a valid signature: unknown", forged_answers_are_not_believed),
     )
 )

@@ -9,7 +9,7 @@ RECORD: Final = "record"
 """Capability of a robot that records its runs."""
 
 WITHOUT: Final[dict[str, str]] = {
-    RECORD: "of a link lost for longer than its last 3000 poses the way stays unknown",
+    RECORD: "if the link is lost for longer than 3000 poses, the older poses of the run are unknown",
 }
 """Effect of a missing capability, by its name in `Info.capabilities`."""
 

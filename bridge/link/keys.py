@@ -121,7 +121,7 @@ def _list_bytes(path: Path) -> bytes:
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read ({error.strerror}); copy it from the site's folder of keys, or have the"
-            " keys issued anew if they are older than it (stopgo keys rotate)"
+            " keys issued again if they are older than it (stopgo keys rotate)"
         ) from None
 
 
@@ -232,7 +232,7 @@ def _read_kept(path: Path, authority: x509.Certificate) -> Revoked:
         return read_revoked(path, authority)
     except InputError:
         raise InputError(
-            f"{path}: the newest list of revoked keys that was kept is damaged; copy the site's newest"
+            f"{path}: the stored list of revoked keys is damaged; copy the site's newest"
             " revoked.json into the folder of keys, and remove this one"
         ) from None
 
@@ -280,7 +280,7 @@ def holder_of(certificate: x509.Certificate) -> Holder:
     common, unit = common_name(certificate), _unit(certificate)
     if common in ROLES:
         raise InputError(
-            "names its role and not its holder, as those of older versions did; have it issued anew:"
+            "names its role and not its holder, as those of older versions did; have it issued again:"
             f" stopgo keys rotate {_organisation(certificate) or 'NAME'} --in SITE-KEYS"
         )
     role = next((role for role in ROLES if role == unit), None)

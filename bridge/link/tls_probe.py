@@ -71,7 +71,7 @@ def _handshake(line: socket.socket, host: str, keys: HeldKeys) -> str:
 def _refused_here(error: ssl.SSLCertVerificationError, host: str) -> str:
     if "mismatch" in error.verify_message or "not valid for" in error.verify_message:
         return (
-            f"its certificate is not for {host}: have it issued anew with --address {host}"
+            f"its certificate is not for {host}: have it issued again with --address {host}"
             " (stopgo keys rotate)"
         )
     return f"its certificate is not of the authority of these keys ({error.verify_message})"

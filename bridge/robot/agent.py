@@ -73,7 +73,7 @@ def check_ordering(request: Request, commander: str | None = None) -> None:
     if holder is None:
         return
     if holder.role != "station":
-        raise Untrusted(f"{holder.name} is a {holder.role}; only stations give orders")
+        raise Untrusted(f"{holder.name} is a {holder.role}; only stations send commands")
     if commander not in (None, holder.name):
         raise Untrusted(f"signed by {holder.name}, not by {commander}")
 

@@ -162,8 +162,8 @@ def _file_locks(directory: Path) -> ModuleType:
         import fcntl
     except ModuleNotFoundError:
         raise InputError(
-            f"--state {directory}: a robot's journal is kept on Linux and macOS only; here you can plan, and "
-            "command and watch robots that run elsewhere"
+            f"--state {directory}: a robot stores its journal on Linux and macOS only; here you can plan,"
+            " and command and watch robots that run elsewhere"
         ) from None
     return fcntl
 

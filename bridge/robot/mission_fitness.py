@@ -30,7 +30,7 @@ def _unfit_now(mission: Mission, run: Run, held: Mission, revisions: RevisionPol
     if revisions == "refuse":
         return Refused("running", f"the robot is {run.state} and takes no revision during a run")
     if run.homing and run.then != "PAUSED":
-        return Refused("running", "the robot is on its way home for good")
+        return Refused("running", "the robot drives home and takes no revision")
     differs = revision.driven_route_change(run, held, mission)
     return Refused("way_differs", f"revision {mission.revision}: {differs}") if differs else None
 

@@ -86,7 +86,7 @@ class RunDriver:
         outcome = "arrived" if there else self._goto(path, mission, heading)
         here = self._base.pose()
         if outcome == "blocked":
-            self._hold_blocked(run, f"the way to {stop.id}", here)
+            self._hold_blocked(run, f"the path to {stop.id}", here)
         elif outcome == "arrived":
             self._store.advance(run, lambda now: runs.reached(now, mission, here, deviation(here, stop)))
 
@@ -98,7 +98,7 @@ class RunDriver:
         path = route_position.forward(leg, pose) if returning else route_position.backward(leg, pose)
         outcome = self._goto(path, mission, None)
         if outcome == "blocked":
-            self._hold_blocked(run, "the way home", self._base.pose())
+            self._hold_blocked(run, "the path home", self._base.pose())
         elif outcome == "arrived":
             self._store.advance(run, lambda now: runs.home_leg_driven(now, mission))
 

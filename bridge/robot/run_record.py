@@ -11,8 +11,8 @@ from stopgo.bridge.link.protocol import RECORD_PAGE, PoseRow, RecordEntry, Recor
 from stopgo.bridge.record_file import RecordFile
 from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport
 
-RESTARTED = "the robot's program was started anew"
-UNSEEN = "the robot kept no record then"
+RESTARTED = "the robot's program was restarted"
+UNSEEN = "the robot recorded nothing then"
 DAMAGED = "the robot's disk has changed what was written"
 
 

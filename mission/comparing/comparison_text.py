@@ -87,7 +87,7 @@ def _coverage_lines(acquired: Acquired) -> list[str]:
     whole = (acquired.planned.whole, acquired.shares.whole)
     pairs = [whole, *acquired.kinds, *acquired.rooms[:MOST_ROOMS]]
     rows = [_share_cells(planned, share) for planned, share in pairs]
-    lines = [table(("coverage", "planned %", "acquired %", "asked %", ""), rows)]
+    lines = [table(("coverage", "planned %", "acquired %", "required %", ""), rows)]
     rest = len(acquired.rooms) - MOST_ROOMS
     return [*lines, f"and {rest} more rooms, with higher coverage"] if rest > 0 else lines
 

@@ -70,7 +70,7 @@ class Measured:
         shifted = [away for away in off if np.isfinite(away)]
         how = f"they fit it if shifted by {max(shifted):.1f} m" if shifted else "no shift fits them to it"
         count = f"{len(off)} of {len(self.misplaced_m or ())} clouds"
-        return f"{count} do not lie on the floor ({how}); clouds in the drawing's frame would tell it"
+        return f"{count} do not lie on the floor ({how}); give clouds in the drawing's frame"
 
     def absent(self, visible: BoolArray) -> tuple[str, ...]:
         """Return the elements without a point, though much of them was visible: units (n,)."""

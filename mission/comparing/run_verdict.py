@@ -12,7 +12,7 @@ from stopgo.mission.run.events import Aborted
 from stopgo.mission.stages.figures import percent
 
 EXIT_CODES: dict[Certainty, int] = {"yes": 0, "no": 1, "unknown": 3}
-HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Cannot be told"}
+HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Undecided"}
 MOST_NAMED = 6
 """Number of stops named in a sentence; of more, only their number is given."""
 
@@ -84,9 +84,9 @@ def _missing_evidence(comparison: Comparison) -> Iterator[str]:
     """Yield what the evidence lacks, and what would tell it."""
     for item in comparison.asked:
         if item.disputed_m is not None:
-            yield f"{item.stop} cannot be told: {item.disputed_text}; the scan's cloud would tell."
+            yield f"{item.stop} is undecided: {item.disputed_text}; check the scan's cloud."
     if any(item.outcome == "unconfirmed" for item in comparison.asked):
-        yield "The scanner's files would tell which of the unconfirmed scans were made."
+        yield "The scanner's files would show which of the unconfirmed scans were made."
     if not comparison.log.ended:
         yield "The run has not ended."
     missing = missing_events(comparison.log)
@@ -96,14 +96,15 @@ def _missing_evidence(comparison: Comparison) -> Iterator[str]:
 
 def _coverage(acquired: Acquired) -> Iterator[str]:
     whole, planned = acquired.shares.whole, acquired.planned.whole
-    asked = "" if whole.required is None else f"{percent(whole.required)} was asked, "
+    asked = "" if whole.required is None else f"{percent(whole.required)} was required, "
     least = "at least " if acquired.unknown else ""
     yield (
         f"{least}{percent(whole.coverage)} of what is visible was scanned; "
         f"{asked}{percent(planned.coverage)} planned."
     )
     for share in [share for share in acquired.shares.short if share is not whole][:MOST_NAMED]:
-        yield f"Of {share.name}, {percent(share.coverage)} was scanned; {percent(share.required)} was asked."
+        covered, required = percent(share.coverage), percent(share.required)
+        yield f"Of {share.name}, {covered} was scanned; {required} was required."
     if acquired.unknown:
         yield f"Coverage of {named(acquired.unknown)} is unknown: no plan of that revision was given."
 

@@ -66,13 +66,13 @@ def facts_of(
         ("Date", date),
         ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
         *(
-            [("Seen", ", ".join(told.values()))]
+            [("Limits", ", ".join(told.values()))]
             if (told := limits_in_words(mission.limits, brief=True))
             else []
         ),
         ("Stops", _stops(mission, selection)),
         ("Coverage", _coverage(mission, selection)),
-        ("Clearances", f"d_sec {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
+        ("Clearances", f"stop {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
         ("Route", _way(route, shared) + f", {robot.speed:g} m/s"),
         ("Planned time", _times([schedule(item).total_s for item in shared or (mission,)])),
         *_least_time(route, shared),
@@ -105,11 +105,11 @@ def share_in_words(mission: Mission) -> str:
 def _stops(mission: Mission, selection: Selection) -> str:
     if mission.share is not UNSET:
         return f"{len(mission.stops)} of this {mission.share.kind}"
-    return f"{len(mission.stops)}, of {selection.among} at least {selection.bound}"
+    return f"{len(mission.stops)}, lower bound {selection.bound} over {selection.among}"
 
 
 def _coverage(mission: Mission, selection: Selection) -> str:
-    seen = f"{100 * selection.coverage:.1f} % of what is in sight"
+    seen = f"{100 * selection.coverage:.1f} % of what is visible"
     return f"{seen}, {_required(selection.required)}" if mission.share is UNSET else f"{seen}, by these alone"
 
 
@@ -137,7 +137,7 @@ def _least_time(route: Route, shared: Sequence[Mission]) -> list[tuple[str, str]
 
 
 def _required(share: float) -> str:
-    return f"asked {100 * share:g} %"
+    return f"required {100 * share:g} %"
 
 
 def legend_height(entries: list[tuple[str, str]]) -> float:
@@ -150,9 +150,9 @@ def legend_entries(route: Route, mission: Mission, shared: Sequence[Mission] = (
     openings = {state.passable for state in space.openings}
     any_view = not limits_in_words(mission.limits)
     some: list[tuple[str, str, bool]] = [
-        ("seen", "seen by the stops", True),
-        ("unseen", "in sight, not seen" if any_view else "can be seen so, is not", True),
-        ("hidden", "out of sight" if any_view else "cannot be seen so", True),
+        ("seen", "covered by the stops", True),
+        ("unseen", "visible, not covered" if any_view else "within limits, not covered", True),
+        ("hidden", "not visible" if any_view else "not within limits", True),
         ("passable", "opening, passable", True in openings),
         ("blocked", "opening, not passable", False in openings),
         ("stop", "stop, and its heading", bool(mission.stops)),
@@ -161,7 +161,7 @@ def legend_entries(route: Route, mission: Mission, shared: Sequence[Mission] = (
         *((f"way {k}", f"{letter(k)}: {share_in_words(item)}", True) for k, item in enumerate(shared)),
         ("way", "route", bool(mission.stops) and not shared),
         ("back", _back_words(route), mission.return_ is not None and not shared),
-        ("thin", "its way back", any(item.return_ is not None for item in shared)),
+        ("thin", "its path back", any(item.return_ is not None for item in shared)),
         *_network_entries(mission),
     ]
     kinds = [(kind, kind) for kind in floor_look.kinds_of(space.floor)]
@@ -174,7 +174,7 @@ def _network_entries(mission: Mission) -> list[tuple[str, str, bool]]:
         return []
     return [
         ("pair", "scans that register", len(network.overlaps) > len(network.bridges)),
-        ("bridge", "without it they fall apart", bool(network.bridges)),
+        ("bridge", "their only connection", bool(network.bridges)),
     ]
 
 
@@ -287,7 +287,7 @@ SHARE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
 STOP_COLUMNS = ("x m", "y m", "heading °", "units", "new", "arrives")
 STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 
-SHARE_HEAD = Row(("coverage", "all", "visible", "seen", "seen %"), SHARE_EDGES, bold=True, to_left=True)
+SHARE_HEAD = Row(("coverage", "all", "visible", "covered", "covered %"), SHARE_EDGES, bold=True, to_left=True)
 
 
 def shared_rows(missions: Sequence[Mission]) -> list[Row]:

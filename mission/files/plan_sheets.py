@@ -265,7 +265,7 @@ def rooms_of(mission: Mission, floor: FloorPlan) -> list[str]:
     return names
 
 
-FIGURE_COLUMNS = (("", 0.0), ("all", 90.0), ("visible", 112.0), ("seen", 134.0), ("seen %", 156.0))
+FIGURE_COLUMNS = (("", 0.0), ("all", 90.0), ("visible", 112.0), ("covered", 134.0), ("covered %", 156.0))
 
 
 def _figure_lines(figures: Figures) -> Iterator[ListLine]:

@@ -93,7 +93,7 @@ def _check_origin(mission: Mission, origin: SiteOrigin) -> None:
     if abs(origin.lat) > LATITUDE_LIMIT:
         raise InputError(
             f"{mission.name}: georeference.lat is {origin.lat}; autopilots' metres end at "
-            f"±{LATITUDE_LIMIT:g}°, give another place with --origin"
+            f"±{LATITUDE_LIMIT:g}°, give another position with --origin"
         )
 
 

@@ -215,7 +215,7 @@ def _short_whole(proof: PlanProof) -> list[str]:
 
 def _short_parts(proof: PlanProof) -> list[str]:
     return [
-        f"{item.name}: {percent(item.required)} asked, simulated {percent(item.simulated)}"
+        f"{item.name}: {percent(item.required)} required, simulated {percent(item.simulated)}"
         for item in (*proof.rooms, *proof.kinds)
         if item.required is not None
         and item.simulated is not None

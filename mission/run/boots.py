@@ -96,7 +96,7 @@ def _without_boots(events: Sequence[AnyEvent], order: Sequence[str], poses: Trac
     edges = [[event.robot_ns for event in events if event.boot_id == boot] for boot in boots]
     if any(min(after) <= max(before) for before, after in pairwise(edges)):
         joined = _joined(events, boots, {})
-        note = "its poses are left out: they do not tell before from after the restart, whose clock went back"
+        note = "its poses are left out: at a restart the clock went back, so their order is unknown"
         return JoinedBoots(joined.events, joined.poses, (*joined.notes, note))
     restarts = [min(after) for after in edges[1:]]
     track = Track.of(poses.ns, poses.xy, poses.heading, restarts_ns=restarts)

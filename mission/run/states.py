@@ -257,7 +257,7 @@ def sent_home(run: Run, mission: Mission, *, then: After, reason: str) -> Change
 def link_lost(run: Run, mission: Mission, silent_s: float) -> Change:
     """Apply the mission's policy after a link loss; no scan is cut short."""
     policy = mission.policy.link_loss
-    reason = f"no station heard for {silent_s:.0f} s"
+    reason = f"no data from a station for {silent_s:.0f} s"
     event = partial(LinkLost, silent_s=silent_s, policy=policy)
     goes_home = policy == "home"
     change = sent_home(run, mission, then="PAUSED", reason=reason) if goes_home else held(run, reason)

@@ -53,7 +53,7 @@ class FloorParameters:
     ] = None
     furniture: Annotated[
         Literal["obstacle", "ignore"] | None,
-        _floor("Furniture and equipment of a model: in the robot's way, or not there", undecided="obstacle"),
+        _floor("Furniture and equipment of a model: obstacles to the robot, or absent", undecided="obstacle"),
     ] = None
     units: Annotated[
         str | None, _floor("Unit of a drawing, such as mm, m or inch", undecided="as it fits walls and doors")

@@ -48,7 +48,7 @@ class RouteParameters:
     robots: Annotated[
         int | None,
         _plan(
-            "Number of robots that share the floor, a mission each",
+            "Number of robots that divide the floor, a mission each",
             group="Fleet",
             first=True,
             least=1,

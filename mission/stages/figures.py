@@ -102,7 +102,7 @@ class Quality:
     def text(self, unit: str) -> str:
         """Return the possible part in words."""
         share = percent(self.possible / self.in_sight if self.in_sight else None)
-        return f"{share} of the {self.in_sight:.0f} {unit} in sight can be seen as asked"
+        return f"{share} of the {self.in_sight:.0f} {unit} in line of sight can be covered within the limits"
 
 
 @dataclass(frozen=True)

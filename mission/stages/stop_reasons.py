@@ -96,7 +96,7 @@ class StopReason:
         if not self.alone_units:
             return "Without it nothing would be lost: other stops see all that it sees."
         losses = [
-            f"{room.name} {lost:.1f} {self.unit}" + ("" if room.met else " (then below what is asked)")
+            f"{room.name} {lost:.1f} {self.unit}" + ("" if room.met else " (then below the requirement)")
             for room, lost in zip(self.rooms, self.lost, strict=True)
             if lost >= LEAST_PRINTED
         ]

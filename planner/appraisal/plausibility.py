@@ -89,8 +89,8 @@ def over_ignored(
             names = _named(sorted(set(leg.tolist())), stops)
             message = (
                 f"the robot drives over lines on layer {layer}, which are not read: {names} "
-                f"(first at {at[0]:.2f}, {at[1]:.2f}); say what they are: {layer_option(layer)}, "
-                f"or {layer_option(layer, 'ignore')} if nothing stands there"
+                f"(first at {at[0]:.2f}, {at[1]:.2f}); state their kind: {layer_option(layer)}, "
+                f"or {layer_option(layer, 'ignore')} if nothing is there"
             )
             yield Finding(LEG_OVER_IGNORED, message, at=at)
 

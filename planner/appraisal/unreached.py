@@ -50,7 +50,7 @@ def _cut_off(candidates: Candidates, index: int, parts: frozenset[int]) -> Itera
             gap = gap_before(space, shape, parts)
             beyond = f" ({gap})" if gap else ""
             why = f"in another part of the floor round ({x:.1f}, {y:.1f}){beyond}; --all-parts plans it too"
-            yield Unreached(f"a piece of {space.rooms[index].name}", why, area)
+            yield Unreached(f"an area of {space.rooms[index].name}", why, area)
 
 
 def _middle(candidates: Candidates, part: int, room: shapely.Geometry) -> tuple[float, float]:

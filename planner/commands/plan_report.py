@@ -203,7 +203,7 @@ def quality_lines(figures: Figures) -> list[str]:
     quality = figures.quality
     if quality is None:
         return []
-    lines = [f"  seen well   {quality.text(figures.unit)}"]
+    lines = [f"  limits      {quality.text(figures.unit)}"]
     return lines + [f"    {item.words:<29} {item.text}" for item in quality.costs]
 
 
@@ -235,15 +235,15 @@ def coverage_lines(figures: Figures) -> list[str]:
     """The coverage table: the whole, then kinds and rooms, the one least seen first."""
     whole, unit = figures.whole, figures.unit
     lines = [
-        f"  coverage    {percent(whole.coverage)} of the {percent(whole.visible_share)} that can be seen "
-        f"(seen {whole.seen:.0f} of visible {whole.visible:.0f} of all {whole.total:.0f} {unit})"
+        f"  coverage    {percent(whole.coverage)} of the {percent(whole.visible_share)} that is visible "
+        f"(covered {whole.seen:.0f} of visible {whole.visible:.0f} of all {whole.total:.0f} {unit})"
     ]
     lines += [_line("kind", share, unit) for share in figures.kinds]
     lines += [_line("room", share, unit) for share in figures.rooms[:MOST_ROOMS]]
     rest = figures.rooms[MOST_ROOMS:]
     if rest:
         lines.append(
-            f"    rooms     {len(rest)} more, none below {percent(rest[0].coverage)} of what can be seen"
+            f"    rooms     {len(rest)} more, none below {percent(rest[0].coverage)} of what is visible"
         )
     return lines
 

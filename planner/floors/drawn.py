@@ -99,7 +99,7 @@ def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:
         return Open(canonical_line(points), stroke.layer, stroke.curved, stroke.global_id, anomalies)
     polygons, changed = repaired(ring)
     if not polygons:
-        flat = Anomaly("no_area", "is closed but encloses nothing; kept as a line", place(ring))
+        flat = Anomaly("no_area", "is closed but encloses nothing; read as a line", place(ring))
         return Open(canonical_line(ring), stroke.layer, stroke.curved, stroke.global_id, (*anomalies, flat))
     if changed:
         anomalies = (*anomalies, _split(polygons, ring))
@@ -191,7 +191,7 @@ def _copies(count: int, at: Iterable[float]) -> tuple[Anomaly, ...]:
     if count == 1:
         return ()
     x, y = at
-    return (Anomaly("duplicate", f"is drawn {count} times; kept once", (float(x), float(y))),)
+    return (Anomaly("duplicate", f"is drawn {count} times; read once", (float(x), float(y))),)
 
 
 def hole_indices(

@@ -62,8 +62,8 @@ def scans_apart(route: Route) -> Iterator[Finding]:
         if others:
             yield Finding(
                 "scans_not_joined",
-                f"the scans fall into {len(others) + 1} pieces that no overlap joins; set up target spheres, "
-                f"or plan with --overlap {USUAL_SHARE:g}",
+                f"the scans fall into {len(others) + 1} components that no overlap connects; set up target "
+                f"spheres, or plan with --overlap {USUAL_SHARE:g}",
             )
         return
     called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]

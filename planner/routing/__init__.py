@@ -135,7 +135,7 @@ def _ordered(
     matrix = tour_matrix(lengths, ends)
     order = router.indices(router.called(matrix, seed=seed), "order", length=len(matrix), below=len(matrix))
     if len(set(order.tolist())) < len(order):
-        raise router.wrong("order visits a point twice")
+        raise router.wrong("route visits a point twice")
     proof = tour_proof(nanometres(matrix), order, improve=router.name == "default")
     bound = proof.bound / NANOMETRES - far_edge(lengths, ends)
     method = METHODS.get(router.name, router.name) + (", proved optimal" if proof.closed else "")

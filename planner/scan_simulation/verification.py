@@ -51,9 +51,9 @@ Say = Callable[[str], None]
 """Callback for progress messages."""
 REACH_SLACK_M = 1e-4
 """A midpoint exactly at the range is within it, as in the plan."""
-GRAZED, HIDDEN = "in sight, but so flat that it falls between two rays", "hidden from every stop"
+GRAZED, HIDDEN = "in line of sight, but so flat that it falls between two rays", "hidden from every stop"
 """Reasons for a missed target, as in proof.json."""
-NOT_AS_ASKED = "in sight, but too flat, too far apart or from too few stops"
+NOT_AS_ASKED = "in line of sight, but too flat, too far apart or from too few stops"
 
 
 def verify(

@@ -168,7 +168,7 @@ def _shown(value: Any) -> str:
 def _stop_table(mission: Mission | None) -> list[str]:
     if mission is None or not mission.stops:
         return []
-    lines = ["## Stops", "", "| stop | x m | y m | units seen | new |", "|---|---|---|---|---|"]
+    lines = ["## Stops", "", "| stop | x m | y m | units covered | new |", "|---|---|---|---|---|"]
     names = ("stop", "x m", "y m", "units", "new")
     rows = (stop.cells for stop in stop_list(mission))
     return [*lines, *(f"| {' | '.join(row[name] for name in names)} |" for row in rows), ""]
@@ -179,7 +179,7 @@ def _coverage_table(figures: Figures | None) -> list[str]:
     if figures is None:
         return []
     unit = figures.unit
-    lines = ["## Coverage", "", f"| | all, {unit} | visible | seen | share |", "|---|---|---|---|---|"]
+    lines = ["## Coverage", "", f"| | all, {unit} | visible | covered | coverage |", "|---|---|---|---|---|"]
     for share in (figures.whole, *figures.kinds, *figures.rooms):
         lines.append(f"| {' | '.join((plain(share.name), *share.cells))} |")
     if figures.quality is not None:
@@ -213,7 +213,7 @@ _COLOURS = (
     "- route yellow, return path dark yellow; run purple",
     "- grey: stops and legs that a revision has withdrawn during a run",
     "- openings: white passable, orange-red not",
-    "- candidates: yellow kept, reddish dropped; point at one for the reason",
+    "- candidates: yellow usable, reddish dropped; point at one for the reason",
     "- walls grey, columns orange, beams purple, stairs teal, windows and railings blue, holes rose",
 )
 

@@ -50,7 +50,7 @@ def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
     steps = sorted([*back.tolist(), *_forward_steps(step, places, usual).tolist()])
     lines += [
         f"the clock steps {'back' if step[k] < 0 else 'forward'} by {abs(step[k]) / 1e9:.1f} s "
-        f"after pose {k + 1} of {len(times)}; times count on in the order of writing"
+        f"after pose {k + 1} of {len(times)}; times continue in the order of writing"
         for k in steps
     ]
     for k in steps:

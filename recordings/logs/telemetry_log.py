@@ -173,7 +173,7 @@ class _FrameScan:
                     ns = last_ns
                     self.clock_lines.append(
                         f"the station's clock steps back by {-step_ns / 1e9:.1f} s at packet {number}; "
-                        "times count on in the order of writing"
+                        "times continue in the order of writing"
                     )
             last_ns = ns
             yield packet._replace(ns=ns)

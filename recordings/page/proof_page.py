@@ -81,7 +81,7 @@ def _picture(proof: PlanProof, floor: FloorPlan) -> str:
         (line_sample(VERMILION, 5), "promised, and missed"),
         (line_sample(GREY, 1.2, "4 3"), "target without points"),
         (line_sample(GREEN, 3), "scans that register"),
-        (line_sample(VERMILION, 1.5, "2 4"), "scans that share surfaces and do not register"),
+        (line_sample(VERMILION, 1.5, "2 4"), "scans that have common surfaces and do not register"),
     ]
     return section("The floor", picture, legend(marks))
 

@@ -73,8 +73,8 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
     good = sum(one.answer == "yes" for one in evidence)
     yield f"{good} of {len(evidence)} stops were visited within tolerance."
     for why in dict.fromkeys(one.why for one in evidence if one.answer == "unknown"):
-        names = named([one.item.stop for one in evidence if one.why == why])
-        yield f"{names} cannot be told: {why}."
+        stops = [one.item.stop for one in evidence if one.why == why]
+        yield f"{named(stops)} {'are' if len(stops) > 1 else 'is'} undecided: {why}."
     against = [one.item for one in evidence if one.answer == "no"]
     for outcome, words in WORDS.items():
         stops = [item.stop for item in against if item.outcome == outcome]
@@ -142,5 +142,5 @@ WORDS = {
 HEADLINES: dict[Certainty, str] = {
     "yes": "Driven as planned",
     "no": "Not driven as planned",
-    "unknown": "Cannot be told",
+    "unknown": "Undecided",
 }

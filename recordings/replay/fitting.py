@@ -66,8 +66,8 @@ def fitted(standstills: Sequence[Standstill], mission: Mission) -> Fit:
     found = sorted((item for item in tried if item is not None), key=lambda item: -item[0])
     if not found or found[0][1].pairs < LEAST_PAIRS:
         raise NegativeResult(
-            f"--align stops: no placing brings {LEAST_PAIRS} of the {len(positions)} standstills onto stops "
-            "in the mission's order; check that the log is of this mission, or give --map X,Y,HEADING"
+            f"--align stops: no transform brings {LEAST_PAIRS} of the {len(positions)} standstills onto "
+            "stops in the mission's order; check that the log is of this mission, or give --map X,Y,HEADING"
         )
     score, best = found[0]
     for other_score, other in found[1:]:

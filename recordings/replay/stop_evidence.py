@@ -1,4 +1,4 @@
-"""Evidence of a log for and against each stop: yes, no, or it cannot be told, with the reason.
+"""Evidence of a log for and against each stop: yes, no or undecided, with the reason.
 
 Yes needs poses within tolerance whose own uncertainty is below it. No needs poses that show the robot
 elsewhere all the time. Gaps, a log that begins late or ends early, and drift leave it open.
@@ -36,7 +36,7 @@ NEIGHBOURS = 4
 
 @dataclass(frozen=True)
 class StopEvidence:
-    """Answer for one stop, with the reason why it cannot be told."""
+    """Answer for one stop, with the reason if it is undecided."""
 
     item: StopComparison
     answer: Certainty
@@ -60,7 +60,7 @@ def _evidence(replay: Replay, number: int, item: StopComparison, unsure_m: float
     climbed_m = climb_m(replay, number)
     if abs(climbed_m) > LEVEL_M and not item.outside_text:
         where = f"{abs(climbed_m):.1f} m {'higher' if climbed_m > 0 else 'lower'} than at the start"
-        return StopEvidence(item, "unknown", f"the robot was {where}; a log of its storey would tell it")
+        return StopEvidence(item, "unknown", f"the robot was {where}; give a log of its storey")
     return StopEvidence(item, "no" if item.outside_text else "yes")
 
 
@@ -79,9 +79,7 @@ def climb_m(replay: Replay, stop: int) -> float:
     return float(np.median(heights[1]) - np.median(heights[0]))
 
 
-DRIFTS = (
-    "the poses drift by more than the tolerance; poses matched to a map, or a scan at the stop, would tell it"
-)
+DRIFTS = "the poses drift by more than the tolerance; give poses matched to a map, or a scan at the stop"
 
 
 def _unseen(replay: Replay, number: int, item: StopComparison) -> str:
@@ -93,9 +91,9 @@ def _unseen(replay: Replay, number: int, item: StopComparison) -> str:
     after = [match for match in replay.matches if match.stop is not None and match.stop > number]
     at = [match for match in replay.matches if match.stop == number]
     if not after and not at:
-        return "" if _over(replay) else "the log ends before; a log that goes on would tell it"
+        return "" if _over(replay) else "the log ends before; give a log that continues"
     if not before and not at and _begins_late(replay):
-        return "the log begins after the start of the mission; an earlier log would tell it"
+        return "the log begins after the start of the mission; give an earlier log"
     longer = _possibly_longer(track, at, least_stay_s(stop))
     return longer or _unseen_between(replay, item, stop, before, after)
 
@@ -109,7 +107,7 @@ def _unseen_between(
     end = min((match.standstill.begin_ns for match in after), default=int(track.ns[-1]))
     longest_s = longest_gap_s(track, begin, max(begin, end))
     if longest_s >= max(LEAST_GAP_S, least_stay_s(stop)):
-        return f"{longest_s:.0f} s without poses on the way; another source of poses would tell it"
+        return f"{longest_s:.0f} s without poses on the path; give another source of poses"
     return DRIFTS if item.outcome == "skipped" and _may_have_drifted(replay, stop, begin, end) else ""
 
 
@@ -117,17 +115,17 @@ def _possibly_longer(track: Track, at: Sequence[Match], least_s: float) -> str:
     """Return why a standstill may have been longer than the log shows; empty if it was not."""
     slack_ns = int(LEAST_GAP_S * 1e9)
     if any(match.standstill.end_ns + slack_ns >= track.ns[-1] for match in at):
-        return "the log ends while the robot is stationary there; a log that goes on would tell it"
+        return "the log ends while the robot is stationary there; give a log that continues"
     if any(match.standstill.begin_ns - slack_ns <= track.ns[0] for match in at):
-        return "the log begins while the robot is stationary there; an earlier log would tell it"
+        return "the log begins while the robot is stationary there; give an earlier log"
     begin_ns = None
     for one, other in pairwise(at):
         broken = other.standstill.begin_ns - one.standstill.end_ns <= BROKEN_NS
         begin_ns = (begin_ns or one.standstill.begin_ns) if broken else None
         if begin_ns is not None and (other.standstill.end_ns - begin_ns) / 1e9 >= least_s:
-            return "its poses jump while it is stationary; another source of poses would tell it"
+            return "its poses jump while it is stationary; give another source of poses"
     if any(possible_s(track, match) >= least_s for match in at):
-        return "poses are too rare to tell how long it stood; another source of poses would tell it"
+        return "poses are too rare to measure the standstill; give another source of poses"
     return ""
 
 

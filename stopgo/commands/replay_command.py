@@ -259,7 +259,7 @@ def _placing(
     from stopgo.recordings.replay.log_placing import Placing
 
     if align is not None and map_ is not None:
-        raise InputError("--map, --align: both place the log; give one of them")
+        raise InputError("--map, --align: both give the log's transform; give one of them")
     if not math.isfinite(time_offset) or abs(time_offset) > 1e9:
         raise InputError(f"--time-offset {time_offset}: must be seconds")
     known: dict[str | None, Align | None] = {None: None, "first": "first", "stops": "stops"}

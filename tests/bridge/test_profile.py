@@ -155,7 +155,7 @@ def test_doctor_tells_what_a_robot_can_and_what_it_lacks() -> None:
         told = msgspec.structs.replace(info, capabilities=capabilities)
         return next(check.result for check in robot_checks(told, info.clock_ns) if check.name == "can")
 
-    assert can().startswith("nothing beyond version 1; lacks record: of a link lost")
+    assert can().startswith("nothing beyond version 1; lacks record: if the link is lost")
     assert can("record", "levitation") == "levitation, record"
 
 

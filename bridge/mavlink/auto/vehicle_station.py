@@ -97,7 +97,7 @@ def _stopped(opened: Wire, url: Url, options: Options, verb: Verb) -> Iterator[P
                 stand(peer, patience_s=options.timeout_s, report=say)
             except Denied as denied:
                 raise NegativeResult(f"{peer}: denied: {denied}", reason="denied") from None
-            say(f"{peer}: stands, in mode HOLD, as it reports itself")
+            say(f"{peer}: stationary, in mode HOLD, as it reports")
             hold.close()
             yield peer
 

@@ -65,7 +65,7 @@ def unknown_content(peer: Peer) -> VehicleContent:
     """The content where it could not be read."""
     return VehicleContent(
         f"what it holds now is unknown{peer.why_silent()}: it may be half a mission, so do not start it "
-        "before stopgo fetch-mission, stopgo clear or another push has gone through",
+        "before stopgo fetch-mission, stopgo clear or another push has succeeded",
         known=False,
     )
 

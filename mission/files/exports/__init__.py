@@ -137,12 +137,12 @@ def _check(places: list[Point], form: Format, mission: Mission) -> None:
     if len(places) != len(mission.stops):
         raise StopgoError(
             f"{form.title}: {len(mission.stops)} stops were written but {len(places)} read back; "
-            "nothing is kept, please report this"
+            "the file was not saved, please report this"
         )
     for stop, place in zip(mission.stops, places, strict=True):
         off = math.dist((stop.x, stop.y), place)
         if not off <= min(form.tolerance, QUANTUM):
             raise StopgoError(
-                f"{form.title}: stop {stop.id} reads back {off:.6f} m off; nothing is kept, "
+                f"{form.title}: stop {stop.id} reads back {off:.6f} m off; the file was not saved, "
                 "please report this"
             )

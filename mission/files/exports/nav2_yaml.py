@@ -41,7 +41,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
     """Return the notes on differences between Nav2's behaviour and the mission."""
     way = (
-        "Nav2's panel plans its own way between the waypoints; the mission's legs are their 'approach', "
+        "Nav2's panel plans its own path between the waypoints; the mission's legs are their 'approach', "
         "for a program that sends them to Nav2's FollowPath"
     )
     return (way, *unmapped(mission))

@@ -43,7 +43,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
     """Return the note that the table has no row for the return leg."""
-    return () if mission.return_ is None else ("the way back to the start is not in a table of stops",)
+    return () if mission.return_ is None else ("the path back to the start is not in a table of stops",)
 
 
 def guarded(text: str) -> str:

@@ -72,7 +72,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
     bare, size = _paper(supplements)
     if _amiss(drawing) > _amiss(bare):
         raise StopgoError(
-            "the drawing is not sound with the layers added; nothing is kept, please report this"
+            "the drawing is not sound with the layers added; the file was not saved, please report this"
         )
     blocks = [item for item in drawing.modelspace().query("INSERT") if item.dxf.layer == STOPS]
     return [(item.dxf.insert.x / size, item.dxf.insert.y / size) for item in blocks]
@@ -187,12 +187,12 @@ def _stop_block(drawing: Drawing) -> str:
 _BLOCK: dict[str, object] = {"layer": "0", "color": 0}
 _SHOWN = ("NUMBER", "ID")
 _PROMPTS = {
-    "NUMBER": "place in the order of driving",
+    "NUMBER": "position in the order of driving",
     "ID": "stop's id",
     "X_M": "x in metres",
     "Y_M": "y in metres",
     "HEADING_DEG": "degrees counter-clockwise from +x",
-    "DOORWAY": "whether it stands in a doorway",
+    "DOORWAY": "whether it is in a doorway",
     "PROFILE": "scanner's profile",
     "SCAN_S": "scan's duration in seconds",
 }

@@ -97,7 +97,7 @@ def assumptions(given: ImportOptions, *, heading: bool, firmware: bool) -> tuple
 def _check_items(items: Sequence[Listed], source: str) -> None:
     driven = False
     for item in items:
-        why = "changes the speed on the way; a mission has one speed, set it before the first waypoint"
+        why = "changes the speed during the drive; a mission has one speed, set it before the first waypoint"
         if not (driven and item.command == Command.DO_CHANGE_SPEED):
             why = _CHECKS.get(item.command, _stranger)(item)
         if why:
@@ -107,7 +107,7 @@ def _check_items(items: Sequence[Listed], source: str) -> None:
 
 def _stranger(item: Listed) -> str:
     if item.command == 20:
-        return "leaves the way back to the vehicle; draw it as waypoints"
+        return "leaves the path back to the vehicle; draw it as waypoints"
     return "is nothing that a scanning robot does; only waypoints, delays and triggers are read"
 
 

@@ -128,7 +128,9 @@ def _in_order(rows: list[_Row]) -> list[_Row]:
     times = Counter(numbers)
     for row, number in zip(rows, numbers, strict=True):
         if number is None or number != round(number) or times[number] > 1:
-            raise row.refused("number", "it must be the stop's place in the route, a number no other row has")
+            raise row.refused(
+                "number", "it must be the stop's position in the route, a number no other row has"
+            )
     return [row for _, row in sorted(zip(numbers, rows, strict=True), key=lambda pair: pair[0] or 0.0)]
 
 
@@ -157,7 +159,7 @@ def _placing(columns: dict[str, str], source: str, given: ImportOptions) -> Call
 def _pair(row: _Row, columns: tuple[str, str]) -> Point:
     one, other = (row.number(column) for column in columns)
     if one is None or other is None:
-        raise row.refused(columns[0] if one is None else columns[1], "every stop needs its place")
+        raise row.refused(columns[0] if one is None else columns[1], "every stop needs its position")
     return (one, other)
 
 

@@ -129,7 +129,7 @@ BEHAVIOUR = ProtocolBehaviour(
 LEFT_OUT = "checks before arming that are left out are not made up for here"
 PARAMETERS = (
     ParameterRule(
-        ("FRAME_CLASS",), lambda v: v == 1, "1 (rover)", "other frames drive in other ways", must=False
+        ("FRAME_CLASS",), lambda v: v == 1, "1 (rover)", "other frames drive differently", must=False
     ),
     ParameterRule(
         ("GPS1_TYPE", "GPS_TYPE"),
@@ -151,21 +151,21 @@ PARAMETERS = (
         ("EK3_SRC1_POSXY",),
         lambda v: v == 6,
         "6 (external)",
-        "its place comes from the localisation",
+        "its position comes from the localisation",
         when="indoors",
     ),
     ParameterRule(
         ("EK3_SRC1_VELXY",),
         lambda v: v in (0, 6, 7),
         "6 (external)",
-        "no satellites tell its speed",
+        "no satellites measure its speed",
         when="indoors",
     ),
     ParameterRule(
         ("EK3_SRC1_YAW",),
         lambda v: v in (1, 6),
         "6 (external), or 1 (compass)",
-        "steel in floors bends a compass: 6 where the localisation tells the heading",
+        "steel in floors bends a compass: 6 where the localisation gives the heading",
         when="indoors",
     ),
     ParameterRule(("WP_RADIUS",), lambda v: v <= 0.1, "0.05", "within it a stop counts as reached"),
@@ -186,7 +186,7 @@ PARAMETERS = (
         ("FS_GCS_ENABLE",),
         lambda v: v == 0,
         "0",
-        "else it stops or goes home when no station is heard, whatever the mission's link_loss says",
+        "else it stops or goes home at a link loss, whatever the mission's link_loss says",
         must=False,
     ),
     ParameterRule(

@@ -101,7 +101,7 @@ PARAMETERS = (
         ("EKF2_EV_CTRL",),
         lambda v: int(v) & 9 == 9,
         "15",
-        "place (1) and heading (8) come from the localisation, by ODOMETRY",
+        "position (1) and heading (8) come from the localisation, by ODOMETRY",
         when="indoors",
     ),
     ParameterRule(
@@ -120,7 +120,7 @@ PARAMETERS = (
         ("NAV_DLL_ACT",),
         lambda v: v == 0,
         "0",
-        "else it stops or goes home when no station is heard, whatever the mission's link_loss says",
+        "else it stops or goes home at a link loss, whatever the mission's link_loss says",
         must=False,
     ),
     ParameterRule(

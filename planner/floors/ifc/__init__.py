@@ -80,7 +80,7 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
         floors=tuple(choices),
         layers=_classes(model),
         ignored=tuple(f"{count} {name}" for name, count in described.left_out.items()),
-        inferred=() if levels else (f"no storeys; elements stand at {standing_at(model)}: --level Z",),
+        inferred=() if levels else (f"no storeys; elements are at {standing_at(model)}: --level Z",),
         findings=in_order(odd_products(model)),
     )
 

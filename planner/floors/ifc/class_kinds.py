@@ -83,6 +83,6 @@ def furniture_findings(model: Model, on_floor: set[str]) -> list[Finding]:
     counts = ", ".join(f"{names.count(name)} {name}" for name in sorted(set(names)))
     text = (
         f"{len(names)} objects of furniture and equipment are obstacles as modelled ({counts}); "
-        "if they do not stand there yet: --furniture ignore, or --layer CLASS=ignore"
+        "if they are not there yet: --furniture ignore, or --layer CLASS=ignore"
     )
     return [Finding("furniture", text)]

@@ -155,8 +155,8 @@ def chosen_level(
         return walked(levels)[0]
     if not levels:
         raise InputError(
-            f"{path}: the model has no storeys; say where the floor lies with --level Z (walls and "
-            f"doors stand at {standing_at(model)})"
+            f"{path}: the model has no storeys; give the level of the floor with --level Z (walls and "
+            f"doors are at {standing_at(model)})"
         )
     raise InputError(f"{path}: has {len(levels)} storeys; choose one with --storey: {listed(levels)}")
 

@@ -33,7 +33,7 @@ def test_a_robot_with_keys_meets_what_can_be_tried_at_rest(tmp_path: Path) -> No
         assert done.stderr.splitlines() == [
             "r1: will not drive, requirements that need it are not tested; add --drive",
             "r1: not a pass, durability was not tested: a boot has an id; mission, lease, events outlive it;"
-            " answers outlive a restart; orders of the boot before do not; add --restart COMMAND",
+            " answers outlive a restart; commands of the boot before do not; add --restart COMMAND",
         ]
         untried = {one["reason"] for one in told["requirements"] if one["outcome"] == "not tried"}
         assert untried == {

@@ -44,13 +44,13 @@ changed = msgspec.structs.replace
 def test_our_own_robot_meets_every_requirement() -> None:
     found = verdicts(RobotUnderTest())
     assert failed(found) == {}
-    assert {verdict.section for verdict in found if verdict.outcome == "not tried"} == {"Seals"}
+    assert {verdict.section for verdict in found if verdict.outcome == "not tried"} == {"Signatures"}
 
 
 def test_our_own_robot_with_keys_meets_what_is_said_of_seals(tmp_path: Path) -> None:
     robot = RobotUnderTest(keys_of_site(tmp_path / "site"))
     with booted(robot):
-        seals = [one for one in REQUIREMENTS if one.section == "Seals"]
+        seals = [one for one in REQUIREMENTS if one.section == "Signatures"]
         found = list(tried(seals, robot.bench()))
     assert {verdict.outcome for verdict in found} == {"passed"}, failed(found)
 
@@ -278,10 +278,10 @@ class WantsPiecesInOrder(Inbox):
 @pytest.mark.parametrize(
     ("part", "broken", "requirement", "why"),
     [
-        ("controller", ForgetsAnswers, "the same order again gets the stored answer", "another answer"),
+        ("controller", ForgetsAnswers, "the same command again gets the stored answer", "another answer"),
         ("controller", ForgetsAnswers, "a start that comes again is carried out once", "another answer"),
         ("controller", IgnoresFences, "an older fence: `fenced`", "wrong_state, not as fenced"),
-        ("controller", NeverTooLate, "orders too late, too long, of another boot: `expired`", "not as exp"),
+        ("controller", NeverTooLate, "commands too late, too long, of another boot: `expired`", "not as exp"),
         ("controller", StopsForTheCommanderOnly, "`pause` and `abort` need no lease", "not_the_commander"),
         ("controller", StopsForTheCommanderOnly, "anybody may pause; only the commander resumes", "refused"),
         ("controller", HeedsNobodysLease, "without the lease: `not_the_commander`", "wrong_state, not as"),
@@ -295,9 +295,9 @@ class WantsPiecesInOrder(Inbox):
         ("controller", GoesOnByItself, "nothing moves by itself after a restart: PAUSED", "it is RUNNING"),
         ("agent", ReadsStrictly, "fields that are not known are passed over", "to be passed over"),
         ("agent", ReadsNothing, "messages that are cut off are Malformed", "answered with Info"),
-        ("agent", LosesEvents, "a run goes stop by stop to FINISHED", "tells ['Arrived', 'Scanned']"),
-        ("agent", TellsAllStops, "110 stops are told in a small state, without gaps", "a state "),
-        ("agent", SaysNothingOfItself, "the state is told at least every second", "0 states came"),
+        ("agent", LosesEvents, "a run goes stop by stop to FINISHED", "reports ['Arrived', 'Scanned']"),
+        ("agent", TellsAllStops, "110 stops are reported in a small state, without gaps", "a state "),
+        ("agent", SaysNothingOfItself, "the state is published at least every second", "0 states came"),
         ("inbox", TakesDamage, "a damaged chunk is found at the commit: `digest`", "Rejected malformed"),
         ("controller", AsksStopsForTheRun, WHATEVER_IT_NAMES, "pause was refused: wrong_run"),
         ("inbox", TakesOldRevisions, "a revision before the stored one: `older_revision`", "with Ready"),
@@ -305,7 +305,7 @@ class WantsPiecesInOrder(Inbox):
         ("recorder", LosesEntriesOfTheRecord, RECORD_WHOLE, "the entries are numbered [1, 3"),
         ("inbox", WantsPiecesInOrder, "chunks may come in any order", "Rejected incomplete"),
         ("agent", TellsNoEvents, "a run goes stop by stop to FINISHED", "an event cannot be read"),
-        ("agent", RepeatsItsPoses, "the way of a run is kept without gaps", "does not go on behind"),
+        ("agent", RepeatsItsPoses, "the poses of a run are stored without gaps", "does not go on behind"),
         ("agent", AnswersInBrackets, "numbered from 1 without gaps", "an answer cannot be read"),
         ("recorder", KeepsNoPoses, RECORD_WHOLE, "the record has no pose"),
         ("inbox", GivesNonsenseBack, "what is stored comes back in parts", "what is stored cannot be read"),
@@ -351,8 +351,8 @@ class SealsNoStates(KeySeals):
     ("broken", "requirement", "why"),
     [
         (BelievesEverybody, "a wrong signature: `untrusted`", "was answered with Info"),
-        (BelievesEverybody, "a question without a seal: `untrusted`", "was answered with Info"),
-        (SealsNoStates, "states are sealed, numbered and fresh", "it is not signed"),
+        (BelievesEverybody, "a query without a signature: `untrusted`", "was answered with Info"),
+        (SealsNoStates, "states are signed, numbered and fresh", "it is not signed"),
     ],
 )
 def test_a_robot_that_seals_or_judges_wrongly_is_found(

@@ -35,11 +35,11 @@ pytestmark = pytest.mark.usefixtures("own_time")
 def test_our_own_station_meets_every_requirement() -> None:
     found = verdicts(StationUnderTest())
     assert {text: one.reason for text, one in found.items() if one.outcome == "failed"} == {}
-    assert {one.section for one in found.values() if one.outcome == "not tried"} == {"Seals"}
+    assert {one.section for one in found.values() if one.outcome == "not tried"} == {"Signatures"}
 
 
 def test_our_own_station_with_keys_meets_what_is_said_of_seals(tmp_path: Path) -> None:
-    found = verdicts(StationUnderTest(keys_of_site(tmp_path / "site")), "Seals")
+    found = verdicts(StationUnderTest(keys_of_site(tmp_path / "site")), "Signatures")
     assert {text: one.reason for text, one in found.items() if one.outcome != "passed"} == {}
 
 
@@ -151,19 +151,19 @@ def _parameters(details: dict[str, Any]) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("broken", "requirement", "why"),
     [
-        (NewIdEachTime, "an answer lost: the same order again, under its id", "under 2 ids"),
-        (CallsSilenceDone, "no answer: told as unknown, one id", "exit code 0, not 3"),
-        (TriesRefusedOrdersAgain, "a refusal is told, and not tried again", "ordered 2 times"),
-        (TakesOverAlways, "another's lease is not taken unasked", "exit code 0, not 1"),
+        (NewIdEachTime, "an answer lost: the same command again, under its id", "under 2 ids"),
+        (CallsSilenceDone, "no answer: reported as unknown, one id", "exit code 0, not 3"),
+        (TriesRefusedOrdersAgain, "a refusal is reported, and not tried again", "ordered 2 times"),
+        (TakesOverAlways, "another's lease is not taken without a request", "exit code 0, not 1"),
         (AsksBeforeItStops, "`pause` is sent without asking, and small", "not reported as done"),
         (SendsEverythingAgain, "a cut: goes on with what is missing", "sent again"),
         (NeverLooksBack, "every chunk, then the commit, then a look", "nothing was read back"),
-        (NeverLooksBack, "done only when the state tells so", "reports another mission"),
+        (NeverLooksBack, "done only when the state reports so", "reports another mission"),
         (NewNonceEachTime, "a commit is repeated under its nonce", "under 2 nonces"),
         (ReadsInfoStrictly, "fields that are not known are passed over", "cannot be started"),
-        (LeavesGaps, "poses that were missed are asked for", "are not asked for"),
+        (LeavesGaps, "poses that were missed are requested", "are not requested"),
         (CountsInWords, "every chunk, then the commit, then a look", "a chunk's number: 'first'"),
-        (SeesOneOfTwo, "two boots: no order, both paused", "though two robots"),
+        (SeesOneOfTwo, "two boots: no command, both paused", "though two robots"),
     ],
 )
 def test_a_broken_station_is_found_by_the_requirement_that_names_it(
@@ -199,8 +199,8 @@ class Credulous(StationUnderTest):
 @pytest.mark.parametrize(
     ("requirement", "why"),
     [
-        ("an Info whose seal does not hold: no order", "reported as done"),
-        ("an answer whose seal does not hold: unknown", "exit code 0, not 3"),
+        ("an Info without a valid signature: no command", "reported as done"),
+        ("an answer without a valid signature: unknown", "exit code 0, not 3"),
     ],
 )
 def test_a_station_that_believes_forgers_is_found(requirement: str, why: str, tmp_path: Path) -> None:
@@ -252,4 +252,4 @@ def test_a_station_that_does_nothing_passes_nothing() -> None:
 
     found = verdicts(Idle())
     assert {one.outcome for one in found.values()} == {"not tried"}
-    assert "the station was to start and asked nothing (exit code 1)" in str(found.values())
+    assert "the station was to start and sent no query (exit code 1)" in str(found.values())

@@ -121,11 +121,11 @@ def test_a_kept_list_that_is_damaged_is_told_and_another_authoritys_is_not_looke
     (kept,) = state.iterdir()
     kept.write_bytes(kept.read_bytes().replace(b'"number":1', b'"number":0'))
     with pytest.raises(
-        InputError, match=r"revoked-\w+\.json: the newest list .* is damaged; copy .* remove this one"
+        InputError, match=r"revoked-\w+\.json: the stored list .* is damaged; copy .* remove this one"
     ):
         read_keys(site / "r1", now=now_utc(), state=state)
     with pytest.raises(
-        InputError, match=r"revoked-\w+\.json: the newest list .* is damaged; copy .* remove this one"
+        InputError, match=r"revoked-\w+\.json: the stored list .* is damaged; copy .* remove this one"
     ):
         Certificates(keys, now_utc, state)
     another = keys_of_site(tmp_path / "another")

@@ -136,7 +136,7 @@ def test_a_robot_on_its_way_home_takes_no_revision() -> None:
     field = running()
     field.controller.step()
     field.order("home")
-    with pytest.raises(NegativeResult, match="on its way home"):
+    with pytest.raises(NegativeResult, match="drives home"):
         field.station().push(LONGER)
 
 

@@ -121,7 +121,7 @@ def test_a_robot_whose_commander_is_gone_holds_though_others_watch(site: Path, w
         field.clock.wait(5.0)
         field.controller.on_link_silence(silence(field))
     assert field.controller.run.state == "HELD"
-    assert "no station heard" in str(field.controller.run.reason)
+    assert "no data from a station" in str(field.controller.run.reason)
 
 
 def test_a_commander_who_watches_is_in_contact_between_two_questions_and_not_after_its_token(

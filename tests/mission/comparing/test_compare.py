@@ -82,7 +82,7 @@ def test_a_run_as_planned_saw_what_was_planned() -> None:
     assert judge(whole).answer == "yes"
     assert (
         judge(whole).text
-        == "Acquired. 78.5 % of what is visible was scanned; 70.0 % was asked, 78.5 % planned."
+        == "Acquired. 78.5 % of what is visible was scanned; 70.0 % was required, 78.5 % planned."
     )
 
 

@@ -16,7 +16,7 @@ from tests.mission.comparing.test_compare import START, planned, visit
 from tests.mission.comparing.told import at, told
 from tests.mission.worlds import square_tour
 
-BLOCKED = {"reason": "the way to S2 is blocked at (4.00, 1.50): a pallet"}
+BLOCKED = {"reason": "the path to S2 is blocked at (4.00, 1.50): a pallet"}
 END = (Finished, 140.0, {})
 
 
@@ -62,7 +62,7 @@ def test_a_pose_in_an_event_is_compared_with_the_poses_sent(x: float, answer: st
     assert (run.stops[0].disputed_m is None) == (answer == "yes")
     if answer == "unknown":
         assert judge(run).exit_code == 3
-        assert "S1 cannot be told: event and sent poses are 3500 mm apart" in judge(run).text
+        assert "S1 is undecided: event and sent poses are 3500 mm apart" in judge(run).text
         assert "3500 mm apart" in comparison_table(run)
 
 

@@ -141,7 +141,7 @@ def test_a_part_that_is_cut_off_is_told_where_there_are_no_rooms() -> None:
         box(0, 0, 12, 4), elements=(shell(0, 0, 12, 4), wall("cut", box(8, 0, 8.2, 4)), column("c", 2, 2))
     )
     (piece,) = figures_of(floor).unreached
-    assert piece.room == "a piece of floor"
+    assert piece.room == "an area of floor"
     assert piece.area_m2 == pytest.approx((3.8 - 0.7) * (4 - 0.7), abs=0.5)
 
 

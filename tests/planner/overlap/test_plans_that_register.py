@@ -90,7 +90,8 @@ def test_a_plan_that_nobody_asked_to_register_tells_into_how_many_pieces_its_sca
     (told,) = [item for item in report.figures.findings if item.code == "scans_not_joined"]
     joined = Network(tuple(stop_names(len(report.mission.stops))), registered_pairs(report.part.route))
     assert len(joined.pieces) > 1
-    assert told.message.startswith(f"the scans fall into {len(joined.pieces)} pieces that no overlap joins")
+    count = len(joined.pieces)
+    assert told.message.startswith(f"the scans fall into {count} components that no overlap connects")
     assert told.message in report.as_text()
     assert report.strict_exit_code == 0, "a surveyor may have spheres"
 

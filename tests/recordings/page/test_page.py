@@ -57,7 +57,7 @@ def skipping() -> ReportSubject:
 def test_a_run_tells_its_verdict_and_every_figure() -> None:
     subject = skipping()
     text = words(report_html(subject))
-    assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was asked, 78.5 % planned." in text
+    assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was required, 78.5 % planned." in text
     assert "stops scanned 1 / 2" in text
     assert "−21.4 %" in text
     assert "greatest cross-track error 10.0 mm" in text

@@ -54,7 +54,7 @@ def test_a_skipped_stop_is_told_with_what_it_cost(
     assert told["stops"][1]["lost"] == pytest.approx(3 / 14)
     assert main(["review", str(sighted), str(skipping)]) == 1
     text = capsys.readouterr().out
-    assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was asked, 78.5 % planned." in text
+    assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was required, 78.5 % planned." in text
     assert "skip by ann" in text
     command = f"stopgo replay {skipping} --mission mission.json --floor FLOOR --top-up next.json"
     assert text.rstrip().endswith(

@@ -245,7 +245,7 @@ def test_a_blocked_leg_is_held_and_driven_once_the_way_is_free(
         station.command("start")
         reports = station.reports()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert held.reason.startswith("the way to s2 is blocked at (")
+        assert held.reason.startswith("the path to s2 is blocked at (")
         # It presses against the wall: by its estimate, which wanders, it stands there or moves about.
         assert re.search(r"(stopped|getting nearer than) (0\.9|1\.0)\d m", held.reason)
         monkeypatch.setattr(Chassis, "move", taken_away)

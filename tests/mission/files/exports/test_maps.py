@@ -63,7 +63,7 @@ def test_rows_end_as_rfc_4180_says() -> None:
 def test_the_way_back_is_told_of_where_it_is_left_out() -> None:
     notes = FORMATS["csv"].notes
     assert notes(from_the_first_stop(), Supplements()) == ()
-    assert "way back" in notes(laboratory(), Supplements())[0]
+    assert "path back" in notes(laboratory(), Supplements())[0]
 
 
 def features(mission: Mission, supplements: Supplements | None = None) -> list[dict]:

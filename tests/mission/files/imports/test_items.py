@@ -106,7 +106,10 @@ REFUSED: dict[str, tuple[tuple[Row, ...], str]] = {
     "home": ((waypoint(hold=5), command(20)), r"item 2 \(NAV_RETURN_TO_LAUNCH 20\).*draw it as waypoints"),
     "jump": ((waypoint(hold=5), command(177, 1, 2)), r"item 2 \(DO_JUMP 177\)"),
     "unheard of": ((waypoint(hold=5), command(4711)), r"item 2 \(command 4711\)"),
-    "speed on the way": ((waypoint(hold=5), SPEED), r"item 2 \(DO_CHANGE_SPEED 178\) changes the speed on"),
+    "speed on the way": (
+        (waypoint(hold=5), SPEED),
+        r"item 2 \(DO_CHANGE_SPEED 178\) changes the speed during",
+    ),
     "speed of nothing": ((command(178, 1, -1), waypoint(hold=5)), r"item 1 .* sets speed -1"),
     "trigger at no place": ((CAPTURE, waypoint(hold=5)), "before the first waypoint"),
     "two triggers": ((waypoint(hold=5), CAPTURE, delay(3), CAPTURE), "a stop has one scan"),

@@ -136,7 +136,7 @@ def test_a_model_without_storeys_is_read_at_a_level(read: Read) -> None:
     house.box("IfcSlab", "slab", (0, 0, 9.8, 6, 5, 10))
     house.box("IfcWall", "wall", (0, 0, 10, 6, 0.2, 13))
     with pytest.raises(
-        InputError, match=r"no storeys; say where the floor lies with --level Z .*stand at 10 m"
+        InputError, match=r"no storeys; give the level of the floor with --level Z .*are at 10 m"
     ):
         read(house, storey=None)
     assert read(house, storey=None, level=10.0).area == pytest.approx(30)
