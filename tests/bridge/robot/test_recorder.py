@@ -228,7 +228,7 @@ def test_health_is_written_down_when_it_changes(tmp_path: Path) -> None:
 
 
 def test_what_follows_without_a_record_is_told_with_the_number_of_poses_that_are_kept() -> None:
-    assert f"its last {POSES_KEPT} poses" in WITHOUT[RECORD]
+    assert f"{POSES_KEPT} poses" in WITHOUT[RECORD]
 
 
 def test_a_disk_that_does_not_answer_delays_no_pose_and_no_state(tmp_path: Path) -> None:

@@ -212,7 +212,7 @@ def test_how_far_off_a_pose_is() -> None:
 
 
 def test_rays_are_told_by_the_step() -> None:
-    fan = RayFan.of(replace(COARSE, fov_deg=90.0, step_deg=1.0), heading=0.0)
+    fan = RayFan.of(replace(COARSE, fov_deg=90.0, step_deg=1.0, cone_deg=60.0), heading=0.0)
     assert len(fan.azimuth) == 90
     assert math.degrees(fan.azimuth[0]) == pytest.approx(-44.5)
     assert math.degrees(fan.elevation[0]) == pytest.approx(-59.5)
