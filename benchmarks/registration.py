@@ -207,7 +207,7 @@ def main(paths: list[str]) -> None:
         good += [registers(row) for row in rows]
         for several, constants in zip(figures, COUNTS.values(), strict=True):
             with counting(**constants):
-                several += counted(floor, settings, rows) if rows else []
+                several.extend(counted(floor, settings, rows) if rows else [])
     lines = [
         _line(name, rule, list(zip(*figures, strict=True)), np.array(good)) for name, rule in RULES.items()
     ]
