@@ -94,6 +94,16 @@ class Overlaps:
         middle: FloatArray = a + (b - a) / np.hypot(*(b - a)) * (begin[longest] + end[longest]) / 2
         return middle
 
+    def normal_matrix(self, row: int, other: int) -> FloatArray:
+        """N of a pair about the local origin (3, 3), without the lever."""
+        there, begin, end = self._common(row)
+        own = self._row[there] == other
+        index = np.zeros(int(own.sum()), dtype=np.int64)
+        found: FloatArray = self._moments(
+            self._seen.face[there[own]], begin[own] + EDGE_M, end[own] - EDGE_M, index, 1
+        )[0]
+        return found
+
     def _common(self, row: int, *, first: int = 0) -> tuple[IntArray, FloatArray, FloatArray]:
         """Stretches that a row and another (from `first` on) both see: the other's stretch, begin, end."""
         seen = self._seen

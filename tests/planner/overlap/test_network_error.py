@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from stopgo.mission.geometry import FloatArray
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.overlap.network_error import information_of, scan_errors
-from stopgo.planner.overlap.pairs import FLOOR_M, LEVER_M, NOISE_M
+from stopgo.planner.overlap.pairs import FLOOR_M, LEVER_M, NOISE_M, error_of
+from stopgo.planner.overlap.registered import predicted_errors, registered_pairs
+from tests.planner.worlds import two_rooms
 
 HERE = np.zeros((4, 2))
 ONE = np.diag([1e6, 1e6, 1e6])
@@ -56,3 +61,13 @@ def test_the_information_of_a_pair_is_that_of_its_walls_wherever_the_origin_is(
     moments: FloatArray = to_point.T @ about @ to_point
     errors = scan_errors(np.array([point, point]), [(0, 1)], [information_of(moments, point)], [0])
     assert errors[1] == pytest.approx(math.hypot(NOISE_M / 3, FLOOR_M), rel=1e-6)
+
+
+def test_a_plan_reports_the_worst_predicted_error() -> None:
+    made = plan(two_rooms(0.9), Settings(overlap=0.1)).first
+    errors = predicted_errors(made.route)
+    (pair,) = registered_pairs(made.route)
+    assert sorted(errors > 0) == [False, True]
+    assert errors.max() < 2 * float(error_of(np.array([pair.hold_m]))[0])
+    line = f"at s0{int(np.argmax(errors)) + 1}: {1000 * errors.max():.1f} mm (standard deviation)"
+    assert line in PlanReport(made, {}, {}).as_text()
