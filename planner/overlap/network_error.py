@@ -26,8 +26,7 @@ def information_of(moments: FloatArray, at: FloatArray) -> FloatArray:
     from_point = np.linalg.inv(to_point)
     alone = NOISE_M**2 * np.linalg.inv(moments)
     least = FLOOR_M**2 * np.diag([1.0, 1.0, 1.0 / LEVER_M**2])
-    found: FloatArray = np.linalg.inv(alone + from_point @ least @ from_point.T)
-    return found
+    return np.asarray(np.linalg.inv(alone + from_point @ least @ from_point.T), np.float64)
 
 
 def scan_errors(
