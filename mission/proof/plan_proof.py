@@ -24,6 +24,11 @@ REGISTERED_M = 0.01
 REGISTERED_DEG = 0.1
 
 
+def within_tolerance(error_m: float, error_deg: float) -> bool:
+    """Return True if a pose with this error counts as registered."""
+    return error_m < REGISTERED_M and error_deg < REGISTERED_DEG
+
+
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
     """Assumptions of the simulation of a mission; the scanner is level."""
@@ -128,11 +133,14 @@ class ScanPair:
     error_m: float
     """At the worst of the start poses."""
     error_deg: float
+    least_error_m: float = 0.0
+    """At the best of the start poses."""
+    starts: int = 1
+    """Start poses tried: all of them, or up to the first that misses."""
 
     @property
     def registered(self) -> bool:
-        near = self.error_m < REGISTERED_M and self.error_deg < REGISTERED_DEG
-        return near and self.free_deg is None
+        return within_tolerance(self.error_m, self.error_deg) and self.free_deg is None
 
 
 @dataclass(frozen=True)

@@ -84,6 +84,8 @@ def _pair(item: ScanPair) -> dict[str, Any]:
         "free_deg": None if item.free_deg is None else round(item.free_deg, 1),
         "error_m": round(item.error_m, 5),
         "error_deg": round(item.error_deg, 4),
+        "least_error_m": round(item.least_error_m, 5),
+        "starts": item.starts,
         "registered": item.registered,
     }
 
@@ -163,7 +165,9 @@ def network_words(proof: PlanProof) -> list[str]:
 def pair_words(pair: ScanPair) -> str:
     """Return the line of one pair, with its error."""
     name = f"{pair.a} and {pair.b}: overlap {percent(pair.shared)}"
-    off = f"{1000 * pair.error_m:.1f} mm and {pair.error_deg:.3f}° off"
+    least, most = (f"{1000 * error:.1f}" for error in (pair.least_error_m, pair.error_m))
+    interval = most if pair.starts == 1 or least == most else f"{least} to {most}"
+    off = f"{interval} mm and {pair.error_deg:.3f}° off"
     if pair.free_deg is not None:
         return f"{name}, unconstrained along {pair.free_deg:.0f}°, {off}"
     return f"{name}, {off}"

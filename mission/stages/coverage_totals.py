@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from stopgo.mission.stages import Visibility, weights_of
+from stopgo.mission.stages import NavigableSpace, Visibility, weights_of
 from stopgo.mission.stages.figures import Share, Shares, worst_first
 
 OUTSIDE = "in no room"
@@ -127,17 +127,24 @@ class CoverageTotals:
 
 def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> CoverageTotals:
     """Return the totals of a plan; `why` has the reason by room where the robot does not go."""
-    space, targets = visibility.space, visibility.targets
-    settings, reasons, asked = space.settings, why or {}, space.settings.least_of_room
+    return totals_of(visibility.space, visibility.visible, visibility.asked, why)
+
+
+def totals_of(
+    space: NavigableSpace, visible: BoolArray, asked: IntArray, why: Mapping[str, str] | None = None
+) -> CoverageTotals:
+    """Return the totals of a space, from the visible units (n,) and the required views of each (n,)."""
+    targets, settings, reasons = space.targets, space.settings, why or {}
+    least = settings.least_of_room
     return CoverageTotals(
         rule=settings.coverage_rule,
         weight=weights_of(targets, settings),
-        visible=visibility.visible,
+        visible=visible,
         room=space.unit_room,
         element=frozen(targets.element[targets.unit_segment], np.int64),
-        rooms=tuple(Group(room.name, asked, reasons.get(room.name, "")) for room in space.rooms),
+        rooms=tuple(Group(room.name, least, reasons.get(room.name, "")) for room in space.rooms),
         elements=tuple(Seen(item.id, item.kind) for item in space.floor.elements),
         required=settings.coverage,
         kind_required=settings.least_of_kind,
-        asked=visibility.asked,
+        asked=asked,
     )

@@ -11,7 +11,7 @@ from stopgo.mission.stages.coverage_totals import ledger_of
 from stopgo.mission.stages.covered_intervals import seen_units
 from stopgo.mission.stages.figures import Figures, Shares
 from stopgo.planner.appraisal.plausibility import floor_of_rooms, near_legs, plausibility_findings
-from stopgo.planner.appraisal.quality import NOT_MET, not_met, quality_of
+from stopgo.planner.appraisal.quality import FEWER_VIEWS, NOT_MET, fewer_views, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.overlap.registered import SCANS_APART, scans_apart
@@ -26,7 +26,8 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     parts = planned or frozenset([candidates.chosen_part])
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
-    doubts = (*plausibility_findings(route, reached_m2=reached), *not_met(selection), *scans_apart(route))
+    views = (*not_met(selection), *fewer_views(selection))
+    doubts = (*plausibility_findings(route, reached_m2=reached), *views, *scans_apart(route))
     findings = (*space.findings, *doubts)
     shares = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(
@@ -47,7 +48,7 @@ def figures_of_share(route: Route, whole: Figures) -> Figures:
     shares = shares_of(route.selection, why={item.room: item.why for item in whole.unreached})
     space = route.space
     doubts = plausibility_findings(route, reached_m2=whole.reached_m2)
-    of_all = (item for item in whole.findings if item.code in (NOT_MET, *SCANS_APART))
+    of_all = (item for item in whole.findings if item.code in (NOT_MET, FEWER_VIEWS, *SCANS_APART))
     findings = (*space.findings, *doubts, *of_all)
     return replace(
         whole,

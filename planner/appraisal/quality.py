@@ -20,6 +20,7 @@ from stopgo.planner.visibility import within_all_limits
 from stopgo.planner.visibility.limited import without_limit
 
 NOT_MET = "limits_not_met"
+FEWER_VIEWS = "fewer_views"
 MOST_NAMED = 5
 """Rooms and kinds that a finding names."""
 
@@ -75,4 +76,20 @@ def not_met(selection: Selection) -> Iterator[Finding]:
             NOT_MET,
             f"seen {', '.join(limits.values())} can be, of the visible targets, only: "
             f"{', '.join(short[:MOST_NAMED])}{more}; lower --grid or --clearance, or ask for less",
+        )
+
+
+def fewer_views(selection: Selection) -> Iterator[Finding]:
+    """A finding if targets count although fewer stops see them than required: no more candidates do."""
+    seen = selection.visibility
+    required = seen.settings.least_views
+    counted = seen.seen_from(selection.chosen) & seen.visible
+    fewer = frozen(counted & (seen.views_from(selection.chosen) < required), np.bool_)
+    if fewer.any():
+        ledger = ledger_of(seen)
+        unit = "units" if ledger.rule == "paper" else "m"
+        yield Finding(
+            FEWER_VIEWS,
+            f"{ledger.amount(fewer):.1f} {unit} count as seen from fewer than {required} stops, as no more "
+            "candidates see them; lower --grid for more candidates",
         )

@@ -22,6 +22,7 @@ from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import DIGITS, Coverage
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
 from stopgo.mission.stages import Candidates, NavigableSpace, weights_of
+from stopgo.mission.stages.coverage_totals import totals_of
 from stopgo.mission.stages.figures import percent
 from stopgo.planner.candidates import STRATEGIES, candidates
 from stopgo.planner.geometry.shapes import local_origin
@@ -93,7 +94,7 @@ def recount(mission: Mission, space: NavigableSpace) -> Recount:
     lines = SightLines(space)
     by_stop = tuple(_seen_from(stop, space, lines) for stop in mission.stops)
     try:
-        views = _candidate_views(_candidates(mission, space), lines)
+        views = _candidate_views(candidates_of(mission, space), lines)
     except (NegativeResult, InputError) as error:
         return Recount(space, by_stop, None, str(error))
     return Recount(space, by_stop, views)
@@ -111,7 +112,7 @@ def _seen_from(stop: Stop, space: NavigableSpace, lines: SightLines) -> IntArray
     return units[in_view(direction, stop.heading, fov=math.radians(space.settings.fov))]
 
 
-def _candidates(mission: Mission, space: NavigableSpace) -> Candidates:
+def candidates_of(mission: Mission, space: NavigableSpace) -> Candidates:
     """All candidates in the mission's part of the floor."""
     if space.settings.candidates not in STRATEGIES:
         raise InputError(
@@ -155,12 +156,24 @@ def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) ->
     claimed, seen = sum(stop.sees.new_units for stop in mission.stops), int(counted.seen.sum())
     if seen < claimed:
         yield _less("$.stops[*].sees.new_units", claimed, seen, "all stops see")
-    least, share = counted.space.settings.coverage, counted.share
-    alone = mission.share is UNSET  # else the other missions cover the rest
-    if alone and claimed and share is not None and share < least - NOISE:
-        yield Problem("$.origin.parameters.coverage", f"is {least:g}, but the stops see {counted.in_words()}")
+    if mission.share is UNSET and claimed:  # else the other missions cover the rest
+        yield from _shortfalls(counted)
     if coverage is not None:
         yield from _coverage_overclaims(coverage, counted)
+
+
+def _shortfalls(counted: Recount) -> Iterator[Problem]:
+    """Required coverages, of the whole and of every room and kind, that the stops do not reach."""
+    least, share = counted.space.settings.coverage, counted.share
+    if share is not None and share < least - NOISE:
+        yield Problem("$.origin.parameters.coverage", f"is {least:g}, but the stops see {counted.in_words()}")
+    if counted.visible is None:
+        return
+    shares = totals_of(counted.space, counted.visible, frozen([1], np.int64)).shares(counted.seen)
+    for key, groups in (("room_coverage", shares.rooms), ("kind_coverage", shares.kinds)):
+        for item in (item for item in groups if not item.met):
+            text = f"is {item.required:g}, but the stops see {percent(item.coverage)} of {item.name}"
+            yield Problem(f"$.origin.parameters.{key}", f"{text}, counted line by line")
 
 
 def _less(path: str, claimed: int, counted: int, who: str) -> Problem:

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.document.problems import Problem
-from stopgo.mission.document.specs import limits_spec_of
+from stopgo.mission.document.specs import limits_spec_of, robot_of
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
@@ -29,6 +29,11 @@ from stopgo.planner.space.targets import solid_of
 
 ALLOWED = SLACK + CLEAR_SLACK
 """Tolerance of clearances in metres: that of planning, and the rounding of missions."""
+
+FASTEST = 10.0
+"""Speed in m/s that no scanning robot drives between walls, whatever the parameters are."""
+LOOSEST = 1.0
+"""Position error in metres with which no scan is where it was planned, whatever the parameters are."""
 
 
 def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterator[Problem]:
@@ -55,6 +60,27 @@ def other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
             yield Problem(path, f"is {sent:g}, but $.origin.parameters.{key} planned with {planned:g}")
     if mission.limits != limits_spec_of(settings):
         yield Problem("$.limits", "are not those that $.origin.parameters planned with")
+    if any(stop.sees.units for stop in mission.stops):  # an imported mission has its own values
+        yield from _bolder_than_planned(mission, settings)
+
+
+def _bolder_than_planned(mission: Mission, settings: Settings) -> Iterator[Problem]:
+    """Motion faster, scans shorter and positions less accurate than the plan's parameters."""
+    planned, robot = robot_of(settings), mission.robot
+    yield from _above("$.robot.speed", robot.speed, min(planned.speed, FASTEST))
+    yield from _above("$.robot.turn_rate", robot.turn_rate, planned.turn_rate)
+    yield from _above("$.robot.acceleration", robot.acceleration, planned.acceleration)
+    for index, stop in enumerate(mission.stops):
+        path = f"$.stops[{index}]"
+        yield from _above(f"{path}.tolerance_m", stop.tolerance_m, min(settings.tolerance, LOOSEST))
+        if stop.scan.duration_s < settings.scan_time * (1 - 1e-6):
+            duration = f"is {stop.scan.duration_s:g}, but the plan's scans take {settings.scan_time:g} s"
+            yield Problem(f"{path}.scan.duration_s", duration)
+
+
+def _above(path: str, sent: float, most: float) -> Iterator[Problem]:
+    if sent > most * (1 + 1e-6):
+        yield Problem(path, f"is {sent:g}; the plan allows at most {most:g}")
 
 
 @dataclass(frozen=True)
@@ -83,6 +109,8 @@ class _Fit:
         point = shapely.Point(np.array([stop.x, stop.y]) - self.ground.origin)
         doorway = stop.doorway and any(point.distance(line) <= ALLOWED for line in self._doorways)
         name = f"{stop.id} at {_point_text((stop.x, stop.y))}"
+        if stop.doorway and not doorway:
+            yield Problem(f"{path}.doorway", f"is true, but {name} is in no doorway that the robot passes")
         if (off := self._off(point)) is not None:
             yield Problem(path, f"{name} {off}")
         elif not doorway and (fault := self._worst(point, self.stops)) is not None:

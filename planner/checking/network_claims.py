@@ -10,26 +10,43 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 import shapely
+from scipy.sparse.csgraph import connected_components
 
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Stop, mission_id
 from stopgo.mission.document.problems import Problem
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import NavigableSpace
+from stopgo.mission.stages.network import network_of
+from stopgo.planner.checking.claims import candidates_of
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
-from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M
+from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
 from stopgo.planner.overlap.pairs import Overlaps
+from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door
 from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 ROUNDED = 1e-5
 """Tolerance of a pair's figures, which are sums of rounded lengths."""
+REQUIRED = "$.origin.parameters.overlap requires scans that register with one another"
 LEAST = {"common_m": LEAST_COMMON_M, "hold_m": LEAST_HOLD_M}
 
 
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
-    """Every pair of the mission's network with a weaker registration than claimed or required."""
-    if isinstance(mission.network, msgspec.UnsetType) or not mission.network:
+    """Every pair that registers less well than claimed or required, and pairs that are missing."""
+    required = space.settings.least_overlap > 0
+    if isinstance(mission.network, msgspec.UnsetType):
+        if required and len(mission.stops) > 1:
+            yield Problem("$.network", f"is missing, but {REQUIRED}")
+        return
+    yield from _weak_pairs(mission, space)
+    if required and mission.share is msgspec.UNSET and _is_whole(mission, space):
+        yield from _separate_scans(mission, space)
+
+
+def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+    """Every pair with a weaker registration than claimed or required."""
+    if not mission.network:
         return
     overlaps = _overlaps(mission, space)
     row = {stop.id: k for k, stop in enumerate(mission.stops)}
@@ -45,6 +62,30 @@ def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Prob
                 yield Problem(path, f"is {claimed:g}, but {counted_text}")
             elif counted < needed - ROUNDED:
                 yield Problem(path, f"is {claimed:g}: {counted_text}; a pair that registers has {needed:g}")
+
+
+def _is_whole(mission: Mission, space: NavigableSpace) -> bool:
+    """True for a plan's own mission; a follow-up mission (another id) also joins earlier scans."""
+    floor, made_by = space.floor, mission.origin.stopgo
+    parts = range(len(reach_of(space).parts.areas))
+    return mission.id in {mission_id(floor.source, space.settings, made_by, part) for part in parts}
+
+
+def _separate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+    """Components of the network that candidates could connect, as every plan does."""
+    network = network_of(mission)
+    if network is None or len(network.pieces) < 2:
+        return
+    found = candidates_of(mission, space)
+    _, region = connected_components(links_of(found), directed=False)
+    xy = found.xy[found.kept]
+    at = {stop.id: np.flatnonzero(np.hypot(*(xy - (stop.x, stop.y)).T) < 1e-5) for stop in mission.stops}
+    owner: dict[int, int] = {}
+    for number, piece in enumerate(network.pieces):
+        for reached in {int(region[row]) for stop in piece for row in at[stop]}:
+            if owner.setdefault(reached, number) != number:
+                yield Problem("$.network", f"leaves {' '.join(piece)} apart, but {REQUIRED}")
+                return
 
 
 def _overlaps(mission: Mission, space: NavigableSpace) -> Overlaps:

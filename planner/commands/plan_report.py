@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from stopgo.mission.console.table import duration, printable
 from stopgo.mission.document import Mission
 from stopgo.mission.document.problems import Problem
@@ -18,6 +20,7 @@ from stopgo.mission.plan import PartPlan
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures, Share, percent
 from stopgo.mission.stages.network import Network, network_lines, network_of, network_table
+from stopgo.planner.overlap.registered import predicted_errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +122,16 @@ class PlanReport:
             ],
         }
 
+    def _error_lines(self) -> list[str]:
+        """Line on the scan with the greatest predicted error in the frame of its network."""
+        if self.network is None or not self.network.overlaps:
+            return []
+        errors = predicted_errors(self.part.route)
+        worst = int(np.argmax(np.where(np.isfinite(errors), errors, -1.0)))
+        frame = self.network.stops[int(np.argmin(errors))]
+        at = f"{self.network.stops[worst]}: {1000 * errors[worst]:.1f} mm (standard deviation)"
+        return [f"    error     predicted, in the frame of {frame}, at most at {at}"]
+
     def as_text(self) -> str:
         """Return the lines for a person: the plan, its coverage, the floor left out, and the findings."""
         result, figures = self.as_json(), self.figures
@@ -136,6 +149,7 @@ class PlanReport:
             *self._time_lines(),
             *quality_lines(figures),
             *network_lines(self.network),
+            *self._error_lines(),
             *coverage_lines(figures),
         ]
         lines += [f"  unreached   {printable(room.text)}" for room in figures.unreached]

@@ -24,6 +24,12 @@ from stopgo.planner.visibility.unit_ranges import ranges, runs_of
 
 PIECE_M = 0.05
 """Length in metres of the boundary's pieces, independent of the plan's units."""
+USUAL_STEP_DEG = 0.1
+"""Angle between neighbouring rays of a scanner that is not given."""
+MOST_SPACING_M = 0.15
+"""Largest spacing of points with which a surface has a direction: two cells of a thinned cloud."""
+MOST_INCIDENCE_DEG = 85.0
+"""Flattest angle from the surface normal at which a scanner measures a surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +122,8 @@ def shown_by(
 ) -> ShownBoundary:
     """The boundary shown from positions (rows, 2), local metres, that see these pieces all round.
 
-    With a field of view below 360° only the part within it about each `heading` (rows,) is shown.
+    With a field of view below 360° only the part within it about each `heading` (rows,) is shown. What the
+    scanner sees too flat or too sparsely for a surface with a direction is not shown.
     """
     face = np.repeat(np.arange(len(boundary.pieces)), boundary.pieces)
     if heading is not None and settings.fov < 360:
@@ -128,14 +135,42 @@ def shown_by(
     first, last = (np.concatenate([empty, *(run[k] for run in runs)]) for k in range(2))
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[face[first]]
     piece = (np.hypot(*(boundary.b - boundary.a).T) / boundary.pieces)[face[first]]
+    row = np.repeat(np.arange(len(xy)), [len(run[0]) for run in runs])
+    low, high = _measured(boundary, face[first], xy[row], step=_step_of(settings))
+    begin = np.maximum((first - start) * piece, low)
+    end = np.minimum((last + 1 - start) * piece, high)
+    some = end > begin
     return ShownBoundary(
         boundary=boundary,
-        pointer=frozen(np.cumsum([0, *(len(run[0]) for run in runs)]), np.int64),
-        face=frozen(face[first], np.int64),
-        begin=frozen((first - start) * piece),
-        end=frozen((last + 1 - start) * piece),
+        pointer=frozen(np.searchsorted(row[some], np.arange(len(xy) + 1)), np.int64),
+        face=frozen(face[first][some], np.int64),
+        begin=frozen(begin[some]),
+        end=frozen(end[some]),
         xy=frozen(xy),
     )
+
+
+def _step_of(settings: Settings) -> float:
+    """Radians between neighbouring rays."""
+    return math.radians(settings.angular_step or USUAL_STEP_DEG)
+
+
+def _measured(
+    boundary: Boundary, face: IntArray, xy: FloatArray, *, step: float
+) -> tuple[FloatArray, FloatArray]:
+    """Stretch of each face (n,) that a scan from each position (n, 2) measures, metres from its start.
+
+    At distance d and incidence i points are d step / cos i apart. With h the distance from the face's line,
+    this is d² step / h. Both limits on it and on i thus bound the distance from the foot of h.
+    """
+    a, b = boundary.a[face], boundary.b[face]
+    along = (b - a) / np.hypot(*(b - a).T)[:, None]
+    to = xy - a
+    foot = to[:, 0] * along[:, 0] + to[:, 1] * along[:, 1]
+    height = np.abs(along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0])
+    dense = np.sqrt(np.maximum(0.0, height * (MOST_SPACING_M / step - height)))
+    half = np.minimum(dense, height * math.tan(math.radians(MOST_INCIDENCE_DEG)))
+    return foot - half, foot + half
 
 
 def _middles(boundary: Boundary, face: IntArray) -> FloatArray:

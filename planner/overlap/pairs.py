@@ -4,7 +4,8 @@ A wall seen by both constrains the pair across the wall and not along it. Point-
 common boundary has the normal matrix N = ∫ j jᵀ ds with j = (nx, ny, (p × n) / LEVER_M), p from the stop
 and n the face's normal (Censi, "An accurate closed-form estimate of ICP's covariance", ICRA 2007). Its least
 eigenvalue is the registration strength `hold_m`: the metres of wall that face the weakest of all small moves
-in x, y and heading. `share` is the overlap ratio. Both names are those of mission.json.
+in x, y and heading. `share` is the overlap ratio. Both names are those of mission.json. The error in the
+weakest direction is NOISE_M / √hold_m, by independent errors along the walls, and at least FLOOR_M.
 """
 
 from __future__ import annotations
@@ -21,9 +22,15 @@ from stopgo.planner.visibility.unit_ranges import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A rotation counts as its displacement at this distance: 0.1° as much as 1 cm, the tolerance of each."""
-LEAST_STRETCH_M = 0.35
-"""Least width of a common stretch. Narrower ones, such as door jambs, do not count: with points thinned to
-one per 7.5 cm they have no direction of their own, and a long wall next to them outweighs them."""
+EDGE_M = 0.14
+"""Metres at each end of a common stretch that do not count. A point's direction comes from 15 neighbours,
+thinned to one per 7.5 cm: nearer to an edge they are of two surfaces."""
+LEAST_STRETCH_M = 2 * EDGE_M
+"""Least width of a common stretch. Narrower ones, such as door jambs, have no direction of their own."""
+NOISE_M = 0.33e-3
+"""Error of the mean of one metre of wall, metres (standard deviation, times the root of the metres)."""
+FLOOR_M = 0.4e-3
+"""Error that no length of wall averages out: that of the thinned cloud."""
 DIGITS = 6
 """Decimals of a pair's figures, so that both stops of a pair have equal figures."""
 
@@ -87,6 +94,16 @@ class Overlaps:
         middle: FloatArray = a + (b - a) / np.hypot(*(b - a)) * (begin[longest] + end[longest]) / 2
         return middle
 
+    def normal_matrix(self, row: int, other: int) -> FloatArray:
+        """N of a pair about the local origin (3, 3), without the lever."""
+        there, begin, end = self._common(row)
+        own = self._row[there] == other
+        index = np.zeros(int(own.sum()), dtype=np.int64)
+        found: FloatArray = self._moments(
+            self._seen.face[there[own]], begin[own] + EDGE_M, end[own] - EDGE_M, index, 1
+        )[0]
+        return found
+
     def _common(self, row: int, *, first: int = 0) -> tuple[IntArray, FloatArray, FloatArray]:
         """Stretches that a row and another (from `first` on) both see: the other's stretch, begin, end."""
         seen = self._seen
@@ -103,7 +120,7 @@ class Overlaps:
         seen = self._seen
         there, begin, end = self._common(row, first=first)
         other, index = np.unique(self._row[there], return_inverse=True)
-        moments = self._moments(seen.face[there], begin, end, index, len(other))
+        moments = self._moments(seen.face[there], begin + EDGE_M, end - EDGE_M, index, len(other))
         common = np.bincount(index, end - begin, len(other))
         least = np.minimum(self.shown_m[row], self.shown_m[other])
         here = np.repeat(seen.xy[row][None], len(other), axis=0)
@@ -133,6 +150,11 @@ class Overlaps:
         for (i, j), entry in entries.items():
             found[:, i, j] = found[:, j, i] = np.bincount(index, entry, many)
         return found
+
+
+def error_of(hold_m: FloatArray) -> FloatArray:
+    """Predicted standard deviation in the weakest direction, metres at a distance of LEVER_M (n,)."""
+    return np.asarray(np.sqrt(FLOOR_M**2 + NOISE_M**2 / np.maximum(hold_m, 1e-12)))
 
 
 def _least_hold(moments: FloatArray, at: FloatArray) -> FloatArray:

@@ -18,6 +18,7 @@ from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap import USUAL_SHARE, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
+from stopgo.planner.overlap.network_error import information_of, scan_errors
 
 
 @instance_cached
@@ -36,6 +37,35 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
                 figures = (float(values[at]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
                 found.append(Overlap(names[k], names[later], *map(rounded, figures)))
     return tuple(found)
+
+
+def predicted_errors(route: Route) -> FloatArray:
+    """Standard deviation of each stop's scan in its worst direction, metres, in the order of driving (n,).
+
+    The frame is that of the stop, of three in the middle, with the least worst error. A scan outside
+    the largest component has the error infinity.
+    """
+    overlaps, network = _overlaps_of_stops(route), Network(stops := _names(route), registered_pairs(route))
+    number = {stop: k for k, stop in enumerate(stops)}
+    ends = [(number[pair.a], number[pair.b]) for pair in network.overlaps]
+    xy = route.xy - local_origin(route.space.floor)
+    information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
+    largest = network.pieces[0] if network.pieces else ()
+    tried = [scan_errors(xy, ends, information, [k]) for k in _middle_first(xy, [number[s] for s in largest])]
+    return min(tried, key=lambda errors: float(np.max(errors[np.isfinite(errors)], initial=0.0)))
+
+
+MOST_FRAMES = 3
+"""Stops tried as the frame of a network, those nearest to its middle."""
+
+
+def _middle_first(xy: FloatArray, rows: list[int]) -> list[int]:
+    away = np.hypot(*(xy[rows] - xy[rows].mean(axis=0)).T)
+    return [rows[k] for k in np.argsort(away, kind="stable")[:MOST_FRAMES]]
+
+
+def _names(route: Route) -> tuple[str, ...]:
+    return tuple(stop_names(len(route.order)))
 
 
 @instance_cached

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import BoolArray, FloatArray, frozen
-from stopgo.mission.proof.plan_proof import ScanPair, Simulation
+from stopgo.mission.proof.plan_proof import ScanPair, Simulation, within_tolerance
 
 VOXEL_M = 0.075
 """Clouds are thinned to a point per cube of this size."""
@@ -137,13 +137,17 @@ class _CloudPair:
         return min(float(mask.sum() / item.upright.sum()) for mask, item in pairs)
 
     @property
-    def free_deg(self) -> float | None:
-        """The unconstrained direction, which almost no shared surface faces, degrees from +x, or None."""
+    def weakest(self) -> tuple[float, float]:
+        """Fraction of the shared surface that faces the weakest direction, and its degrees from +x."""
         facing = self.one.normals[self.shared[0]][:, :2]
         weight, axes = np.linalg.eigh(facing.T @ facing / len(facing))
-        if weight[0] >= WEAKEST:
-            return None
-        return math.degrees(math.atan2(axes[1, 0], axes[0, 0])) % 180.0
+        return float(weight[0]), math.degrees(math.atan2(axes[1, 0], axes[0, 0])) % 180.0
+
+    @property
+    def free_deg(self) -> float | None:
+        """The unconstrained direction, which almost no shared surface faces, degrees from +x, or None."""
+        fraction, direction = self.weakest
+        return None if fraction >= WEAKEST else direction
 
     def aligned(self, there: FloatArray) -> FloatArray:
         """The pose of the second in the first that registration finds from `there`."""
@@ -168,8 +172,12 @@ class _CloudPair:
 
 
 def _registered(names: tuple[str, str], two: _CloudPair, starts: Sequence[FloatArray]) -> Registered:
-    """The pair registered from every start; the worst result counts."""
-    ends = [two.aligned(start) for start in starts]
+    """The pair registered from its starts up to the first that misses; the worst result counts."""
+    ends: list[FloatArray] = []
+    for start in starts:
+        ends.append(two.aligned(start))
+        if not within_tolerance(*two.error(ends[-1])):
+            break
     errors = [two.error(end) for end in ends]
     worst = int(np.argmax([error[0] for error in errors]))
     pair = ScanPair(
@@ -178,19 +186,30 @@ def _registered(names: tuple[str, str], two: _CloudPair, starts: Sequence[FloatA
         free_deg=two.free_deg,
         error_m=errors[worst][0],
         error_deg=max(error[1] for error in errors),
+        least_error_m=min(error[0] for error in errors),
+        starts=len(errors),
     )
     return Registered(pair, ends[worst])
 
 
 def _starts(two: _CloudPair, simulation: Simulation, pair: tuple[int, int]) -> list[FloatArray]:
-    """Start poses with an error to either side; or the pose found without a start."""
+    """Start poses off to either side of two directions; or the pose found without a start.
+
+    One direction is the weakest of the pair, in which it may slide. The other is random.
+    """
     random = np.random.default_rng([simulation.seed, *pair])
     azimuth, turn = random.uniform(0, 2 * math.pi), random.choice((-1.0, 1.0))
     if not simulation.poses:
         return [_without_pose(two.one.points, two.other.points, turn=azimuth)]
-    far, angle = simulation.pose_error_m, turn * math.radians(simulation.pose_error_deg)
-    aside = far * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-    return [_shift(side * aside) @ two.truth @ _turned(side * angle) for side in (1.0, -1.0)]
+    angle = turn * math.radians(simulation.pose_error_deg)
+    weak = math.radians(two.weakest[1])
+    return [
+        _shift(simulation.pose_error_m * side * np.array([math.cos(way), math.sin(way), 0.0]))
+        @ two.truth
+        @ _turned(side * angle)
+        for way in (weak, azimuth)
+        for side in (1.0, -1.0)
+    ]
 
 
 def _without_pose(one: FloatArray, other: FloatArray, *, turn: float) -> FloatArray:

@@ -130,7 +130,7 @@ def test_only_a_stop_in_a_doorway_may_stand_near_its_jambs() -> None:
     floor = two_rooms(0.8)
     assert told(floor, driven((2.0, 2.0), (4.0, 2.0), doorway=True)) == []
     assert len(told(floor, driven((2.0, 2.0), (4.0, 2.0)))) == 1
-    assert len(told(floor, driven((2.0, 2.0), (1.0, 0.5), doorway=True))) == 1
+    assert len(told(floor, driven((2.0, 2.0), (1.0, 0.5), doorway=True))) == 2
 
 
 def test_circles_to_avoid_are_avoided() -> None:

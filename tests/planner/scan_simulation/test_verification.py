@@ -21,7 +21,14 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.planner import plan
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
-from stopgo.planner.scan_simulation.registration import off, registered, surface_of
+from stopgo.planner.scan_simulation.registration import (
+    _CloudPair,
+    _shift,
+    _starts,
+    off,
+    registered,
+    surface_of,
+)
 from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
 from stopgo.planner.scan_simulation.strips import strips_of
 from stopgo.planner.scan_simulation.verification import verify
@@ -187,6 +194,25 @@ def test_two_scans_of_one_room_register_from_a_given_error() -> None:
     assert pair.registered
     assert pair.free_deg is None
     assert pair.error_m < 0.003
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_pair_starts_along_its_weakest_direction_with_every_seed(seed: int) -> None:
+    """A corridor with one step in it: whatever the seed, two starts are 5 cm off along the corridor."""
+    simulation = replace(COARSEST, range_m=4.0, joining_m=4.0, seed=seed)
+    places = [(13.0, 1.0), (15.0, 1.0)]
+    one, other = (surface_of(cloud) for cloud in clouds_of(hall(30, 2), places, simulation))
+    two = _CloudPair(one, other, _shift(np.array([2.0, 0.0, 0.0])))
+    along = [start[0, 3] - 2.0 for start in _starts(two, simulation, (0, 1))]
+    assert sorted(np.abs(along))[-2:] == pytest.approx([0.05, 0.05], abs=1e-3)
+
+
+def test_the_first_start_that_misses_decides() -> None:
+    simulation = replace(COARSEST, range_m=4.0, joining_m=4.0)
+    (pair,) = pair_of(hall(30, 2), (13.0, 1.0), (15.0, 1.0), simulation)
+    assert pair.starts == 1 and pair.error_m > 0.01
+    (good,) = pair_of(hall(6, 4, column("c", 2, 2)), (1.5, 1.0), (4.5, 3.0), COARSEST)
+    assert good.starts == 4 and good.least_error_m <= good.error_m
 
 
 def test_scans_along_a_corridor_are_free_along_it_and_told_so() -> None:

@@ -1,0 +1,234 @@
+"""Pairs of positions on many floors: simulated registration against the rules that predict it.
+
+`python -m benchmarks.registration simulate pairs.jsonl 0 1` simulates (hours); with the file's name alone it
+counts every pair by each rule and puts the table into the README.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.floors import office
+from benchmarks.shares import FLOORS, SHARED
+from benchmarks.table import put, table, versions
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, frozen
+from stopgo.mission.proof.plan_proof import Simulation, within_tolerance
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.overlap import LEAST_HOLD_M, boundary, overlaps_of, pairs
+from stopgo.planner.scan_simulation import registration
+from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
+from stopgo.planner.scan_simulation.verification import _ScanSite as ScanSite
+from stopgo.planner.space.navigable import navigable
+
+POSITIONS = 11
+"""Positions on each floor; two rounds with different ones."""
+ROUNDS = 2
+SEEDS = (1, 2)
+"""Seeds of the pose errors; each gives two starts."""
+STOREYS = {
+    "office": ("Level 2",),
+    "school": ("u4pyxnN8d1", "w85seUQP"),
+    "duplex": ("Level 2",),
+    "fzk-haus": ("Dachgeschoss",),
+    "schependomlaan-structure": ("Begane grondvloer", "1e Verdiepingvloer"),
+}
+
+
+def floors() -> Iterator[tuple[str, FloorPlan, Settings]]:
+    """Layered floors, storeys of models, drawings, and synthetic offices; a floor that is missing is left out."""
+    for seed, size in enumerate(((24, 14), (30, 14), (40, 16), (30, 28), (18, 14), (36, 28)), start=1):
+        yield f"office {size[0]} x {size[1]}, seed {seed}", office(*size, seed=seed), Settings()
+    for name, (path, options) in FLOORS.items():
+        if path.exists():
+            yield name, read_floor(path, FloorOptions(d_dis=0.05)), Settings(**options)
+    for name in ("house", "barcelona-plan"):
+        path = SHARED / "dxf" / f"{name}.dxf"
+        if path.exists():
+            yield name, read_floor(path, FloorOptions(d_dis=0.05)), Settings()
+    for name, storeys in STOREYS.items():
+        path = SHARED / "ifc" / f"{name}.ifc"
+        for storey in storeys if path.exists() else ():
+            yield f"{name} {storey}", read_floor(path, FloorOptions(d_dis=0.05, storey=storey)), Settings()
+    for seed, size in enumerate(((26, 14), (50, 14), (20, 28), (44, 30)), start=11):
+        yield f"office {size[0]} x {size[1]}, seed {seed}", office(*size, seed=seed), Settings()
+
+
+def standing(floor: FloorPlan, settings: Settings, xy: FloatArray) -> Candidates:
+    """Candidates at given positions."""
+    found = candidates(navigable(floor, replace(settings, use=tuple(map(tuple, xy.tolist())))))
+    return replace(found, reason=frozen(np.where(found.must, KEPT, OUTSIDE), np.int64))
+
+
+def positions(floor: FloorPlan, settings: Settings, seed: int) -> FloatArray:
+    """Reachable candidates chosen at random."""
+    found = candidates(navigable(floor, settings))
+    random = np.random.default_rng(seed)
+    rows = random.permutation(found.kept)[:POSITIONS]
+    return np.asarray(found.xy[np.sort(rows)])
+
+
+def simulated(name: str, floor: FloorPlan, settings: Settings, seed: int) -> Iterator[dict[str, Any]]:
+    """Every pair of positions with shared surfaces, registered from several starts."""
+    simulation = Simulation(range_m=settings.range, ceiling_m=floor.ceiling_m or 2.7)
+    site = ScanSite.of(navigable(floor, settings), simulation)
+    xy = positions(floor, settings, seed)
+    at = np.column_stack([xy - site.solids.origin, np.full(len(xy), simulation.height_m)])
+    poses = [ScannerPose(frozen(place), 0.0, number=k) for k, place in enumerate(at)]
+    clouds = [scanned(site.solids, site.strips, pose, simulation).cloud for pose in poses]
+    surfaces = [registration.surface_of(cloud) for cloud in clouds]
+    for i, j in combinations(range(len(xy)), 2):
+        two = registration._CloudPair(surfaces[i], surfaces[j], registration._shift(at[j] - at[i]))
+        if not two.meets or two.shared_points < registration.LEAST_POINTS:
+            continue
+        errors = []
+        for start_seed in SEEDS:
+            starts = registration._starts(two, replace(simulation, seed=start_seed), (i, j))
+            for start in starts:
+                errors.append(two.error(two.aligned(start)))
+                if errors[-1][0] >= 0.05:
+                    break
+            if errors[-1][0] >= 0.05:
+                break
+        yield {
+            "floor": name,
+            "a": xy[i].tolist(),
+            "b": xy[j].tolist(),
+            "shared": two.share,
+            "free_deg": two.free_deg,
+            "errors": errors,
+        }
+
+
+def simulate(path: Path, part: int, of: int) -> None:
+    """Append the simulated pairs of every `of`-th floor to a file, one JSON object per line."""
+    with path.open("a") as file:
+        for round_number in range(ROUNDS):
+            for number, (name, floor, settings) in enumerate(floors()):
+                if number % of != part:
+                    continue
+                for pair in simulated(name, floor, settings, seed=100 * round_number + number):
+                    file.write(json.dumps(pair) + "\n")
+                file.flush()
+                print(round_number, name, file=sys.stderr)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Figures of a pair as one rule counts them."""
+
+    common_m: float
+    share: float
+    hold_m: float
+
+
+@contextmanager
+def counting(*, edge: float, least: float, spacing: float, incidence: float) -> Iterator[None]:
+    """Count overlaps with other constants."""
+    before = pairs.EDGE_M, pairs.LEAST_STRETCH_M, boundary.MOST_SPACING_M, boundary.MOST_INCIDENCE_DEG
+    try:
+        pairs.EDGE_M, pairs.LEAST_STRETCH_M = edge, least
+        boundary.MOST_SPACING_M, boundary.MOST_INCIDENCE_DEG = spacing, incidence
+        yield
+    finally:
+        pairs.EDGE_M, pairs.LEAST_STRETCH_M = before[:2]
+        boundary.MOST_SPACING_M, boundary.MOST_INCIDENCE_DEG = before[2:]
+
+
+def counted(floor: FloorPlan, settings: Settings, rows: list[dict[str, Any]]) -> list[Figures]:
+    """Figures of each pair by the constants in force."""
+    xy = np.unique([place for row in rows for place in (row["a"], row["b"])], axis=0)
+    found = standing(floor, replace(settings, overlap=0.1), xy)
+    at, overlaps, result = found.xy[found.kept], overlaps_of(found), []
+    for row in rows:
+        i, j = (int(np.argmin(np.hypot(*(at - np.array(row[end])).T))) for end in ("a", "b"))
+        near = overlaps.of(i)
+        k = np.flatnonzero(near.other == j)
+        values = (
+            float(getattr(near, key)[k[0]]) if len(k) else 0.0 for key in ("common_m", "share", "hold_m")
+        )
+        result.append(Figures(*values))
+    return result
+
+
+def registers(row: dict[str, Any]) -> bool:
+    """True if every start ends within the tolerance and the pair is constrained."""
+    good = all(within_tolerance(*error) for error in row["errors"])
+    return good and row["free_deg"] is None
+
+
+COUNTS = {
+    "now": {"edge": pairs.EDGE_M, "least": pairs.LEAST_STRETCH_M, "spacing": 0.15, "incidence": 85.0},
+    "wide": {"edge": 0.0, "least": 0.35, "spacing": 1e9, "incidence": 89.999},
+    "narrow": {"edge": 0.0, "least": 0.15, "spacing": 1e9, "incidence": 89.999},
+}
+
+
+RULES: dict[str, Callable[[Figures, Figures, Figures], bool]] = {
+    "predicted error ≤ 1 cm (99 %)": lambda now, wide, narrow: now.hold_m >= LEAST_HOLD_M,
+    "the same, and overlap 0.1 (`--overlap 0.1`)": lambda now, wide, narrow: (
+        now.hold_m >= LEAST_HOLD_M and now.share >= 0.1 and now.common_m >= 1
+    ),
+    "before: width 0.35 m, strength 0.15 m, overlap 0.1": lambda now, wide, narrow: (
+        wide.hold_m >= 0.15 and wide.share >= 0.1 and wide.common_m >= 1
+    ),
+    "width 0.35 m and strength 0.05 m, or 0.15 m, 0.15 m and overlap 0.15": lambda now, wide, narrow: (
+        wide.hold_m >= 0.05 or (narrow.hold_m >= 0.15 and narrow.share >= 0.15)
+    ),
+    **{
+        f"overlap ratio {least:g} alone": lambda now, wide, narrow, least=least: narrow.share >= least
+        for least in (0.1, 0.2, 0.3, 0.5)
+    },
+}
+
+
+def main(paths: list[str]) -> None:
+    """Put the table of all simulated pairs into the README."""
+    known: dict[str, list[dict[str, Any]]] = {}
+    for line in (line for path in paths for line in Path(path).read_text().splitlines()):
+        row = json.loads(line)
+        known.setdefault(row["floor"], []).append(row)
+    good: list[bool] = []
+    figures: list[list[Figures]] = [[] for _ in COUNTS]
+    for name, floor, settings in floors():
+        rows = known.get(name, [])
+        good += [registers(row) for row in rows]
+        for several, constants in zip(figures, COUNTS.values(), strict=True):
+            with counting(**constants):
+                several.extend(counted(floor, settings, rows) if rows else [])
+    lines = [
+        _line(name, rule, list(zip(*figures, strict=True)), np.array(good)) for name, rule in RULES.items()
+    ]
+    head = ("rule", "promised", "wrong", "precision", "recall")
+    note = f"{len(good)} pairs on {len(known)} floors, {sum(good)} of which register from every start."
+    put("registration", f"{versions('numpy', 'embreex', 'small-gicp')}\n\n{table(head, lines)}\n\n{note}")
+
+
+def _line(
+    name: str, rule: Callable[..., bool], figures: list[tuple[Figures, ...]], good: BoolArray
+) -> list[str]:
+    told = np.array([rule(*of_pair) for of_pair in figures])
+    right = int((told & good).sum())
+    return [
+        *(name, str(told.sum()), str(told.sum() - right)),
+        *(f"{100 * right / max(1, told.sum()):.1f} %", f"{100 * right / max(1, good.sum()):.1f} %"),
+    ]
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "simulate":
+        simulate(Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]))
+    else:
+        main(sys.argv[1:])

@@ -1,0 +1,143 @@
+"""Missions edited after planning: `check --floor` recomputes every claim, and names the one that is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import pytest
+from msgspec import UNSET
+
+from stopgo.mission.document import Mission, stop_names
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.checking.claims import overclaims, recount
+from stopgo.planner.checking.fit import misfits_on, other_machine
+from stopgo.planner.checking.network_claims import network_overclaims
+from tests.planner.worlds import hall, planned, two_rooms
+
+change = msgspec.structs.replace
+REGISTERING = Settings(overlap=0.1, range=2.5)
+
+
+def first_stop(mission: Mission, **details: Any) -> Mission:
+    return change(mission, stops=(change(mission.stops[0], **details), *mission.stops[1:]))
+
+
+def paths(problems: Any) -> list[str]:
+    return [problem.path for problem in problems]
+
+
+def without_last_stop(mission: Mission) -> Mission:
+    """The mission that ends one stop earlier; the pairs of that stop are gone too."""
+    gone = mission.stops[-1].id
+    shorter = change(mission, stops=mission.stops[:-1])
+    if mission.network is UNSET:
+        return shorter
+    pairs = tuple(pair for pair in mission.network if gone not in (pair.a, pair.b))
+    return change(shorter, network=pairs)
+
+
+def test_a_dropped_stop_leaves_a_room_below_its_required_fraction() -> None:
+    settings = Settings(coverage=0.3, kind_coverage=0.0)
+    mission, nouns = planned(two_rooms(0.9), settings)
+    space = nouns[NavigableSpace]
+    assert list(overclaims(mission, recount(mission, space), None)) == []
+    one = without_last_stop(mission)
+    problems = list(overclaims(one, recount(one, space), None))
+    assert paths(problems) == ["$.origin.parameters.room_coverage"]
+    assert "is 0.7, but the stops see" in problems[0].message
+
+
+def test_a_dropped_stop_leaves_a_kind_below_its_required_fraction() -> None:
+    mission, nouns = planned(two_rooms(0.9), Settings(coverage=0.3, room_coverage=0.0, kind_coverage=0.9))
+    one = without_last_stop(mission)
+    problems = overclaims(one, recount(one, nouns[NavigableSpace]), None)
+    assert paths(problems) == ["$.origin.parameters.kind_coverage"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "path"),
+    [
+        ({"speed": 60.0}, "$.robot.speed"),
+        ({"turn_rate": 9.0}, "$.robot.turn_rate"),
+        ({"acceleration": 60.0}, "$.robot.acceleration"),
+    ],
+)
+def test_a_robot_faster_than_planned_is_reported(changes: dict[str, float], path: str) -> None:
+    mission, _ = planned(hall(6, 4))
+    assert list(other_machine(mission, Settings())) == []
+    bold = change(mission, robot=change(mission.robot, **changes))
+    assert paths(other_machine(bold, Settings())) == [path]
+    slow = change(mission, robot=change(mission.robot, speed=0.1))
+    assert list(other_machine(slow, Settings())) == []
+
+
+def test_no_parameters_excuse_what_no_robot_does() -> None:
+    settings = Settings(speed=60.0, tolerance=8.0)
+    mission, _ = planned(hall(6, 4), settings)
+    assert "$.robot.speed" in paths(other_machine(mission, settings))
+    assert "$.stops[0].tolerance_m" in paths(other_machine(mission, settings))
+
+
+def test_a_scan_shorter_than_planned_is_reported() -> None:
+    mission, _ = planned(hall(6, 4))
+    scan = mission.stops[0].scan
+    empty = first_stop(mission, scan=change(scan, duration_s=0.0))
+    (problem,) = other_machine(empty, Settings())
+    assert str(problem) == "$.stops[0].scan.duration_s: is 0, but the plan's scans take 60 s"
+    longer = first_stop(mission, scan=change(scan, duration_s=90.0))
+    assert list(other_machine(longer, Settings())) == []
+
+
+def test_a_position_tolerance_wider_than_planned_is_reported() -> None:
+    mission, _ = planned(hall(6, 4))
+    (problem,) = other_machine(first_stop(mission, tolerance_m=8.0), Settings())
+    assert str(problem) == "$.stops[0].tolerance_m: is 8; the plan allows at most 0.05"
+
+
+def test_a_doorway_mark_away_from_every_doorway_is_reported() -> None:
+    mission, _ = planned(two_rooms(0.9))
+    marked = first_stop(mission, doorway=True)
+    (problem,) = misfits_on(two_rooms(0.9), marked, Settings())
+    assert problem.path == "$.stops[0].doorway"
+
+
+@pytest.fixture(scope="module")
+def network() -> tuple[Mission, NavigableSpace]:
+    mission, nouns = planned(hall(12, 4), REGISTERING)
+    assert len(mission.stops) >= 3 and mission.network
+    return mission, nouns[NavigableSpace]
+
+
+def test_the_network_of_a_plan_is_as_claimed(network: tuple[Mission, NavigableSpace]) -> None:
+    assert list(network_overclaims(*network)) == []
+
+
+@pytest.mark.parametrize("pairs", [UNSET, ()])
+def test_a_network_that_was_removed_is_reported(pairs: Any, network: tuple[Mission, NavigableSpace]) -> None:
+    mission, space = network
+    assert paths(network_overclaims(change(mission, network=pairs), space)) == ["$.network"]
+
+
+def test_a_network_that_a_dropped_stop_tears_is_reported(network: tuple[Mission, NavigableSpace]) -> None:
+    mission, space = network
+    last = mission.stops[-1].id
+    assert isinstance(mission.network, tuple)
+    kept = tuple(pair for pair in mission.network if last not in (pair.a, pair.b))
+    (problem,) = network_overclaims(change(mission, network=kept), space)
+    assert problem.message.startswith(f"leaves {last} apart")
+
+
+def test_scans_that_no_candidate_connects_may_stay_apart() -> None:
+    """Two rooms that see nothing of each other: the plan says so itself, and its mission is in order."""
+    settings = replace(REGISTERING, doors="closed")
+    mission, nouns = planned(two_rooms(0.9), replace(settings, overlap=0.9))
+    assert list(network_overclaims(mission, nouns[NavigableSpace])) == []
+    assert stop_names(len(mission.stops)) == [stop.id for stop in mission.stops]
+
+
+def test_a_follow_up_mission_may_leave_its_scans_apart(network: tuple[Mission, NavigableSpace]) -> None:
+    mission, space = network
+    assert list(network_overclaims(change(mission, network=(), id="0" * 32), space)) == []
