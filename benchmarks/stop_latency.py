@@ -74,8 +74,12 @@ def trials(session: str, fault: Fault) -> list[tuple[float, float, float]]:
         station = opened.enter_context(connect(endpoint, robot="r1", commander="bench"))
         station.push(one_leg())
         port = int(endpoint.rpartition(":")[2])
-        line = opened.enter_context(Proxy(port, delay_s=fault.delay_s)).endpoint if fault.delay_s else endpoint
-        used = opened.enter_context(connect(line, robot="r1", commander="bench")) if fault.delay_s else station
+        line = (
+            opened.enter_context(Proxy(port, delay_s=fault.delay_s)).endpoint if fault.delay_s else endpoint
+        )
+        used = (
+            opened.enter_context(connect(line, robot="r1", commander="bench")) if fault.delay_s else station
+        )
         if session == "shared":
             opened.enter_context(shared_session(line))
         if fault.floods:
