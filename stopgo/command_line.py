@@ -30,7 +30,7 @@ COMMANDS = {
     "demo_command": ("demo",),
     "bridge_commands": (
         "robot", "push", "fetch-mission", "clear", "doctor", "start", "pause", "resume", "skip", "retry",
-        "abort", "home", "status", "watch", "simulate", "keys", "conform", "tunnel",
+        "abort", "home", "status", "session", "watch", "simulate", "keys", "conform", "tunnel",
     ),
     "review_command": ("review",),
     "runs_command": ("runs",),

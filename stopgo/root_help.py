@@ -28,6 +28,7 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
         "abort": "End the run at the present position",
         "home": "End the run and drive back",
         "status": "Print the state of the robots",
+        "session": "Hold a session open for commands",
         "watch": "Follow and record a run",
     },
     "Look back": {
@@ -54,8 +55,7 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
 
 _HEAD = """\
 Usage: stopgo COMMAND ...    or  stopgo COMMAND --help
-Plan the stops of a laser scanner; drive a robot to them.
-"""
+Plan the stops of a laser scanner; drive a robot to them."""
 _FOOT = "Also: --version --install-completion --show-completion"
 
 

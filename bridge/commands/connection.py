@@ -27,10 +27,12 @@ from stopgo.bridge.commands.bridge_options import (
     Timeout,
     VehicleId,
 )
+from stopgo.bridge.console import say
 from stopgo.bridge.profile import effective, read_profile
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
+    from stopgo.bridge.station.session_socket import SessionOptions
     from stopgo.bridge.station.station import Station
     from stopgo.mission.run.orders import Verb
 
@@ -221,14 +223,37 @@ def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager
     return connect(url, options)
 
 
+def session_options(connection: Connection) -> SessionOptions:
+    """Return the options that commands must have in common to share a session."""
+    from stopgo.bridge.station.session_socket import SessionOptions
+
+    return SessionOptions(
+        endpoint=connection.endpoint, robot=connection.robot, site=connection.site, commander=connection.who,
+        insecure=connection.insecure, keys=connection.keys,
+    )  # fmt: skip
+
+
+def _shared(connection: Connection, *, at_once: bool) -> AbstractContextManager[Station]:
+    """Connect through the session that the user holds open, if there is one."""
+    if connection.mavlink is not None:
+        return reached(connection, at_once=at_once)
+    from stopgo.bridge.station.session_link import connect_shared
+
+    return connect_shared(
+        session_options(connection), timeout_s=connection.timeout_s, at_once=at_once, say=say
+    )
+
+
 @contextmanager
 def in_time(connection: Connection, *, at_once: bool = False) -> Iterator[Station]:
     """Connect to the robot; the time left of the timeout is for one query or command.
 
+    The session that the user holds open is used if there is one (`stopgo session`).
+
     A vehicle that was commanded to stop stands by then: noting that has the whole timeout again.
     """
     began = time.monotonic()
-    with reached(connection, at_once=at_once) as station:
+    with _shared(connection, at_once=at_once) as station:
         if connection.mavlink is not None and connection.mavlink.stop is not None:
             began = time.monotonic()
         station.timeout_s = max(LEAST_S, connection.timeout_s - (time.monotonic() - began))

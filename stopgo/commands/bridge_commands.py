@@ -15,6 +15,7 @@ from stopgo.bridge.commands.key_commands import key_commands
 from stopgo.bridge.commands.mission_commands import clear, fetch_mission, push
 from stopgo.bridge.commands.order_commands import add_orders
 from stopgo.bridge.commands.robot_commands import robot
+from stopgo.bridge.commands.session_command import session
 from stopgo.bridge.commands.simulate_commands import simulate_commands
 from stopgo.bridge.commands.tunnel_commands import tunnel_commands
 from stopgo.bridge.commands.watch_commands import watch_command
@@ -34,6 +35,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command()(clear)
     app.command()(doctor)
     add_orders(app)
+    app.command()(session)
     app.command()(watch_command(recording))
     app.add_typer(simulate_commands(), name="simulate")
     app.add_typer(key_commands(), name="keys")

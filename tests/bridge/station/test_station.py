@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import msgspec
 import pytest
 
 from stopgo.bridge.link.memory_link import MemoryLink, Switchboard
-from stopgo.bridge.link.protocol import KeyExpressions, encode
+from stopgo.bridge.link.protocol import VERSION, KeyExpressions, encode
 from stopgo.bridge.station import station as stations
 from stopgo.bridge.station.follow import PoseHistory
 from stopgo.bridge.station.station import LEAST_S, PATIENCE_S, Station
-from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from tests.bridge.world import Field, corridor
 
 
@@ -201,3 +202,17 @@ def test_a_stop_that_may_have_arrived_is_unknown_though_the_robot_was_never_foun
     station.look_for("tcp/robot:7447")
     with pytest.raises(OutcomeUnknown, match="no answer to pause in time"):
         station.command("pause")
+
+
+@pytest.mark.parametrize("difference", [-1, 1])
+def test_another_protocol_version_is_refused_before_anything_is_sent(difference: int) -> None:
+    field = Field()
+    station = field.station()
+    info = msgspec.structs.replace(station.info(), protocol=VERSION + difference)
+    field.board.serving = [served for served in field.board.serving if served[1] != field.keys.info]
+    field.board.link().serve(field.keys.info, lambda request: encode(info))
+    named = f"robot r1: protocol {VERSION + difference}, here {VERSION}; update the older one"
+    for query in (station.status, lambda: station.command("start")):
+        with pytest.raises(InputError, match=named):
+            query()
+    assert field.told() == []
