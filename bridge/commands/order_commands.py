@@ -296,6 +296,8 @@ def state_line(report: StateReport) -> str:
     stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
     outside = stops_outside_text(report.outside, report.outside_count)
     skipped = f", {report.skipped_count} skipped" if report.skipped_count else ""
+    if report.skipped and report.state == "FINISHED":
+        skipped += f" ({', '.join(report.skipped)}: stopgo start --again repeats the mission)"
     if report.next_revision is not None:
         mission += f" (revision {report.next_revision} from the next stop on)"
     return (

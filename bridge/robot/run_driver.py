@@ -78,9 +78,9 @@ class RunDriver:
         """Drive the rest of the leg, or the correction to the stop."""
         stop, pose = mission.stops[run.at], self._base.pose()
         at_stop = run.leg > run.at
-        path = (
-            ((stop.x, stop.y),) if at_stop else route_position.forward(mission.stops[run.leg].approach, pose)
-        )
+        leg = mission.stops[min(run.leg, run.at)].approach
+        onward = route_position.forward(leg, pose, within_m=stop.tolerance_m)
+        path = ((stop.x, stop.y),) if at_stop else onward
         there = at_stop and not is_outside(deviation(pose, stop), stop.tolerance_m) and faces(pose, stop)
         heading = stop.heading if run.leg >= run.at else None
         outcome = "arrived" if there else self._goto(path, mission, heading)
@@ -95,7 +95,8 @@ class RunDriver:
         legs, pose = route_position.legs_of(mission), self._base.pose()
         returning = run.leg == len(mission.stops)
         leg = legs[run.leg]
-        path = route_position.forward(leg, pose) if returning else route_position.backward(leg, pose)
+        along = route_position.forward if returning else route_position.backward
+        path = along(leg, pose, within_m=mission.stops[min(run.at, len(mission.stops) - 1)].tolerance_m)
         outcome = self._goto(path, mission, None)
         if outcome == "blocked":
             self._hold_blocked(run, "the path home", self._base.pose())

@@ -9,10 +9,11 @@ from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.console.table import duration, printable, table
-from stopgo.mission.run.events import Aborted, Finished
+from stopgo.mission.run.events import JUMPED_OVER, Aborted, Finished
 from stopgo.mission.stages.figures import Share, percent
 from stopgo.mission.stages.network import apart_in_words, network_of
 
+FOLLOW_UP = "stopgo replay RECORDING --mission mission.json --floor FLOOR --top-up next.json"
 HEADER = (
     *("stop", "outcome", "planned s", "arrived s", "late s", "along mm", "across mm", "heading °"),
     *("settle s", "tries", "lost %", "why"),
@@ -69,6 +70,19 @@ def _totals(comparison: Comparison) -> list[str]:
         f"greatest position error {_millimetres(position)}, cross-track error "
         + (f"≤ {_millimetres(cross_track)} {seen.limits}" if seen.gaps else _millimetres(cross_track)),
         *seen.lines,
+        *_jumped_lines(comparison),
+    ]
+
+
+def _jumped_lines(comparison: Comparison) -> list[str]:
+    """Name the stops that somebody jumped over, with the command that plans a mission for them."""
+    skipped = [item for item in comparison.stops if item.outcome == "skipped"]
+    jumped = [printable(item.stop) for item in skipped if JUMPED_OVER in item.reason]
+    if not jumped:
+        return []
+    return [
+        f"not scanned, {JUMPED_OVER}: {', '.join(jumped)}; for a follow-up mission: {FOLLOW_UP};"
+        " to drive the whole mission again: stopgo start --again"
     ]
 
 

@@ -182,15 +182,24 @@ def _resume(order: Order, mission: Mission, situation: Situation) -> Change | Re
 
 
 def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
-    """Return a refusal if the robot is farther from its leg than the stop's tolerance."""
+    """Return a refusal if the robot is farther from its leg than its radius, and than the stop's tolerance.
+
+    The robot's circle is free where it is and on the route. On the straight line of at most a radius between
+    the two, no more than a seventh of the radius lies outside of both circles.
+    """
     legs = route_position.legs_of(mission)
     leg = min(run.leg, len(legs) - 1)
-    tolerance = mission.stops[min(leg, len(mission.stops) - 1)].tolerance_m
-    near = [route_position.nearest(legs[index], pose).distance for index in {leg, max(0, leg - 1)}]
-    if min(near) <= tolerance:
+    limit = max(mission.robot.radius, mission.stops[min(leg, len(mission.stops) - 1)].tolerance_m)
+    near = [route_position.nearest(legs[index], pose) for index in (leg, max(0, leg - 1))]
+    back = min(near, key=lambda point: point.distance)
+    if back.distance <= limit:
         return None
-    return Refused("off_route", f"the robot is {min(near):.2f} m off its route (tolerance {tolerance:g} m); "
-                   "bring it back onto it")  # fmt: skip
+    x, y = back.point
+    return Refused(
+        "off_route",
+        f"the robot is {back.distance:.2f} m off its route;"
+        f" drive it by hand to ({x:.2f}, {y:.2f}), within {limit:g} m, and send the command again",
+    )
 
 
 def _skip(order: Order, mission: Mission, situation: Situation) -> Change | Refused:

@@ -90,6 +90,10 @@ class Skipped(Event, frozen=True, kw_only=True):
     reason: str
 
 
+JUMPED_OVER = "jumped over by somebody"
+"""First words of the reason of a stop that was skipped by no command from here."""
+
+
 class Failed(Event, frozen=True, kw_only=True):
     stop: str
     reason: str

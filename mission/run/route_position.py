@@ -39,14 +39,20 @@ def nearest(leg: Sequence[Point], pose: Pose) -> NearestPoint:
     return min(reversed(candidates), key=lambda point: point.distance)
 
 
-def forward(leg: Sequence[Point], pose: Pose) -> tuple[Point, ...]:
-    """Return the points of `leg` that are still ahead of the robot."""
-    return tuple(leg[nearest(leg, pose).segment + 1 :]) or (leg[-1],)
+def forward(leg: Sequence[Point], pose: Pose, *, within_m: float) -> tuple[Point, ...]:
+    """Return the points of `leg` that are still ahead; first its nearest point, if that is farther away."""
+    here = nearest(leg, pose)
+    return _from(here, tuple(leg[here.segment + 1 :]) or (leg[-1],), within_m)
 
 
-def backward(leg: Sequence[Point], pose: Pose) -> tuple[Point, ...]:
-    """Return the points of `leg` back to its beginning."""
-    return tuple(reversed(leg[: nearest(leg, pose).segment + 1]))
+def backward(leg: Sequence[Point], pose: Pose, *, within_m: float) -> tuple[Point, ...]:
+    """Return the points of `leg` back to its beginning; first its nearest point, if that is farther away."""
+    here = nearest(leg, pose)
+    return _from(here, tuple(reversed(leg[: here.segment + 1])), within_m)
+
+
+def _from(here: NearestPoint, path: tuple[Point, ...], within_m: float) -> tuple[Point, ...]:
+    return path if here.distance <= within_m or here.point == path[0] else (here.point, *path)
 
 
 def nearest_leg(mission: Mission, pose: Pose) -> tuple[int, NearestPoint]:

@@ -54,7 +54,7 @@ from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
-from stopgo.mission.mavlink.following.observer import CLOCKS, Observer
+from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.steps import (
     AT_STOP,
     COUNTS_NOT_YET,
@@ -64,6 +64,7 @@ from stopgo.mission.mavlink.following.steps import (
     steps,
     tried_again,
 )
+from stopgo.mission.mavlink.following.vehicle_status import CLOCKS
 from stopgo.mission.mavlink.telemetry import Message, has_restarted
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Arrived
@@ -145,8 +146,8 @@ class AutoFollower:
 
     def _check_clock(self) -> None:
         """Reset the run of a vehicle that was restarted: it stopped, and lost its mode, origin and item."""
-        began_ns, before_ms = self._observer.began_ns, self._book.boot_ms
-        self._book.boot_ms = self._observer.boot_ms
+        began_ns, before_ms = self._observer.status.began_ns, self._book.boot_ms
+        self._book.boot_ms = self._observer.status.boot_ms
         went_back = has_restarted(before_ms, self._book.boot_ms)
         if self._looks_only or began_ns is None or not self._book.booted(began_ns, went_back=went_back):
             return

@@ -83,17 +83,17 @@ class AutoRunner:
     def snapshot(self) -> tuple[Run, Mission | None]:
         """The run as seen if this process only looks; else as stored by any process."""
         listed, run = self._book.listed, self._follower.run if self._looks_only else self._book.run
-        return run_on_vehicle(run, self._observer.items), None if listed is None else listed.mission
+        return run_on_vehicle(run, self._observer.position.items), None if listed is None else listed.mission
 
     def position(self) -> Position | None:
-        fix = self._observer.fix
+        fix = self._observer.poses.fix
         if fix is None or fix.ns <= self._reported_ns:
             return None
         self._reported_ns = fix.ns
         return Position(fix.pose, fix.speed, fix.ns)
 
     def battery(self) -> float:
-        return self._observer.battery
+        return self._observer.status.battery
 
     def execute(self, order: Order) -> Answer:
         """Carry out a command; raises `OutcomeUnknown` if the vehicle does not show its effect."""
@@ -122,7 +122,7 @@ class AutoRunner:
         with self._commands.news:
             listed = self._book.listed
             self._commands.news.wait_for(lambda: self._observer.complete(listed), timeout_s)
-        if self._observer.sequence is None and self._book.listed is not None:
+        if self._observer.position.sequence is None and self._book.listed is not None:
             raise RobotUnreachable(
                 f"{self._peer}: no current item (MISSION_CURRENT) within {timeout_s:g} s; nothing was sent"
             )

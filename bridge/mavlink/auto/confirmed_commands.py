@@ -96,7 +96,7 @@ class ConfirmedCommands:
         near = range(sequence, sequence + 3)
 
         def shown() -> bool:
-            return self._observer.current_ns > asked_ns and self._observer.sequence in near
+            return self._observer.position.current_ns > asked_ns and self._observer.position.sequence in near
 
         for _ in range(REPEATS if ack.result == CommandResult.UNSUPPORTED else 0):
             self._peer.send(set_current(self._peer.who, sequence))
@@ -109,7 +109,7 @@ class ConfirmedCommands:
         """Arm it, or disarm it."""
         what = "arming" if armed else "disarming"
         self._command(Command.COMPONENT_ARM_DISARM, float(armed), what=what)
-        self._await(lambda: self._observer.armed == armed, what)
+        self._await(lambda: self._observer.status.armed == armed, what)
 
     def speed(self, metres_per_s: float) -> None:
         """Set the speed that the mission's first item sets; not every firmware takes it from elsewhere."""
@@ -120,7 +120,8 @@ class ConfirmedCommands:
         asked_ns = self._clock.now_ns()
         self._command(Command.DO_SET_MODE, *mode.params, what=f"mode {name}")
         self._await(
-            lambda: self._observer.mode == name and self._observer.mode_ns > asked_ns, f"changing to {name}"
+            lambda: self._observer.status.mode == name and self._observer.status.mode_ns > asked_ns,
+            f"changing to {name}",
         )
 
     def _command(self, number: int, *params: float, what: str) -> None:

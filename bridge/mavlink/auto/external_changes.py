@@ -29,7 +29,7 @@ class ExternalChanges:
 
     def change(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
         """The change by somebody else, once the vehicle's mode has settled and is explained."""
-        settled = self._observer.mode_ns >= self._book.changed_ns + SETTLED_NS
+        settled = self._observer.status.mode_ns >= self._book.changed_ns + SETTLED_NS
         if not (settled and self._observer.mode_explained(self._book.clock.now_ns())):
             return None
         if self._guard.difference(listed, run):  # then no mode of the vehicle lets the run go on

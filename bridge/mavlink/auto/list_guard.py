@@ -84,13 +84,13 @@ class ListGuard:
             listed, began_ns = self._book.listed, self._book.clock.now_ns()
             if listed is None or self._book.run.state in ("FINISHED", "ABORTED"):
                 return
-            self._tried_ns, self._wanted, number = began_ns, False, self._observer.mission_id
+            self._tried_ns, self._wanted, number = began_ns, False, self._observer.position.mission_id
             try:
                 found = differences(listed.sent, download(self._peer))
             except (NegativeResult, RobotUnreachable):
                 self._wanted = True
                 return
-            number = number if number == self._observer.mission_id else 0
+            number = number if number == self._observer.position.mission_id else 0
             self._last = ListComparison(listed, began_ns, found, number)
             if not found and self._uploader is not None and self._uploader[1] < began_ns:
                 self._uploader = None
@@ -100,8 +100,8 @@ class ListGuard:
         last = self._last
         if last is None or last.listed is not listed or last.differences:
             return False
-        same_id = last.mission_id != 0 and last.mission_id == self._observer.mission_id
-        return last.began_ns > since_ns or (same_id and self._observer.current_ns > since_ns)
+        same_id = last.mission_id != 0 and last.mission_id == self._observer.position.mission_id
+        return last.began_ns > since_ns or (same_id and self._observer.position.current_ns > since_ns)
 
     def is_compared(self, listed: ListedMission) -> bool:
         """True if the list was found to be the one that was sent, by the last comparison."""
@@ -112,7 +112,7 @@ class ListGuard:
 
         A comparison from before the run went on says nothing about the list by which it did.
         """
-        last, items = self._last, self._observer.items
+        last, items = self._last, self._observer.position.items
         found: tuple[str, ...] = ()
         old = last is not None and run.state == "RUNNING" and last.began_ns < self._book.changed_ns
         if last is not None and last.listed is listed and not old:
@@ -134,7 +134,7 @@ class ListGuard:
     @property
     def _has_other_id(self) -> bool:
         last = self._last
-        return last is not None and last.mission_id not in (0, self._observer.mission_id)
+        return last is not None and last.mission_id not in (0, self._observer.position.mission_id)
 
 
 def uploader_of(message: Message, vehicle: Who, me: Who) -> Who | None:

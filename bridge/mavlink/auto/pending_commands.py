@@ -33,9 +33,10 @@ class PendingCommands:
         since_ns = self._book.clock.now_ns()
         if tried_again(before, after):
             return PendingCommand(command="jump", place=listed.stops[after.at].at, since_ns=since_ns)
-        early = after.state == "FINISHED" and (self._observer.sequence or 0) < listed.sequence(listed.end - 1)
+        sequence = self._observer.position.sequence or 0
+        early = after.state == "FINISHED" and sequence < listed.sequence(listed.end - 1)
         stops = before.state == "RUNNING" and (after.state in ("HELD", "ABORTED") or early)
-        if stops and self._observer.mode == AUTO:
+        if stops and self._observer.status.mode == AUTO:
             return PendingCommand(command="hold", place=0, since_ns=since_ns)
         return None
 

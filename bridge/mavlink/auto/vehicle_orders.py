@@ -171,7 +171,7 @@ class VehicleOrders:
         listed, run, here = self._book.listed, self._book.run, self._pose
         if listed is None:
             return Refused("no_mission", UNREMEMBERED)
-        if order.verb in DRIVING and self._observer.items == 0:
+        if order.verb in DRIVING and self._observer.position.items == 0:
             return Refused("no_mission", CLEARED)
         wrong_origin = self._wrong_origin(listed) if order.verb in DRIVING else None
         if wrong_origin is not None:
@@ -183,7 +183,7 @@ class VehicleOrders:
         situation = situation_of(
             self._book.journal, listed.mission, run=run, pose=here or NOWHERE,
             now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
-            battery=self._observer.battery, endurance_s=None, boot_id=self._book.boot_id,
+            battery=self._observer.status.battery, endurance_s=None, boot_id=self._book.boot_id,
         )  # fmt: skip
         return decide(order, situation)
 
@@ -254,7 +254,7 @@ class VehicleOrders:
 
     @property
     def _pose(self) -> Pose | None:
-        return self._observer.pose(self._book.clock.now_ns())
+        return self._observer.poses.pose(self._book.clock.now_ns())
 
     def _here(self) -> Pose:
         return self._pose or NOWHERE
@@ -271,10 +271,10 @@ class VehicleOrders:
         if unplaced:
             raise Denied(Refused("no_position", unplaced))
         self._check_mission(listed)
-        armed = self._observer.armed
+        armed = self._observer.status.armed
         if not armed and not self._consent.arm:
             raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
-        if self._observer.mode == AUTO:
+        if self._observer.status.mode == AUTO:
             self._commands.hold()
         if not armed:
             self._commands.arm()

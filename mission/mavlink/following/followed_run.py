@@ -13,7 +13,7 @@ from stopgo.mission.document import Mission, Stop
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.captures import NEAR_M, Picture
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
-from stopgo.mission.mavlink.following.observer import CLOCKS, NONE_YET, Observer
+from stopgo.mission.mavlink.following.observer import NONE_YET, Observer
 from stopgo.mission.mavlink.following.steps import (
     AT_STOP,
     COUNTS_NOT_YET,
@@ -25,6 +25,7 @@ from stopgo.mission.mavlink.following.steps import (
     steps,
     taken_over,
 )
+from stopgo.mission.mavlink.following.vehicle_status import CLOCKS
 from stopgo.mission.mavlink.telemetry import Message, has_restarted
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import AnyEvent, Arrived, Pose
@@ -68,7 +69,7 @@ class FollowedRun:
     def take_earlier(self, message: Message, now_ns: int) -> None:
         """Take a message from before the vehicle got this list: it belongs to no run of it."""
         self._observer.take(message, self._listed, now_ns)
-        self._boot_ms = self._observer.boot_ms
+        self._boot_ms = self._observer.status.boot_ms
 
     def take(self, message: Message, now_ns: int) -> None:
         """Take a message that the vehicle sent at this time."""
@@ -139,7 +140,7 @@ class FollowedRun:
                 return
 
     def _look_at_clock(self, now_ns: int) -> None:
-        before_ms, self._boot_ms = self._boot_ms, self._observer.boot_ms
+        before_ms, self._boot_ms = self._boot_ms, self._observer.status.boot_ms
         if has_restarted(before_ms, self._boot_ms) and not self._run.over:
             self._take(runs.rebooted(self._run), now_ns)
 

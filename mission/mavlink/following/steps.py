@@ -16,7 +16,7 @@ import msgspec
 from stopgo.mission.document import Stop
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, StopItems
 from stopgo.mission.run import states as runs
-from stopgo.mission.run.events import Pose, Settled, Unconfirmed
+from stopgo.mission.run.events import JUMPED_OVER, Pose, Settled, Unconfirmed
 from stopgo.mission.run.scans import ScanFailed, ScanResult, heading_error
 from stopgo.mission.run.states import Change, Run, changed
 from stopgo.mission.run.tolerance import deviation, is_outside
@@ -24,7 +24,7 @@ from stopgo.mission.run.tolerance import deviation, is_outside
 SOMEBODY = "the vehicle's operator"
 """Commander of commands that were not sent from here."""
 JUMPED = (
-    "jumped over by somebody: the vehicle's current item was set beyond it; drive to it again by"
+    f"{JUMPED_OVER}: the vehicle's current item was set beyond it; drive to it again by"
     " stopgo start --again, or plan a follow-up mission (stopgo review)"
 )
 LATE_REPORTS = ("NAVIGATING", "SCANNING")

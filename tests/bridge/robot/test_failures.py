@@ -167,9 +167,42 @@ def test_a_robot_carried_off_its_route_is_not_resumed() -> None:
     field = started(corridor())
     field.order("pause")
     field.base.stand_at(Pose(x=1.0, y=0.5, heading=0.0))
-    assert field.order("resume").reason == "off_route"
+    refused = field.order("resume")
+    assert refused.reason == "off_route"
+    assert "drive it by hand to (1.00, 0.00), within 0.35 m" in refused.message
     field.base.stand_at(Pose(x=1.0, y=0.02, heading=0.0))
     assert field.order("resume").outcome == "ok"
+
+
+@pytest.mark.parametrize(("verb", "away_m"), [("resume", 0.15), ("resume", 0.34), ("home", 0.15)])
+def test_a_robot_within_its_radius_of_its_route_goes_back_to_it_first(
+    monkeypatch: pytest.MonkeyPatch, verb: Verb, away_m: float
+) -> None:
+    field = started(corridor())
+    field.order("pause")
+    field.base.stand_at(Pose(x=1.0, y=away_m, heading=0.0))
+    paths: list[tuple[tuple[float, float], ...]] = []
+    goto = field.base.goto
+    monkeypatch.setattr(
+        field.base, "goto", lambda path, **more: paths.append(tuple(path)) or goto(path, **more)
+    )
+    assert field.order(verb).outcome == "ok"
+    field.work()
+    assert paths[0][0] == pytest.approx((1.0, 0.0)) and len(paths[0]) == 2
+    assert field.controller.run.state == ("ABORTED" if verb == "home" else "FINISHED")
+
+
+def test_a_robot_that_rolled_past_the_last_stop_takes_it_again() -> None:
+    field = started(corridor(), Fault("scanner", 3))
+    mission = field.controller.snapshot()[1]
+    assert mission is not None
+    last = mission.stops[-1]
+    field.work_until(lambda run: run.at == len(mission.stops) - 1)
+    field.order("pause")
+    field.base.stand_at(Pose(x=last.x + 0.16, y=last.y, heading=0.0))
+    assert field.order("resume").outcome == "ok"
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
 
 
 def test_a_turn_that_a_pause_ended_is_finished_before_the_scan() -> None:

@@ -90,3 +90,9 @@ def test_a_stop_scanned_within_its_tolerance_is_told_as_before() -> None:
     scans = [event for event in field.journal.events() if isinstance(event, Scanned)]
     assert len(scans) == 3 and not [event for event in scans if "beside" in event_line(event, stops)]
     assert "3 done;" in state_line(field.report())
+
+
+def test_status_names_the_skipped_stops_of_a_finished_run(field: Field) -> None:
+    state = msgspec.structs.replace(field.report(), skipped=("s2",), skipped_count=1)
+    assert state.state == "FINISHED"
+    assert ", 1 skipped (s2: stopgo start --again repeats the mission);" in state_line(state)

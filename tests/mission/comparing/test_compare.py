@@ -16,6 +16,7 @@ from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.comparing.spans import paused_s
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.run.events import (
+    JUMPED_OVER,
     Aborted,
     Arrived,
     Failed,
@@ -283,3 +284,19 @@ def test_of_repeated_visits_the_last_reason_counts_and_of_a_skip_after_a_failure
         (Skipped, 9.0, {"stop": "S1", "reason": "skip by ann"}),
     )
     assert given_up.stops[0].reason == "scan: timeout; skip by ann"
+
+
+def test_stops_that_somebody_jumped_over_are_named_with_the_commands_that_scan_them() -> None:
+    skip = {"stop": "S2", "reason": f"{JUMPED_OVER}: the vehicle's current item was set beyond it"}
+    text = comparison_text(run(START, *visit("S1", 0, 1, 1), (Skipped, 65.0, skip), (Finished, 70.0, {})))
+    (line,) = [line for line in text.splitlines() if line.startswith("not scanned")]
+    assert "jumped over by somebody: S2;" in line
+    assert (
+        "stopgo replay RECORDING" in line and "--top-up next.json" in line and "stopgo start --again" in line
+    )
+
+
+def test_a_stop_that_was_skipped_by_command_is_not_named_as_jumped_over() -> None:
+    skip = {"stop": "S2", "reason": "skip by ann"}
+    comparison = run(START, *visit("S1", 0, 1, 1), (Skipped, 65.0, skip), (Finished, 70.0, {}))
+    assert "jumped over" not in comparison_text(comparison)

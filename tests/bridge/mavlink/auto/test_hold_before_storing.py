@@ -65,9 +65,12 @@ class SlowDisk:
 
 
 class Still:
-    """An observer of a vehicle without a pose."""
+    """An observer of a vehicle without a pose: also its status, position and poses."""
 
     items, battery = None, 1.0
+
+    def __init__(self) -> None:
+        self.status = self.position = self.poses = self
 
     def pose(self, now_ns: int) -> None:
         return None

@@ -69,15 +69,15 @@ def test_a_mission_ends_by_its_state_or_by_its_last_item_where_there_is_none() -
     telling = Telling()
     last = telling.listed.sequence(telling.listed.end - 1)
     telling.current(last, UNKNOWN)
-    assert telling.observer.place(telling.listed) == telling.listed.end - 1
+    assert telling.observer.position.place(telling.listed) == telling.listed.end - 1
     telling.reached(last - 1)
-    assert telling.observer.place(telling.listed) == telling.listed.end - 1
+    assert telling.observer.position.place(telling.listed) == telling.listed.end - 1
     telling.reached(last)
-    assert telling.observer.place(telling.listed) == telling.listed.end
+    assert telling.observer.position.place(telling.listed) == telling.listed.end
     telling.current(1, UNKNOWN)
-    assert telling.observer.place(telling.listed) == 0
+    assert telling.observer.position.place(telling.listed) == 0
     telling.current(last, COMPLETE)
-    assert telling.observer.place(telling.listed) == telling.listed.end
+    assert telling.observer.position.place(telling.listed) == telling.listed.end
 
 
 def test_local_metres_are_exact_and_degrees_a_step_off() -> None:
@@ -90,13 +90,14 @@ def test_local_metres_are_exact_and_degrees_a_step_off() -> None:
         dialect.MAVLink_attitude_message(1, 0, 0, yaw, 0, 0, 0),
         dialect.MAVLink_global_position_int_message(1, lat, lon, 0, 0, 30, 40, 0, 0),
     )
-    fix = telling.observer.fix
+    fix = telling.observer.poses.fix
     assert fix is not None and fix.speed == pytest.approx(0.5)
     assert (fix.pose.x, fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.008)
     assert fix.pose.heading == pytest.approx(0.0, abs=1e-6)
     telling.origin()
     telling.tell(dialect.MAVLink_local_position_ned_message(2, 4.0, 3.0, 0, 0, 0, 0))
-    assert (telling.observer.fix.pose.x, telling.observer.fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.001)  # type: ignore[union-attr]
+    fix = telling.observer.poses.fix
+    assert (fix.pose.x, fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.001)  # type: ignore[union-attr]
 
 
 def test_a_pose_is_of_the_item_only_if_it_was_told_after_it() -> None:
@@ -152,7 +153,7 @@ def test_a_battery_that_is_not_told_changes_nothing() -> None:
     telling = Telling()
     for remaining in (40, -1):
         telling.tell(dialect.MAVLink_sys_status_message(0, 0, 0, 0, 0, 0, remaining, 0, 0, 0, 0, 0, 0))
-    assert telling.observer.battery == 0.4
+    assert telling.observer.status.battery == 0.4
 
 
 def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
@@ -160,10 +161,10 @@ def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
     told = []
     for total in (0, 65_535, 7):
         telling.current(1, total=total)
-        told.append(telling.observer.items)
+        told.append(telling.observer.position.items)
     assert told == [None, None, 7]
     telling.current(0, dialect.MISSION_STATE_NO_MISSION, total=65_535)
-    assert telling.observer.items == 0
+    assert telling.observer.position.items == 0
 
 
 def standing(telling: Telling, x: float, y: float) -> None:

@@ -1,0 +1,224 @@
+"""A vehicle in AUTO, and whatever else befalls it: a stop counts once, and only if it was scanned in place.
+
+The simulated vehicle gives the truth: its own poses at begin and end of each scan.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stopgo.bridge.mavlink.auto.logbook import remember
+from stopgo.bridge.mavlink.simulated.profiles import profile_named
+from stopgo.bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
+from stopgo.bridge.mavlink.transfer.upload import upload
+from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.messages import set_current
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
+from stopgo.bridge.mavlink.vehicle_link.url import Url
+from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
+from stopgo.mission.document import Scan
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import Held, Paused, Pose, Scanned, StateReport
+from tests.bridge.mavlink.auto.site import KINDS, Site, real_tour
+from tests.bridge.mavlink.lossy import Lossy, Roughness
+from tests.faults.sizes import size
+from tests.faults.test_gateway import moment
+from tests.own_time import World, stepped_into
+
+SEEDS = range(size(short=4, full=200))
+OTHER = Who(255, 190)
+TRUE_M = 0.05
+"""By how much an estimate may differ from the truth."""
+LONGEST_S = 1500.0
+SCAN = Scan(profile="default", duration_s=6.0, timeout_s=40.0)
+FAILSAFES = 6
+
+
+@dataclass
+class Hands:
+    """The vehicle, its link, and another station on a link of its own."""
+
+    site: Site
+    line: Lossy
+    world: World
+    vehicle: Url
+    life: ExitStack = field(default_factory=ExitStack)
+
+    def on(self) -> None:
+        """Switch the vehicle on; it stands where it stood."""
+        passed, self.site.url = self.site.url, self.vehicle
+        self.life.enter_context(self.site.up())
+        self.site.url = passed
+        self.site.at, self.site.faults = None, ()
+
+    def other(self, does: Callable[[Peer], object]) -> None:
+        with wire(self.vehicle, me=OTHER) as opened, found(opened, 1) as peer:
+            does(peer)
+
+
+def another_list(hands: Hands, chance: random.Random) -> None:
+    """Of the same length, with other stops or scans that are cut short; or of another length."""
+    site = hands.site
+    brief = Scan(profile="default", duration_s=0.2, timeout_s=20.0)
+    other = translate(
+        real_tour(**({"scan": brief} if chance.random() < 0.5 else {"settle_s": 4.0})), KINDS[site.profile]
+    )
+    hands.other(lambda peer: upload(peer, other, while_running=True))
+
+
+def another_mode(hands: Hands, chance: random.Random) -> None:
+    modes = profile_named(hands.site.profile).modes
+    mode = chance.choice([modes.hold, modes.numbers["manual"]])
+    hands.other(lambda peer: peer.order(dialect.MAV_CMD_DO_SET_MODE, *mode.params))
+
+
+def jumped(hands: Hands, chance: random.Random) -> None:
+    """To the begin of the leg to some stop, ahead or behind."""
+    with hands.site.book() as book:
+        listed = book.listed
+    assert listed is not None
+    sequence = listed.sequence(chance.choice(listed.stops).first)
+    hands.other(lambda peer: peer.send(set_current(peer.who, sequence)))
+
+
+def cut(hands: Hands, chance: random.Random) -> None:
+    hands.line.roughness = Roughness(loss=1.0)
+    hands.world.sleep(chance.choice([1.0, 4.0, 15.0, 60.0]))
+    hands.line.roughness = Roughness()
+
+
+def rough(hands: Hands, chance: random.Random) -> None:
+    hands.line.roughness = Roughness(delay_s=0.05, loss=0.2, doubled=0.05, overtaken=0.1)
+
+
+def switched_off(hands: Hands, chance: random.Random) -> None:
+    hands.life.close()
+    hands.world.sleep(chance.choice([0.5, 3.0, 10.0]))
+    hands.on()
+
+
+def watch_restarted(hands: Hands, chance: random.Random) -> None:
+    """The connection is closed and opened again after each mishap."""
+    hands.world.sleep(chance.choice([0.0, 2.0, 20.0]))
+
+
+MISHAPS = (another_list, another_mode, jumped, cut, rough, switched_off, watch_restarted)
+
+
+def followed(hands: Hands, befalls: list[Any], chance: random.Random) -> None:
+    """Follow the run to its end, let all befall it, and go on as an operator would."""
+    began_ns, site = hands.world.monotonic_ns(), hands.site
+
+    def in_time() -> None:
+        assert hands.world.monotonic_ns() - began_ns < LONGEST_S * 1e9, site.run
+
+    site.order("start")
+    while not site.run.over:
+        in_time()
+        try:
+            with site.reached() as station:
+                for report in station.reports():
+                    in_time()
+                    if befalls and befalls[0][0](report):
+                        befalls.pop(0)[1](hands, chance)
+                        break
+                    if isinstance(report, StateReport) and report.state in ("HELD", "PAUSED"):
+                        go_on(hands, report.state)
+                        break
+        except (NegativeResult, OutcomeUnknown, RobotUnreachable):
+            hands.world.sleep(1.0)
+
+
+def go_on(hands: Hands, state: str) -> None:
+    """Give the vehicle its list again if it has another one, and order to go on."""
+    site = hands.site
+    if "changed the vehicle's mission" in site.run.reason:
+        hands.other(lambda peer: upload(peer, site.sent, while_running=True))
+    site.order("retry" if state == "HELD" else "resume")
+
+
+@dataclass(frozen=True)
+class TrueScan:
+    """A scan as the simulated vehicle made it."""
+
+    file: str
+    moved_m: float
+    at: Pose
+
+
+@pytest.fixture
+def true_scans(monkeypatch: pytest.MonkeyPatch) -> list[TrueScan]:
+    made: list[TrueScan] = []
+    end = VehicleScanner.end
+
+    def noted(scanner: VehicleScanner, pose: Pose) -> ScanEnd:
+        assert scanner.scan is not None
+        began = scanner.scan.began_at
+        monkeypatch.setattr("stopgo.bridge.mavlink.simulated.vehicle_scanner._moved", lambda *poses: False)
+        done = end(scanner, pose)
+        moved_m = math.dist((began.x, began.y), (pose.x, pose.y))
+        made.append(TrueScan(done.file_url.partition("?")[0], moved_m, pose))
+        return done
+
+    monkeypatch.setattr(VehicleScanner, "end", noted)
+    return made
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    with stepped_into() as stepped:
+        yield stepped
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_stop_counts_in_auto_that_was_not_scanned_in_place(
+    tmp_path: Path, true_scans: list[TrueScan], world: World, seed: int
+) -> None:
+    chance = random.Random(2000 + seed)
+    profile = ("ardupilot", "px4")[seed // 8 % 2]
+    first = seed % (len(MISHAPS) + 1)
+    faults = (
+        [f"failsafe@{chance.randrange(4, 30)}={chance.randrange(FAILSAFES)}"] if first == len(MISHAPS) else []
+    )
+    befalls = [
+        (moment(chance, "S1", "S2"), MISHAPS[first % len(MISHAPS)]),
+        (moment(chance, "S2", "S3"), chance.choice(MISHAPS)),
+    ]
+    site = Site(
+        tmp_path, profile, mission=real_tour(scan=SCAN, retries=2), faults=faults, speed_up=1.0, seed=seed + 1
+    )
+    with Lossy(site.url.number, Roughness(), seed=seed) as line:
+        hands = Hands(site, line, world, vehicle=site.url)
+        site.url = line.url
+        with site.book() as book:
+            remember(book, site.mission, site.sent)
+        with hands.life:
+            hands.on()
+            followed(hands, befalls, chance)
+        run, events = site.run, site.events
+    counted = [event for event in events if isinstance(event, Scanned)]
+    names = [event.stop for event in counted]
+    assert len(set(names)) == len(names), "scanned twice"
+    assert (
+        set(run.done) | set(run.skipped) == {stop.id for stop in site.mission.stops} or run.state == "ABORTED"
+    )
+    for event in counted:
+        stop = next(stop for stop in site.mission.stops if stop.id == event.stop)
+        fits = [
+            scan
+            for scan in true_scans
+            if scan.file == event.file
+            and scan.moved_m <= stop.tolerance_m
+            and math.dist((scan.at.x, scan.at.y), (stop.x, stop.y)) <= stop.tolerance_m + TRUE_M
+        ]
+        assert fits, (event, true_scans)
+    assert all(event.reason for event in events if isinstance(event, Held | Paused))
