@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from stopgo.mission.comparing.acquired import Acquired
-from stopgo.mission.comparing.comparison import StopComparison
+from stopgo.mission.comparing.comparison import Comparison, StopComparison
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import IntArray, frozen
 from stopgo.mission.stages.sight import Sight
@@ -28,7 +28,7 @@ def acquired_by(
         return None
     last = plans[-1]
     planned = {stop.id: stop for mission in missions for stop in mission.stops}
-    done = [item.stop for item in stops if item.outcome == SCANNED and not item.is_doubtful]
+    done = [item.stop for item in stops if _is_scanned(item)]
     doubtful = [item.stop for item in stops if item.is_doubtful]
     views = _views(done, planned, plans)
     seen = last.ledger.enough(views)
@@ -40,6 +40,62 @@ def acquired_by(
         lost={stop: last.brings(stop, views) for stop in wanted if stop in last.ids},
         unknown=tuple(stop for stop in done if _plan_with(stop, planned, plans) is None),
     )
+
+
+def acquired_together(runs: Sequence[Comparison], sights: Iterable[Sight]) -> Acquired | None:
+    """Return the coverage that runs of one mission acquired together; None without visibility data.
+
+    Scans of several runs at one position are one view. A scan outside its tolerance is doubtful.
+    """
+    newest = max((run.missions[-1] for run in runs), key=lambda mission: mission.revision)
+    plans = _plans_of(newest, sights)
+    if not plans:
+        return None
+    last = plans[-1]
+    done = scanned_positions(runs)
+    perhaps = {
+        (stop.x, stop.y): stop
+        for run in runs
+        for item, stop in _with_positions(run)
+        if item.is_doubtful or item.outside_tolerance
+    }
+    views = _views_at(done.values(), plans)
+    seen = last.ledger.enough(views)
+    also = [stop for position, stop in perhaps.items() if position not in done]
+    left = [stop.id for stop in newest.stops if (stop.x, stop.y) not in done]
+    return Acquired(
+        sight=last,
+        seen=seen,
+        perhaps=last.ledger.enough(views + _views_at(also, plans)),
+        lost={stop: last.brings(stop, views) for stop in left if stop in last.ids},
+        unknown=tuple(stop.id for stop in done.values() if not any(plan.knows(stop) for plan in plans)),
+    )
+
+
+def scanned_positions(runs: Iterable[Comparison]) -> dict[tuple[float, float], Stop]:
+    """Return the stops that a run scanned within tolerance, by planned position."""
+    pairs = (pair for run in runs for pair in _with_positions(run))
+    return {
+        (stop.x, stop.y): stop for item, stop in pairs if _is_scanned(item) and not item.outside_tolerance
+    }
+
+
+def _with_positions(run: Comparison) -> Iterable[tuple[StopComparison, Stop]]:
+    """Return the stops of a run that its mission contains, each with its planned position."""
+    planned = {stop.id: stop for mission in run.missions for stop in mission.stops}
+    return ((item, planned[item.stop]) for item in run.stops if item.stop in planned)
+
+
+def _is_scanned(item: StopComparison) -> bool:
+    return item.outcome == SCANNED and not item.is_doubtful
+
+
+def _views_at(stops: Iterable[Stop], sights: Sequence[Sight]) -> IntArray:
+    """Return the number of these stops, one for each position, that see each unit."""
+    views = np.zeros(len(sights[-1].ledger.weight), dtype=np.int64)
+    for stop in stops:
+        views += _views([stop.id], {stop.id: stop}, sights)
+    return frozen(views, np.int64)
 
 
 def _plans_of(mission: Mission, sights: Iterable[Sight]) -> list[Sight]:

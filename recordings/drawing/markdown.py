@@ -137,6 +137,10 @@ def _schedule(schedule: Schedule) -> dict[str, Any]:
     return {"planned_s": round(float(schedule.total_s), 1)}
 
 
+def _figures(figures: Figures) -> dict[str, Any]:
+    return {"findings": len(figures.findings)}  # of all stages, not of the floor alone
+
+
 def _mission(mission: Mission) -> dict[str, Any]:
     return {
         "mission_id": mission.id,
@@ -155,6 +159,7 @@ _RESULTS: dict[type, Any] = {
     Route: _route,
     Schedule: _schedule,
     Mission: _mission,
+    Figures: _figures,
 }
 
 

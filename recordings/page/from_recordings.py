@@ -36,6 +36,7 @@ def subject_of(review: Review) -> ReportSubject:
         raise InputError(
             "report: no recording contains its mission, all are of another version; plan and record again"
         )
+    both = review.together.get(ids[0])
     return ReportSubject(
         missions=missions,
         comparisons=tuple(sorted(review.comparisons, key=lambda item: item.log.began_ns or 0)),
@@ -49,8 +50,9 @@ def subject_of(review: Review) -> ReportSubject:
             run.run_id: (("What to do next", lines),)
             for item in items
             for run in item.comparisons
-            if (lines := what_next(run, item.recording.path))
+            if both is None and (lines := what_next(run, item.recording.path))
         },
+        together=() if both is None else (*both.sentences, *review.next_together(ids[0])),
         problems=tuple(f"{item.recording.path.name}: {text}" for item in items for text in item.problems),
     )
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 from stopgo.mission.comparing.compare import compare
@@ -18,6 +18,7 @@ from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.drawing import entities
 from stopgo.recordings.embedded.checking import problems_of
 from stopgo.recordings.embedded.reading import Recording, read_each
+from stopgo.recordings.page.runs_together import RunsTogether, follow_up_command, together
 
 SUFFIX = ".rrd"
 
@@ -52,8 +53,8 @@ class RecordingReview:
             "runs": [comparison_json(comparison) for comparison in self.comparisons],
         }
 
-    def as_text(self) -> str:
-        """Return the review for a person."""
+    def as_text(self, *, alone: bool = True) -> str:
+        """Return the review for a person; without what to do next if there are more runs of the mission."""
         contents = self.recording.contents
         lines = [
             f"{self.recording.path}: recording {contents.recording_id} (mission of the same id)",
@@ -64,7 +65,7 @@ class RecordingReview:
         if self.plan is not None:
             lines += [f"  {name}: {value}" for name, value in self.plan.items()]
         for item in self.comparisons:
-            lines += ["", comparison_text(item), *what_next(item, self.recording.path)]
+            lines += ["", comparison_text(item), *(what_next(item, self.recording.path) if alone else ())]
         return "\n".join(lines)
 
 
@@ -79,6 +80,38 @@ class Review:
     @property
     def comparisons(self) -> tuple[Comparison, ...]:
         return tuple(item for review in self.recordings for item in review.comparisons)
+
+    @cached_property
+    def together(self) -> dict[str, RunsTogether]:
+        """Runs of every mission of which there are several, by the mission's id."""
+        return {
+            mission_id: together(runs, sights_of(item.recording for item in items))
+            for mission_id, items in self._by_mission.items()
+            if len(runs := [run for item in items for run in item.comparisons]) > 1
+        }
+
+    def next_together(self, mission_id: str) -> tuple[str, ...]:
+        """Return the command for one follow-up mission after all runs of a mission, if one is needed."""
+        items = self._by_mission[mission_id]
+        return self.together[mission_id].what_next(item.recording.path for item in items if item.comparisons)
+
+    @property
+    def _by_mission(self) -> dict[str, list[RecordingReview]]:
+        found: dict[str, list[RecordingReview]] = {}
+        for item in self.recordings:
+            found.setdefault(item.recording.mission_id, []).append(item)
+        return found
+
+    def as_text(self) -> str:
+        """Return the review for a person: each recording, then the runs of each mission together."""
+        each = [
+            item.as_text(alone=item.recording.mission_id not in self.together) for item in self.recordings
+        ]
+        both = [
+            "\n".join((*runs.verdicts, *runs.sentences, *self.next_together(mission_id)))
+            for mission_id, runs in self.together.items()
+        ]
+        return "\n\n".join([*each, *both])
 
     @property
     def exit_code(self) -> int:
@@ -98,8 +131,7 @@ def what_next(run: Comparison, path: Path) -> tuple[str, ...]:
     acquired, floor = run.acquired, run.mission.origin.floor
     if acquired is None or acquired.answer != "no" or not run.log.ended or not floor:
         return ()
-    command = f"stopgo replay {quote(str(path))} --mission mission.json --floor FLOOR --top-up next.json"
-    return (f"For the missing coverage, plan a follow-up mission (FLOOR is the file of {floor}): {command}",)
+    return (follow_up_command([path], floor),)
 
 
 def review(paths: Iterable[Path]) -> Review:

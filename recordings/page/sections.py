@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from datetime import UTC, datetime
 
 from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
@@ -16,13 +15,12 @@ from stopgo.mission.run.events import Scanned
 from stopgo.mission.stages.figures import Share, percent
 from stopgo.recordings.page.floor_picture import legend, line_sample, plan_picture
 from stopgo.recordings.page.plots import plots
+from stopgo.recordings.page.runs_together import run_names, when_and_who
 from stopgo.recordings.page.stop_table import stop_table
 from stopgo.recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
 
-FIRST_DATE_NS, LAST_DATE_NS = 10**18, 4 * 10**18
-"""Times from 2001 to 2096: others are no dates."""
 MOST_ELEMENTS = 40
 """Limit of listed elements; those with the least coverage come first."""
 
@@ -127,19 +125,11 @@ def _plan_shares(shares: Sequence[Share], what: str) -> str:
 # ---- a run ----
 
 
-def _when_and_who(comparison: Comparison) -> str:
-    """Return date and robot of a run; a clock that was never set has no date."""
-    began_ns = comparison.log.began_ns or 0
-    when = "date unknown (its clock was not set)"
-    if FIRST_DATE_NS <= began_ns < LAST_DATE_NS:
-        when = f"{datetime.fromtimestamp(began_ns // 10**9, UTC):%Y-%m-%d %H:%M} UTC"
-    return f"{when}, robot {comparison.log.robot or 'without a name'}"
-
-
 def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iterator[str]:
     if not alone:
-        yield tag("h2", shown(f"Run {comparison.run_id or 'without a name'}"))
-    yield tag("p", shown(_when_and_who(comparison)))
+        yield tag("h2", shown(f"Run of {_name_of(subject, comparison)}"))
+    identity = f", run {comparison.run_id}" if comparison.run_id else ""
+    yield tag("p", shown(when_and_who(comparison) + ("" if alone else identity)))
     judgement = subject.judgement(comparison)
     words = shown(" " + " ".join(judgement.sentences))
     yield tag("div", tag("b", shown(f"{judgement.headline}.")), words, class_="band",
@@ -155,6 +145,12 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
     for title, lines in subject.more.get(comparison.run_id, ()):
         yield section(title, tag("ul", *(tag("li", shown(line)) for line in lines)))
     yield section("During the run", plots(comparison))
+
+
+def _name_of(subject: ReportSubject, comparison: Comparison) -> str:
+    """Return date and robot of a run, as among all runs of the page."""
+    runs = subject.comparisons
+    return next(name for run, name in zip(runs, run_names(runs), strict=True) if run is comparison)
 
 
 def _tiles(comparison: Comparison) -> Iterator[str]:
@@ -304,15 +300,17 @@ def _bar(share: Share) -> str:
 
 def _runs_compared(subject: ReportSubject) -> str:
     runs = subject.comparisons
-    header = ["", *(shown(run.run_id or "without a name") for run in runs)]
+    header = ["", *map(shown, run_names(runs))]
     verdicts = (shown(subject.judgement(run).headline) for run in runs)
     rows = [row([tag("b", "verdict"), *verdicts])]
     rows += [row([tag("b", name), *(figure(run) for run in runs)]) for name, figure in _ROWS]
     stops = dict.fromkeys(item.stop for run in runs for item in run.stops)
     by_stop = [{item.stop: item for item in run.stops} for run in runs]
     cells = [row([shown(stop), *(_outcome(items.get(stop)) for items in by_stop)]) for stop in stops]
+    lines = [tag("li", shown(line)) for line in subject.together]
     return (
-        section("Runs", tag("div", grid(header, rows), class_="scroll"))
+        section("All runs together", tag("ul", *lines) if lines else "")
+        + section("Runs", tag("div", grid(header, rows), class_="scroll"))
         + section("Stops of every run", tag("div", grid(header, cells), class_="scroll"))
         + section("Rooms of every run", tag("div", _rooms_of(runs, header), class_="scroll"))
     )
@@ -367,14 +365,12 @@ def _findings(subject: ReportSubject) -> str:
 
 
 def _alignments(subject: ReportSubject) -> str:
+    runs = subject.comparisons
     lines = [
-        tag("li", shown(f"{_run_name(run)}: {_aligned(run)}. {_read(run)}")) for run in subject.comparisons
+        tag("li", shown(f"{name}: {_aligned(run)}. {_read(run)}"))
+        for run, name in zip(runs, run_names(runs), strict=True)
     ]
     return section("Alignment", tag("ul", *lines)) if lines else ""
-
-
-def _run_name(run: Comparison) -> str:
-    return f"run {run.run_id or 'without a name'}"
 
 
 def _aligned(run: Comparison) -> str:

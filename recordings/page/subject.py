@@ -42,6 +42,9 @@ class ReportSubject:
     more: Mapping[str | None, tuple[tuple[str, tuple[str, ...]], ...]] = field(default_factory=dict)
     """Additional texts by run id: titles, each with its lines."""
 
+    together: tuple[str, ...] = ()
+    """Coverage that several runs acquired together, what is left, and what to do next."""
+
     def judgement(self, run: Comparison) -> Judgement:
         """Return the verdict on a run, with its reasons."""
         return self.judgements.get(run.run_id) or judge(run)

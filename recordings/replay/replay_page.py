@@ -8,7 +8,8 @@ from dataclasses import replace
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.page.from_recordings import subject_of
-from stopgo.recordings.page.reviewed import Review
+from stopgo.recordings.page.reviewed import Review, sights_of
+from stopgo.recordings.page.runs_together import together
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.replay.drive_verdict import drive_verdict, missing, outside
 from stopgo.recordings.replay.path_and_time import lost_times, smoothed_track
@@ -41,9 +42,18 @@ def page_of(replays: Sequence[Replay], plans: Review | None = None) -> ReportSub
         sight=None
         if any(one.inferred for one in replays)
         else plan.sight,  # else walls would be drawn as scanned
+        together=_together(replays, plans),
         judgements={item.run.run_id: drive_verdict(item) for item in replays},
         more={item.run.run_id: tuple(run_texts(item)) for item in replays},
     )
+
+
+def _together(replays: Sequence[Replay], plans: Review | None) -> tuple[str, ...]:
+    """Return what several replays acquired together, if their logs contain scans."""
+    if plans is None or len(replays) < 2 or any(one.inferred for one in replays):
+        return ()
+    sights = sights_of(item.recording for item in plans.recordings)
+    return together([one.comparison for one in replays], sights).sentences
 
 
 def _shown(replay: Replay) -> Comparison:

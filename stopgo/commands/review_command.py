@@ -99,9 +99,10 @@ def _print_review(found: Review, *, as_json: bool) -> None:
     if as_json:
         items = [item.as_json() for item in found.recordings]
         alone = len(items) == 1 and not found.faults
-        whole = items[0] if alone else {"recordings": items, "faults": list(found.faults)}
+        both = [item.as_json() for item in found.together.values()]
+        whole = items[0] if alone else {"recordings": items, "together": both, "faults": list(found.faults)}
         typer.echo(json.dumps(whole, ensure_ascii=False))
     else:
-        typer.echo(printable_lines("\n\n".join(item.as_text() for item in found.recordings)))
+        typer.echo(printable_lines(found.as_text()))
     for fault in found.faults:
         typer.echo(f"stopgo: {printable(fault)}", err=True)

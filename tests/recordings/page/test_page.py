@@ -23,6 +23,7 @@ from stopgo.recordings.page import ReportSubject, report_html
 from stopgo.recordings.page.floor_picture import plan_picture
 from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import review
+from stopgo.recordings.page.runs_together import run_names, when_and_who
 from stopgo.recordings.page.words import number, shown
 from tests.mission.comparing.test_compare import START, planned, run, visit
 from tests.mission.comparing.told import told
@@ -140,6 +141,20 @@ def test_several_runs_stand_in_columns() -> None:
     rows = [["".join(cell.itertext()) for cell in line] for line in table.iter("tr")]
     assert ["verdict", "Not acquired", "Acquired"] in rows
     assert ["coverage", "57.1 %", "78.5 %"] in rows
+
+
+def test_runs_are_named_by_date_and_robot_and_numbered_within_a_minute() -> None:
+    whole = run(*visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1), (Finished, 133.0, {}))
+    (first,) = skipping().comparisons
+    one, two = (replace(item, log=replace(item.log, robot="r7")) for item in (first, whole))
+    names = run_names([one, two])
+    assert [
+        name.endswith(f"robot r7 (run {number})") for name, number in zip(names, (1, 2), strict=True)
+    ] == [
+        True,
+        True,
+    ]
+    assert run_names([one]) == [when_and_who(one)]
 
 
 def test_text_from_outside_stays_text(mission: Mission) -> None:

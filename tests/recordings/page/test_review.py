@@ -16,7 +16,9 @@ from stopgo.mission.document import Mission, sealed
 from stopgo.recordings.embedded.checking import problems_of
 from stopgo.recordings.embedded.reading import read_recording
 from stopgo.recordings.rrd.compact import VIEWER
+from stopgo.recordings.runs.field import FieldRecording
 from tests.recordings import run, world
+from tests.recordings.conftest import tell
 
 
 def test_a_plan_in_json(plan: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -70,6 +72,46 @@ def test_nothing_is_to_be_done_after_a_run_as_planned(
 ) -> None:
     assert main(["review", str(sighted), str(field)]) == 0
     assert "a follow-up mission" not in capsys.readouterr().out
+
+
+def run_without(path: Path, mission: Mission, stop: str) -> Path:
+    """A recording of a run of its own, in which a stop is skipped."""
+    recording = FieldRecording(path, mission)
+    with recording:
+        for report in run.reports_with_a_skip(mission, stop):
+            tell(recording, msgspec.structs.replace(report, run_id=f"without-{stop}"))
+    return path
+
+
+def test_two_runs_are_told_together_and_need_no_follow_up_for_what_one_of_them_did(
+    sighted: Path, mission: Mission, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without S2, 57 % of the visible is scanned; without S1 less. Together it is the planned 78.5 %."""
+    files = [str(run_without(tmp_path / f"{stop}.rrd", mission, stop)) for stop in ("S1", "S2")]
+    page = tmp_path / "report.html"
+    assert main(["review", str(sighted), *files, "--html", str(page)]) == 1
+    text = capsys.readouterr().out
+    assert (
+        "Together, the 2 runs scanned 78.5 % of what is visible; 70.0 % was asked.\nNo stop is left." in text
+    )
+    assert "follow-up" not in text and "follow-up" not in page.read_text()
+    assert "All runs together" in page.read_text() and "robot r1 (run 2)" in page.read_text()
+    assert main(["review", str(sighted), *files, "--json"]) == 1
+    (both,) = json.loads(capsys.readouterr().out)["together"]
+    assert both["coverage"] == pytest.approx(11 / 14)
+    assert (both["answer"], both["left"]) == ("yes", [])
+
+
+def test_two_runs_that_lack_the_same_stop_get_one_follow_up(
+    sighted: Path, skipping: Path, mission: Mission, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = run_without(tmp_path / "other.rrd", mission, "S2")
+    assert main(["review", str(sighted), str(skipping), str(other)]) == 1
+    text = capsys.readouterr().out
+    assert "Together, the 2 runs scanned 57.1 % of what is visible; 70.0 % was asked." in text
+    assert "Not scanned by any run: S2." in text
+    assert text.count("--top-up next.json") == 1
+    assert f"stopgo replay {skipping} {other} --mission mission.json" in text
 
 
 def test_without_its_plan_a_skipped_stop_is_a_no(skipping: Path, capsys: pytest.CaptureFixture[str]) -> None:
