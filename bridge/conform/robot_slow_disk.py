@@ -79,5 +79,5 @@ def _apart(one: Pose, other: Pose) -> float:
 
 
 SLOW_DISK: tuple[Requirement[RobotBench], ...] = (
-    Requirement("Orders", "a pause stands before it is stored", a_stop_waits_for_no_disk, drives=True),
+    Requirement("Commands", "a pause stands before it is stored", a_stop_waits_for_no_disk, drives=True),
 )

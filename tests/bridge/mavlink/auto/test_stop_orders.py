@@ -84,7 +84,7 @@ def test_hold_is_the_first_frame_on_the_line(
         assert said.returncode == 0, said.stderr
         before = next(number for number, frame in enumerate(frames) if is_hold(frame))
         assert before == 0
-        assert "stands" in said.stderr
+        assert "stationary" in said.stderr
     assert site.run.state == ("PAUSED" if verb == "pause" else "ABORTED")
 
 
