@@ -25,7 +25,7 @@ from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Visibility
+from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
 from stopgo.planner.candidates import candidates
 from stopgo.planner.covering_tour import least_time_route
@@ -135,6 +135,7 @@ def top_up(
     obstacles: Sequence[Polygon] = (),
     evidence: str = "",
     measured: BoolArray | None = None,
+    others: Sequence[Mission] = (),
 ) -> Mission | None:
     """Return the smallest follow-up mission that reaches the required coverage; None if nothing is missing.
 
@@ -147,25 +148,30 @@ def top_up(
         Added to the text that the follow-up mission's id is hashed from, such as a log's digest.
     measured
         True for units that need no scan (n,), instead of those visible from the poses.
+    others
+        The other missions that divide the floor with this one; the poses are then those of all their runs.
 
     Raises
     ------
     NegativeResult
         When the required coverage cannot be reached any more.
     InputError
-        When the mission is one of several that divide a floor: the others cover the rest.
+        When the mission divides its floor with others that were not given.
     """
-    _must_cover_alone(planned.mission)
+    _must_be_whole((planned.mission, *others))
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
     seen, done = _with_poses(known, poses, measured)
     selection = select_follow_up(seen, done)
     if not len(selection.chosen):
         return None
-    driven = route(selection)
-    if planned.settings.minimise == "time":
-        driven = least_time_route(driven, done=done)
-    mission = assemble(driven)
+    mission = assemble(_driven(selection, planned.settings, done))
     return _follow_up(mission, planned.mission, evidence, _coverage_alone(known, mission))
+
+
+def _driven(selection: Selection, settings: Settings, done: IntArray) -> Route:
+    """Return the route through the selected stops, of least time if the settings ask for it."""
+    driven = route(selection)
+    return least_time_route(driven, done=done) if settings.minimise == "time" else driven
 
 
 def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
@@ -177,11 +183,20 @@ def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
     )
 
 
-def _must_cover_alone(mission: Mission) -> None:
-    if mission.share is not UNSET:
+def _must_be_whole(missions: Sequence[Mission]) -> None:
+    """Raise InputError unless the missions are all of one plan that divide its floor, or one undivided."""
+    first = missions[0]
+    for mission in missions[1:]:
+        if UNSET in (first.share, mission.share) or mission.origin != first.origin:
+            raise InputError(f"{mission.name}: is not of the same divided plan as {first.name}")
+    if first.share is UNSET:
+        return
+    given = {mission.share.number for mission in missions if mission.share is not UNSET}
+    missing = [str(number) for number in range(1, first.share.of + 1) if number not in given]
+    if missing:
         raise InputError(
-            f"{mission.name}: divides its floor with {mission.share.of - 1} more; a follow-up mission needs "
-            "a floor that one mission covers alone"
+            f"{first.name}: divides its floor with {first.share.of - 1} more; give also mission "
+            f"{', '.join(missing)} of {first.share.of}, each with --mission"
         )
 
 

@@ -85,7 +85,11 @@ def _floor(floor: FloorPlan) -> dict[str, Any]:
 
 def _space(space: NavigableSpace) -> dict[str, Any]:
     passable = sum(state.passable for state in space.openings)
-    return {"passable_openings": passable, "target_units": space.targets.total}
+    return {
+        "passable_openings": passable,
+        "target_units": space.targets.total,
+        "findings": len(space.findings),  # those of the floor are among them
+    }
 
 
 def _candidates(candidates: Candidates) -> dict[str, Any]:

@@ -30,7 +30,10 @@ ReplayLogs = Annotated[
     typer.Argument(metavar="LOG...", help=".bag, rosbag2, .mcap, .db3, .tlog, .BIN, .ulg, TUM, CSV, journal"),
 ]
 ReplayMission = Annotated[
-    Path | None, typer.Option(help="Planned mission; without it the MAVLink mission in the log.")
+    list[Path] | None,
+    typer.Option(
+        help="Planned mission, else the MAVLink mission in the log; repeat for the robots of one plan."
+    ),
 ]
 ReplayOut = Annotated[
     Path | None, typer.Option("-o", "--out", rich_help_panel="Output", help="Recording to write (.rrd).")
@@ -142,12 +145,12 @@ def replay(
     if list_:
         _print_logs(read, as_json=json_)
         return 0
-    files = _ReplayFiles(logs, mission, floor, clouds, out, csv, top_up, html)
+    files = _ReplayFiles(logs, mission or [], floor, clouds, out, csv, top_up, html, plan)
     files.check()
-    driven = _mission(mission, read)
+    driven = _missions(mission or [], read)
     placing = _placing(map_, align, time_offset, poses, robot_name)
-    plans = None if plan is None else _plans(plan, driven)
-    replays = files.compare_and_write(_replays(read, driven, placing, plans), plans)
+    plans = None if plan is None else _plans(plan, driven[0])
+    replays = files.compare_and_write(_replays(read, driven, placing, plans), plans, driven)
     _print_replays(replays, as_json=json_)
     return _exit_code(replays)
 
@@ -157,13 +160,14 @@ class _ReplayFiles:
     """Files that `replay` reads, and files that it writes; None where the user gave no path."""
 
     logs: list[Path]
-    mission: Path | None
+    missions: list[Path]
     floor: Path | None
     clouds: Path | None
     out: Path | None
     csv: Path | None
     follow_up: Path | None
     html: Path | None
+    plan: Path | None
 
     def check(self) -> None:
         """Raise InputError where an option needs another one, or a file cannot be written."""
@@ -174,28 +178,43 @@ class _ReplayFiles:
         for path in (self.out, self.csv, self.follow_up, self.html):
             if path is not None:
                 must_be_writable(path)
-                must_not_replace(path, *self.logs, self.mission, self.floor)
+                must_not_replace(path, *self.logs, *self.missions, self.floor)
         if self.csv is not None and len(self.logs) > 1:
             raise InputError(f"--csv {self.csv}: is a table of one log, not {len(self.logs)}; give one log")
+        self._check_of_one_mission()
 
-    def compare_and_write(self, replays: list[Replay], plans: Review | None) -> list[Replay]:
+    def _check_of_one_mission(self) -> None:
+        """Raise InputError where a file shows one mission, and several were given."""
+        of_one = {"--out": self.out, "--html": self.html, "--plan": self.plan, "--clouds": self.clouds}
+        for option, path in of_one.items():
+            if path is not None and len(self.missions) > 1:
+                raise InputError(
+                    f"{option} {path}: is of one mission, not {len(self.missions)}; give one --mission"
+                )
+
+    def compare_and_write(
+        self, replays: list[Replay], plans: Review | None, missions: list[Mission]
+    ) -> list[Replay]:
         """Return the replays with what was visible on the floor, and write every file."""
         with running("comparing with the floor") as step:
-            found = self.with_floor(replays)
+            found = self.with_floor(replays, missions)
             step.begin("writing the results")
             self.write(found, plans)
         return found
 
-    def with_floor(self, replays: list[Replay]) -> list[Replay]:
+    def with_floor(self, replays: list[Replay], missions: list[Mission]) -> list[Replay]:
         """Return the replays with what was visible on the floor, and write the follow-up mission."""
         if self.floor is None:
             return replays
         from stopgo.planner.pipeline.follow_up_mission import planned_floor
 
-        planned = planned_floor(self.floor, replays[0].mission)
-        found = on_floor(replays, planned, self.clouds)
+        planned = {item.digest: planned_floor(self.floor, item) for item in missions}
+        found = [
+            one for item in replays for one in on_floor([item], planned[item.mission.digest], self.clouds)
+        ]
         if self.follow_up is not None:
-            write_follow_up(follow_up_of(found, planned), self.follow_up)
+            first, *others = missions
+            write_follow_up(follow_up_of(found, planned[first.digest], others), self.follow_up)
         return found
 
     def write(self, replays: list[Replay], plans: Review | None) -> None:
@@ -238,18 +257,35 @@ def _reading(stamps: str, frame: str | None, path: Path, step: RunningStep) -> R
     return Reading(stamps="log" if stamps == "log" else "header", frame=frame, tick=tick)
 
 
-def _mission(path: Path | None, logs: list[FieldLog]) -> Mission:
-    """Return the mission in the given file, else the one in the first log."""
+def _missions(paths: list[Path], logs: list[FieldLog]) -> list[Mission]:
+    """Return the missions in the given files, else the one in the first log."""
     from stopgo.mission.document.problems import problems_of
     from stopgo.mission.files.mission_json import read
     from stopgo.recordings.replay.uploaded import mission_in
 
-    if path is None:
-        return mission_in(logs[0])
-    document = read(path)
-    for problem in problems_of(document)[:1]:
-        raise InputError(f"{path}: {problem} (stopgo check {path} lists all)")
-    return document
+    if not paths:
+        return [mission_in(logs[0])]
+    documents = [read(path) for path in paths]
+    for path, document in zip(paths, documents, strict=True):
+        for problem in problems_of(document)[:1]:
+            raise InputError(f"{path}: {problem} (stopgo check {path} lists all)")
+    return documents
+
+
+def _mission_of(log: FieldLog, number: int, missions: list[Mission], logs: int) -> Mission:
+    """Return the mission that a log names, else the one given in the same order as the log."""
+    if len(missions) == 1:
+        return missions[0]
+    ids = {event.mission_id for event in log.events}
+    for mission in missions:
+        if mission.id in ids:
+            return mission
+    if ids or logs > len(missions):
+        raise InputError(
+            f"{log.path}: belongs to none of the {len(missions)} missions by its own events; "
+            "give each log's mission with --mission, in the order of the logs"
+        )
+    return missions[number]
 
 
 def _placing(
@@ -282,14 +318,17 @@ def _plans(path: Path, mission: Mission) -> Review:
     return found
 
 
-def _replays(logs: list[FieldLog], mission: Mission, placing: Placing, plans: Review | None) -> list[Replay]:
-    """Compare each log with the mission, with the coverage that the plan's recording contains."""
+def _replays(
+    logs: list[FieldLog], missions: list[Mission], placing: Placing, plans: Review | None
+) -> list[Replay]:
+    """Compare each log with its mission, with the coverage that the plan's recording contains."""
     from stopgo.recordings.replay.replaying import replay as replay_of
 
     items = () if plans is None else plans.recordings
     sights = tuple(sight for item in items for sight in item.recording.sights)
     with running("comparing with the mission"):
-        return [replay_of(log, mission, placing, sights) for log in logs]
+        own = [_mission_of(log, number, missions, len(logs)) for number, log in enumerate(logs)]
+        return [replay_of(log, mission, placing, sights) for log, mission in zip(logs, own, strict=True)]
 
 
 def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:

@@ -36,8 +36,11 @@ def _measured(planned: PlannedFloor, replay: Replay, clouds: Path | None) -> Mea
     return found if found.points else None
 
 
-def follow_up_of(replays: list[Replay], planned: PlannedFloor) -> Mission | None:
-    """Plan a mission for what all replays together missed; None if they missed nothing required."""
+def follow_up_of(replays: list[Replay], planned: PlannedFloor, others: list[Mission]) -> Mission | None:
+    """Plan a mission for what all replays together missed; None if they missed nothing required.
+
+    `others` are the missions that divide the floor with the planned one.
+    """
     import numpy as np
 
     from stopgo.planner.pipeline.follow_up_mission import top_up
@@ -55,7 +58,7 @@ def follow_up_of(replays: list[Replay], planned: PlannedFloor) -> Mission | None
         if found.placing_text:
             raise InputError(f"--clouds: {found.placing_text}; no follow-up mission can be planned")
     done = np.any([found.hit | ~found.ledger.visible for found in clouds], axis=0) if clouds else None
-    return top_up(planned, scanned_from, obstacles=obstacles, evidence=evidence, measured=done)
+    return top_up(planned, scanned_from, obstacles=obstacles, evidence=evidence, measured=done, others=others)
 
 
 def write_follow_up(mission: Mission | None, path: Path) -> None:

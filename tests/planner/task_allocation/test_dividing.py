@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import UNSET
+from msgspec.structs import replace as replace_struct
 
 from stopgo.command_line import main
 from stopgo.mission.document import MissionShare
@@ -272,8 +274,29 @@ def test_the_coverage_of_a_mission_is_its_own() -> None:
     assert 0 < told["total"]["coverage"] < settled("hall", robots=2).whole.figures.whole.coverage
 
 
-def test_no_further_mission_is_planned_for_one_share() -> None:
+def test_the_follow_up_of_one_share_needs_the_others() -> None:
     share = settled("hall", robots=2).shares[1]
     known = PlannedFloor(share.floor, share.space.settings, share.mission)
-    with pytest.raises(InputError, match="divides its floor with 1 more"):
+    with pytest.raises(InputError, match="divides its floor with 1 more; give also mission 1 of 2"):
         top_up(known, np.empty((0, 3)))
+
+
+def test_a_follow_up_of_all_shares_scans_only_what_the_lost_robot_left() -> None:
+    """Robot 2 was lost before its first scan; after both shares nothing is left."""
+    one, two = settled("hall", robots=2).shares
+    known = PlannedFloor(one.floor, one.space.settings, one.mission)
+    poses = [
+        np.array([(stop.x, stop.y, stop.heading) for stop in share.mission.stops]) for share in (one, two)
+    ]
+    assert top_up(known, np.concatenate(poses), others=[two.mission]) is None
+    left = top_up(known, poses[0], others=[two.mission])
+    assert left is not None and left.share is UNSET
+    assert 0 < len(left.stops) <= len(two.mission.stops)
+
+
+def test_a_mission_of_another_plan_is_no_share() -> None:
+    one, two = settled("hall", robots=2).shares
+    origin = replace_struct(two.mission.origin, floor_digest="e" * 64)
+    known = PlannedFloor(one.floor, one.space.settings, one.mission)
+    with pytest.raises(InputError, match="not of the same divided plan"):
+        top_up(known, np.empty((0, 3)), others=[replace_struct(two.mission, origin=origin)])

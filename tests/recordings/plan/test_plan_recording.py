@@ -165,6 +165,7 @@ def test_findings_and_results_are_told(plan: Path) -> None:
     assert sum("narrow_door" in line for line in lines) == 1
     told = check(plan).properties
     assert (told["plan"]["stops"], told["plan"]["coverage"], told["plan"]["route_m"]) == (2, 0.7857, 2.2)
+    assert told["plan"]["findings"] == 2  # one of the floor, one of the space
     assert (told["plan"]["floor_digest"], told["parameters"]["d_sec"]) == (world.FLOOR_DIGEST, "0.7")
     (report,) = static(plan, entities.REPORT, "TextDocument:text")
     assert "| stops | 2 |" in report

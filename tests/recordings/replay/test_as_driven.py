@@ -96,6 +96,32 @@ def test_the_command_tells_coverage_and_writes_the_top_up(
     assert main(["check", str(folder / "next.json"), "--floor", str(folder / "floor.dxf")]) == 0
 
 
+def test_a_lost_robots_stops_are_planned_from_the_missions_of_both_robots(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Robot 1 drives its whole mission; robot 2 is lost before its first stop, and has no log."""
+    floor = str(drawn(tmp_path / "floor.dxf"))
+    assert main(["plan", floor, "-o", str(tmp_path), *PLAN, "--robots", "2", "--start", "1,1,0"]) == 0
+    names = [str(tmp_path / name) for name in ("mission.json", "mission-2.json")]
+    mission, lost = (read(Path(name)) for name in names)
+    track = logged(driven(mission, Odd()))
+    rows = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)
+    table = "".join(f"{ns},{x},{y},{heading}\n" for ns, (x, y), heading in rows)
+    (tmp_path / "run.csv").write_text("time_ns,x,y,heading\n" + table)
+    log, further = str(tmp_path / "run.csv"), tmp_path / "next.json"
+    given = ["replay", log, "--align", "first", "--floor", floor, "--top-up", str(further)]
+    capsys.readouterr()
+    assert main([*given, "--mission", names[0]]) == 2
+    assert "give also mission 2 of 2" in capsys.readouterr().err
+    both = [*given, "--mission", names[0], "--mission", names[1]]
+    assert main([*both, "--html", str(tmp_path / "page.html")]) == 2
+    assert "is of one mission, not 2" in capsys.readouterr().err
+    assert main(both) in (0, 1)
+    left = read(further)
+    assert left.share is UNSET
+    assert 0 < len(left.stops) <= len(lost.stops)
+
+
 def test_limits_on_views_hold_as_driven_and_for_the_top_up(tmp_path: Path) -> None:
     """Each wall is to be seen from two stops: left by one, what only one other sees counts no more."""
     limits = ["--min-views", "2", "--max-incidence", "65", "--min-range", "0.9"]
