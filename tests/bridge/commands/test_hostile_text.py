@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from stopgo.bridge.station import session_link
 from stopgo.bridge.station import station as stations
 from stopgo.bridge.station.station import Station
 from stopgo.command_line import main
@@ -44,6 +45,7 @@ def field(monkeypatch: pytest.MonkeyPatch) -> Field:
         yield field.station(commander=HOSTILE)
 
     monkeypatch.setattr(stations, "connect", connect)
+    monkeypatch.setattr(session_link, "connect", connect)
     return field
 
 
