@@ -14,8 +14,7 @@ from stopgo.mission.stages.figures import Figures, Share, percent
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import FloorOptions, read_floor
-from stopgo.planner.selection import select
-from stopgo.planner.selection.refine import refined
+from stopgo.planner.selection.refine import select_refined
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 
@@ -70,7 +69,7 @@ def main() -> None:
 
 def cost_row(name: str, path: Path, options: dict[str, float]) -> list[str]:
     """Stops and bound at each required fraction."""
-    settings = Settings(**options)
+    settings = Settings(register=False, **options)
     floor = read_floor(path, FloorOptions(d_dis=settings.d_dis))
     seen = visibility(candidates(navigable(floor, settings)))
     return [name, *(f"{len(s.chosen)} / {s.bound}" for s in _selections(seen))]
@@ -81,13 +80,13 @@ def _selections(seen: Visibility) -> Iterator[Selection]:
         space = seen.space
         settings = replace(space.settings, room_coverage=share, kind_coverage=share)
         again = replace(seen, candidates=replace(seen.candidates, space=replace(space, settings=settings)))
-        yield refined(select(again))
+        yield select_refined(again)
 
 
 def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list[str]]:
     """Figures of a plan by either rule, counted by length."""
     for rule in ("paper", "length"):
-        settings = Settings(**options, coverage_rule=rule)
+        settings = Settings(**options, coverage_rule=rule, register=False)
         begin = time.perf_counter()
         made = plan(read_floor(path, FloorOptions(d_dis=settings.d_dis)), settings)
         took = time.perf_counter() - begin

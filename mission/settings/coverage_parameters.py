@@ -67,10 +67,17 @@ class CoverageParameters:
             group="Paper",
         ),
     ] = "length"
+    register: Annotated[
+        bool | None,
+        _plan(
+            "Choose stops whose scans register with one another, all in one network",
+            undecided="yes; no with --coverage-rule paper",
+        ),
+    ] = None
     overlap: Annotated[
         float | None,
         _plan(
-            "Minimum overlap ratio of neighbouring scans, so that all register; 0: not required",
+            "Minimum overlap ratio of scans that register",
             least=0,
             below=1,
             why="0.1 is 10 %",
@@ -101,8 +108,13 @@ class CoverageParameters:
         return LEAST_SHARE if given is None else given
 
     @property
+    def registers(self) -> bool:
+        """True if stops are chosen so that their scans register."""
+        return self.coverage_rule != "paper" if self.register is None else self.register
+
+    @property
     def least_overlap(self) -> float:
-        """Least fraction of a scan that its neighbour covers too; 0 where scans need not register."""
+        """Least fraction of a scan that a scan which registers with it covers too."""
         return self.overlap or 0.0
 
     @property

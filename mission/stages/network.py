@@ -96,8 +96,8 @@ def network_table(network: Network | None) -> dict[str, Any]:
 
 
 def network_lines(network: Network | None) -> list[str]:
-    """Return the lines for a terminal: components, the weakest pair, and bridges."""
-    if network is None:
+    """Return the lines for a terminal: components, the weakest pair, and bridges; none for a single scan."""
+    if network is None or len(network.stops) < 2:
         return []
     number, pairs = len(network.pieces), len(network.overlaps)
     lines = [

@@ -28,13 +28,13 @@ from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 ROUNDED = 1e-5
 """Tolerance of a pair's figures, which are sums of rounded lengths."""
-REQUIRED = "$.origin.parameters.overlap requires scans that register with one another"
+REQUIRED = "the plan's parameters require scans that register with one another"
 LEAST = {"common_m": LEAST_COMMON_M, "hold_m": LEAST_HOLD_M}
 
 
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
     """Every pair that registers less well than claimed or required, and pairs that are missing."""
-    required = space.settings.least_overlap > 0
+    required = space.settings.registers
     if isinstance(mission.network, msgspec.UnsetType):
         if required and len(mission.stops) > 1:
             yield Problem("$.network", f"is missing, but {REQUIRED}")

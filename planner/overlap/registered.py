@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -13,21 +14,20 @@ from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState, Route
+from stopgo.mission.stages.figures import percent
 from stopgo.mission.stages.network import Network
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.overlap import USUAL_SHARE, Overlaps, registers
+from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.network_error import information_of, scan_errors
+from stopgo.planner.overlap.pairs import error_of
 
 
 @instance_cached
 def registered_pairs(route: Route) -> tuple[Overlap, ...]:
-    """Pairs of the route's stops that register with one another, in the order of driving.
-
-    The overlap ratio is that of the settings, or the usual one if they give none.
-    """
-    overlaps, share = _overlaps_of_stops(route), _settings(route).least_overlap or USUAL_SHARE
+    """Pairs of the route's stops that register with one another, in the order of driving."""
+    overlaps, share = _overlaps_of_stops(route), _settings(route).least_overlap
     names = stop_names(overlaps.rows)
     found = []
     for k in range(overlaps.rows):
@@ -84,16 +84,16 @@ SCANS_APART = ("scans_apart", "scans_not_joined")
 
 
 def scans_apart(route: Route) -> Iterator[Finding]:
-    """Remedy for each separate component of the network; without a required overlap, their number."""
+    """Remedy for each separate component of the network; where scans need not register, their number."""
     settings, count = _settings(route), len(route.order)
     names = stop_names(count)
     _, *others = Network(tuple(names), registered_pairs(route)).pieces or ((),)
-    if settings.least_overlap == 0:
+    if not settings.registers:
         if others:
             yield Finding(
                 "scans_not_joined",
-                f"the scans fall into {len(others) + 1} components that no overlap connects; set up target "
-                f"spheres, or plan with --overlap {USUAL_SHARE:g}",
+                f"the scans fall into {len(others) + 1} components that no common surfaces connect; set up "
+                "target spheres, or plan with --register",
             )
         return
     called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]
@@ -128,11 +128,10 @@ def _remedy(
             found = (worth, k, int(pairs.other[index]))
             best = max(best, found) if best else found
     if best is not None:
-        (hold, common), k, j = best
+        _, k, j = best
         x, y = overlaps.middle_of_common(k, j) + local_origin(space.floor)
-        spheres = f"target spheres that {names[k]} and {names[j]} both see would join them, such as near "
-        seen = f" (they see {common:.1f} m of boundary in common, which hold as {hold:.2f} m do)"
-        return f"{spheres}({x:.1f}, {y:.1f}){seen}", (x, y)
+        spheres = f"a target sphere or board that {names[k]} and {names[j]} both see would join them, such as"
+        return f"{spheres} near ({x:.1f}, {y:.1f}): {_reason(route, k, j)}", (x, y)
     opening = _nearest_opening(space.openings, route.xy[here], route.xy[there])
     if opening is None:
         return (
@@ -147,6 +146,29 @@ def _remedy(
         else f"it would join them if it were not {opening.why}: a scan from it"
     )
     return f"{kind} {name} at ({x:.1f}, {y:.1f}) is nearest to both; {advice} or spheres there", (x, y)
+
+
+FREE_M = 0.5
+"""Predicted error from which on a pair is free, metres."""
+
+
+def _reason(route: Route, k: int, j: int) -> str:
+    """The reason why two stops that see common boundary do not register."""
+    overlaps, asked = _overlaps_of_stops(route), _settings(route).least_overlap
+    pairs = overlaps.of(k)
+    at = np.flatnonzero(pairs.other == j)
+    common, share, hold = (float(values[at][0]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
+    if common < LEAST_COMMON_M:
+        return f"they see only {common:.1f} m of boundary in common"
+    if hold >= LEAST_HOLD_M:
+        return f"they see {percent(share)} of a scan in common, of {percent(asked)} required"
+    error = float(error_of(np.array([hold]))[0])
+    x, y, turn = overlaps.weakest_move(k, j)
+    direction = math.degrees(math.atan2(y, x)) % 180
+    how = "in heading" if abs(turn) > math.hypot(x, y) else f"along {direction:.0f}° from +x"
+    if error > FREE_M:
+        return f"no surface that both see holds them {how}"
+    return f"their predicted error {how} is {1000 * error:.0f} mm (standard deviation)"
 
 
 def _nearest_opening(
