@@ -17,6 +17,7 @@ from stopgo.mission.document.problems import Problem
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import network_of
+from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_of
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
 from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, links_of
@@ -76,13 +77,15 @@ def _separate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem
     network = network_of(mission)
     if network is None or len(network.pieces) < 2:
         return
-    found = candidates_of(mission, space)
+    poses = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
+    doorway = np.array([stop.doorway for stop in mission.stops])
+    found = with_scans(candidates_of(mission, space), poses, doorway)
     _, region = connected_components(links_of(found), directed=False)
-    xy = found.xy[found.kept]
-    at = {stop.id: np.flatnonzero(np.hypot(*(xy - (stop.x, stop.y)).T) < 1e-5) for stop in mission.stops}
+    first = len(region) - len(mission.stops)
+    at = {stop.id: first + k for k, stop in enumerate(mission.stops)}
     owner: dict[int, int] = {}
     for number, piece in enumerate(network.pieces):
-        for reached in {int(region[row]) for stop in piece for row in at[stop]}:
+        for reached in {int(region[at[stop]]) for stop in piece}:
             if owner.setdefault(reached, number) != number:
                 yield Problem("$.network", f"leaves {' '.join(piece)} apart, but {REQUIRED}")
                 return

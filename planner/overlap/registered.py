@@ -17,7 +17,7 @@ from stopgo.mission.stages import OpeningState, Route
 from stopgo.mission.stages.figures import percent
 from stopgo.mission.stages.network import Network
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.network_error import information_of, scan_errors
@@ -129,9 +129,15 @@ def _remedy(
             best = max(best, found) if best else found
     if best is not None:
         _, k, j = best
-        x, y = overlaps.middle_of_common(k, j) + local_origin(space.floor)
+        x, y = (overlaps.middle_of_common(k, j) + local_origin(space.floor)).tolist()
         spheres = f"a target sphere or board that {names[k]} and {names[j]} both see would join them, such as"
         return f"{spheres} near ({x:.1f}, {y:.1f}): {_reason(route, k, j)}", (x, y)
+    if (between := _midway(route, here, there)) is not None:
+        k, j, (x, y) = between
+        near = float(np.hypot(*(route.xy[k] - route.xy[j]))) <= 2 * _settings(route).farthest_overlap
+        target = "a target sphere or board" if near else "a stop, with a target sphere or board on each side,"
+        means = f"{target} between {names[k]} and {names[j]} would join them, such as"
+        return f"{means} at ({x:.1f}, {y:.1f}): they see no boundary in common", (x, y)
     opening = _nearest_opening(space.openings, route.xy[here], route.xy[there])
     if opening is None:
         return (
@@ -146,6 +152,21 @@ def _remedy(
         else f"it would join them if it were not {opening.why}: a scan from it"
     )
     return f"{kind} {name} at ({x:.1f}, {y:.1f}) is nearest to both; {advice} or spheres there", (x, y)
+
+
+def _midway(route: Route, here: IntArray, there: IntArray) -> tuple[int, int, tuple[float, float]] | None:
+    """The nearest stops of two sets in sight of one another, and the position midway; None if none are."""
+    origin = local_origin(route.space.floor)
+    solids = to_shape(route.space.occluders, origin)
+    shapely.prepare(solids)
+    away = np.hypot(*(route.xy[here][:, None] - route.xy[there][None]).transpose(2, 0, 1))
+    for flat in np.argsort(away, axis=None, kind="stable").tolist():
+        i, j = divmod(flat, len(there))
+        ends = route.xy[[here[i], there[j]]]
+        if not solids.intersects(shapely.LineString(ends - origin)):
+            x, y = ends.mean(axis=0).tolist()
+            return int(here[i]), int(there[j]), (x, y)
+    return None
 
 
 FREE_M = 0.5
