@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# The kernels that are compiled at installation: one that changed is compiled again.
+TYPES := $(wildcard planner/*/*_compiled.pxd planner/*/*/*_compiled.pxd)
 
 # Every test that starts a process would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -10,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: demo docs test lint types faults benchmarks wheels clean
 
 # pip would compile all packages one after another; what is imported is compiled then, by as many as import it.
-$(STAMP): pyproject.toml setup.py constraints.txt
+$(STAMP): pyproject.toml setup.py constraints.txt $(TYPES) $(TYPES:_compiled.pxd=.py)
 	$(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[test]'
 	touch $(STAMP)
