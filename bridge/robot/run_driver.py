@@ -12,11 +12,13 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Base, Scanner
 from stopgo.bridge.robot.current_task import faces, has_work, label, moved
 from stopgo.bridge.robot.run_store import RunStore
+from stopgo.bridge.robot.scan_standstill import ScanStandstill
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission, Point
 from stopgo.mission.run import route_position
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Pose
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 from stopgo.mission.run.states import Run
 from stopgo.mission.run.tolerance import deviation, is_outside
 
@@ -36,6 +38,7 @@ class RunDriver:
         self._base = base
         self._scanner = scanner
         self._clock = clock
+        self.standstill = ScanStandstill(base)
         self.silent_s = 0.0
         """Seconds without data from any station; written by the link's thread."""
 
@@ -146,7 +149,10 @@ class RunDriver:
 
     def _scan(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
-        result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._control.scan_interrupt)
+        with self.standstill.watching(stop.tolerance_m):
+            result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._control.scan_interrupt)
+        if isinstance(result, ScanResult) and self.standstill.why:
+            result = ScanFailed(reason=self.standstill.why)
         self._store.advance(run, lambda now: runs.scan_ended(now, mission, result))
 
     def _verify(self, run: Run, mission: Mission) -> None:
