@@ -190,7 +190,7 @@ def _resume(order: Order, mission: Mission, situation: Situation) -> Change | Re
 
 
 def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
-    """Return a refusal if the robot is farther from its leg than its radius, and than the stop's tolerance."""
+    """Return a refusal if the robot is farther from its leg than its radius, and the stop's tolerance."""
     legs = route_position.legs_of(mission)
     leg = min(run.leg, len(legs) - 1)
     limit = _limit(mission, leg)

@@ -95,6 +95,10 @@ class Vehicle:
         self.armed = False
         self.failsafe = False
         """True while it holds because setpoints were missing, and no command has come since."""
+        self.camera_is_apart = setup.faults.any("camera") is not None
+        """Its scanner is a component of its own, which counts its pictures itself."""
+        self.triggers = 0
+        """Commands to take a picture since the boot, as an autopilot counts them, also repeated ones."""
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setup.state)
@@ -264,10 +268,12 @@ class Vehicle:
         self.rover.brake(self.now_ns)
         self.rover.origin = self._setup.origin
         self.armed, self.mode, self.failsafe, self.reached = False, "manual", False, None
+        self.triggers = 0
         self.target.forget()
         self.auto.pause(self.now_ns)
         self.auto.reset()
-        self.camera.reset()
+        if not self.camera_is_apart:
+            self.camera.reset()
         self.transfers.reset()
         self.streams = Streams(self._wall, self._makers)
         self.time.boot()
@@ -303,7 +309,8 @@ class Vehicle:
         message, why = self.camera.end(self.now_ns, self.time.boot_ms)
         if why:
             self.text(why)
-        self.send(message)
+        if not self._mishaps.once("lostpicture", self.camera.count):
+            self.send(message)
         self.auto.scan_over(self.now_ns)
 
     def _stored(self, kind: int, marked: int | None) -> None:

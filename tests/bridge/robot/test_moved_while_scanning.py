@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from threading import Event
+
 import msgspec
 
 from stopgo.bridge.robot.scan_standstill import ScanStandstill
+from stopgo.mission.document import Scan
 from stopgo.mission.run.events import Failed, Pose, Scanned
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 from tests.bridge.robot.test_run import loaded
 from tests.bridge.world import Field, corridor
 
@@ -62,3 +66,23 @@ def test_a_steady_robot_is_not_disturbed_by_its_estimates_noise() -> None:
             standstill.take(Pose(x=0.004 * (-1) ** index, y=0.0, heading=0.01), 0.02)
         standstill.take(Pose(x=0.0, y=0.0, heading=0.0), 0.5)
     assert standstill.why == ""
+
+
+def test_a_file_that_has_counted_for_a_stop_counts_for_no_other() -> None:
+    """As of a scanner that names its last file again after a restart."""
+    field = loaded(corridor(retries=0, on_failure="skip"))
+    first = field.scanner.scan
+    named: list[ScanResult] = []
+
+    def same(label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
+        result = first(label, scan, interrupt=interrupt)
+        assert isinstance(result, ScanResult)
+        named.append(result)
+        return named[0] if len(named) < 3 else result
+
+    field.scanner.scan = same  # type: ignore[method-assign]
+    field.order("start")
+    field.work()
+    (failed,) = [event for event in field.journal.events() if isinstance(event, Failed)]
+    assert failed.stop == "s2" and "again, which is the scan of s1" in failed.reason
+    assert field.controller.run.done == ("s1", "s3")
