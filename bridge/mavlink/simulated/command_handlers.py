@@ -264,7 +264,7 @@ def _report_home(vehicle: Vehicle, command: ReceivedCommand) -> int:
 
 def _capture(vehicle: Vehicle, command: ReceivedCommand) -> int:
     """IMAGE_START_CAPTURE: param4 is the number; param2, the interval (unused for one picture), seconds."""
-    vehicle.triggers += 1
+    vehicle.camera.triggers += 1
     return _scan(vehicle, command, command.whole(3, 0), command.params[1])
 
 

@@ -95,10 +95,6 @@ class Vehicle:
         self.armed = False
         self.failsafe = False
         """True while it holds because setpoints were missing, and no command has come since."""
-        self.camera_is_apart = setup.faults.any("camera") is not None
-        """Its scanner is a component of its own, which counts its pictures itself."""
-        self.triggers = 0
-        """Commands to take a picture since the boot, as an autopilot counts them, also repeated ones."""
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setup.state)
@@ -228,6 +224,11 @@ class Vehicle:
         return True
 
     @property
+    def camera_is_apart(self) -> bool:
+        """True if its scanner is a component of its own, which has the pictures and counts them itself."""
+        return self._setup.faults.any("camera") is not None
+
+    @property
     def is_unplaced(self) -> bool:
         """True if its origin is of no use to it."""
         return self._setup.faults.any("unplaced") is not None
@@ -268,12 +269,10 @@ class Vehicle:
         self.rover.brake(self.now_ns)
         self.rover.origin = self._setup.origin
         self.armed, self.mode, self.failsafe, self.reached = False, "manual", False, None
-        self.triggers = 0
         self.target.forget()
         self.auto.pause(self.now_ns)
         self.auto.reset()
-        if not self.camera_is_apart:
-            self.camera.reset()
+        self.camera.reset(is_apart=self.camera_is_apart)
         self.transfers.reset()
         self.streams = Streams(self._wall, self._makers)
         self.time.boot()
