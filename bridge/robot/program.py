@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from stopgo.bridge.link import keys as key_files
 from stopgo.bridge.link.access import access_control
+from stopgo.bridge.link.admission import can_admit
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import KeyExpressions, place_of
@@ -74,7 +75,6 @@ class RobotOptions:
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     """Run the robot agent until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
-    from stopgo.bridge.link.admission import can_admit
     from stopgo.bridge.link.zenoh_link import Guard, admitting, joining
 
     signal.signal(signal.SIGTERM, _leave)
