@@ -49,7 +49,7 @@ PATTERN = 150
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What of a building line work shows, by which it is told from other lines."""
+    """Traits of a building in line work, by which it is told from other lines."""
 
     double: float = 0.0
     """Fraction of the walls' lines that run in pairs and bound a solid."""
@@ -75,7 +75,7 @@ class Derived:
     cells: int = 0
     """Small spaces among the lines of walls."""
     shown: Shown = Shown()
-    """What of a building the line work shows."""
+    """Traits of a building in the line work."""
 
 
 @dataclass(eq=False)
@@ -176,7 +176,7 @@ def _shown(
     rooms: Sequence[shapely.Polygon],
     spaces: Spaces,
 ) -> Shown:
-    """What the line work shows; rooms that a layer shows are those."""
+    """Traits of a building; rooms that a layer shows are those."""
     thick = sum(solid.length for solid in walls.solids)
     single = sum(line.length for line in walls.lines)
     free = spaces.floor.difference(walls.shape) if not spaces.floor.is_empty else spaces.floor
