@@ -52,7 +52,6 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.auto.pending_commands import PendingCommands
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
-from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.steps import (
@@ -185,6 +184,7 @@ class AutoFollower:
     def _observe(self, listed: ListedMission) -> Observation | None:
         """The vehicle's present state; requests again the scan of a stop that the vehicle has left."""
         run, now_ns = self.run, self._book.clock.now_ns()
+        self._observer.captures.counted = self._book.scanned_files(run)
         observed = self._observer.observe(run, listed, self._arrived(listed), after=self._book.used)
         if observed is None:
             return None
@@ -197,7 +197,7 @@ class AutoFollower:
         if self._left is None or self._left[0] != stop:
             self._left = (stop, now_ns)
         if observed.scan is None:
-            self._commands.ask_for(MessageId.CAMERA_IMAGE_CAPTURED)
+            self._commands.ask_for_picture()
         return since_left(run, listed, observed, now_ns - self._left[1])
 
     def _is_ours(self, run: Run, listed: ListedMission, now_ns: int) -> bool:

@@ -129,6 +129,7 @@ class AutoRunner:
         if compares:
             self._follower.compare()
         if not self._follower.run.over:  # its last report may have been missed
+            self._commands.ask_for_picture()
             self._peer.ask(MessageId.CAMERA_IMAGE_CAPTURED)
         self._follower.begin()
 

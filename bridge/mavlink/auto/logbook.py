@@ -26,11 +26,12 @@ from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import shared_journal
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.following.capture_reports import ScanFile
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.telemetry import BACK_MS
 from stopgo.mission.run import states as runs
-from stopgo.mission.run.events import Aborted
+from stopgo.mission.run.events import Aborted, Scanned
 from stopgo.mission.run.states import Change, Run
 
 REBOOT_NS = 5 * 10**9
@@ -103,6 +104,9 @@ class Logbook:
         self.own_order: Ordered | None = None
         """The command that this process carries out; it counts before the journal has it."""
         self._listed: tuple[Sent, ListedMission] | None = None
+        self._scanned: tuple[tuple[str | None, tuple[str, ...]], frozenset[ScanFile]] = (
+            (None, ()), frozenset(),
+        )  # fmt: skip
 
     @property
     def run(self) -> Run:
@@ -124,6 +128,14 @@ class Logbook:
         assert stored is not None and items is not None
         mission = msgspec.json.decode(stored[1], type=Mission)
         return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList))
+
+    def scanned_files(self, run: Run) -> frozenset[ScanFile]:
+        """Name and sha256 of each scan that has counted in the run."""
+        if self._scanned[0] != (run.run_id, run.done):
+            events = self.journal.events(run_id=run.run_id) if run.run_id else ()
+            files = frozenset((event.file, event.sha256) for event in events if isinstance(event, Scanned))
+            self._scanned = (run.run_id, run.done), files
+        return self._scanned[1]
 
     @property
     def boot_id(self) -> str:

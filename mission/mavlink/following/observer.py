@@ -33,7 +33,7 @@ class Observer:
         self.status = VehicleStatus(autopilot)
         self.position = ListPosition()
         self.poses = VehiclePoses()
-        self._captures = CaptureReports()
+        self.captures = CaptureReports()
         self._scan_watch = ScanWatch()
         self._came_ns: dict[str, int] = {}
         """Time of the last message of each name."""
@@ -53,7 +53,7 @@ class Observer:
         elif name == "CAMERA_IMAGE_CAPTURED":
             capture = capture_of(message, None if listed is None else listed.sent)
             at_stop = self.position.is_at_stop(listed)
-            self._captures.take(capture, self.poses.pose(now_ns), now_ns, at_stop=at_stop)
+            self.captures.take(capture, self.poses.pose(now_ns), now_ns, at_stop=at_stop)
         return name
 
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
@@ -87,7 +87,7 @@ class Observer:
             return None
         newest = self.poses.fix
         fix = newest if newest is not None and newest.ns > self.position.since_ns else None
-        report = self._captures.of_stop(run, listed, arrived, after)
+        report = self.captures.of_stop(run, listed, arrived, after)
         return Observation(
             mode=self.status.mode, armed=self.status.armed, place=self.position.place(listed),
             pose=None if fix is None else fix.pose,
@@ -106,5 +106,5 @@ class Observer:
         self, run: Run, listed: ListedMission, arrived: Arrived | None, after: Picture
     ) -> Capture | None:
         """Return the last report of a scan at the current stop."""
-        report = self._captures.of_stop(run, listed, arrived, after)
+        report = self.captures.of_stop(run, listed, arrived, after)
         return None if report is None else report.capture
