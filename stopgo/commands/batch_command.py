@@ -89,8 +89,7 @@ def batch_command(
     batch = Batch(file, folder, found.entries, kept.folder, found.left_out, all_parts, strict)
     if why is not None:
         return _print_why(batch, why)
-    _print_problems(found)
-    faults = 2 if found.problems else 0
+    faults = _print_problems(found)
     if faults and not skip_faulty:
         return faults
     if dry_run:
@@ -128,11 +127,13 @@ def _print_why(batch: Batch, name: str) -> int:
     return 0
 
 
-def _print_problems(found: Expansion) -> None:
+def _print_problems(found: Expansion) -> int:
+    """Print the faults of a batch's file; returns their exit code."""
     for problem in found.problems:
         notice(str(problem))
     if found.problems:
         notice(f"{len(found.problems)} faults, {len(found.entries)} sound entries; correct the file")
+    return 2 if found.problems else 0
 
 
 def _print_entries(entries: Sequence[Entry], *, as_json: bool) -> None:
