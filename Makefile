@@ -1,7 +1,11 @@
 # Both targets do all their set-up: `make demo` runs the main job, `make test` checks everything.
 PYTHON ?= python3
 VENV := .venv
+ifeq ($(OS),Windows_NT)
+BIN := $(VENV)/Scripts
+else
 BIN := $(VENV)/bin
+endif
 STAMP := $(VENV)/.installed
 
 # Every test that starts a process would compile the sources anew.

@@ -8,6 +8,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,14 @@ settings.register_profile("search", deadline=None, max_examples=20_000)
 settings.load_profile(os.environ.get("STOPGO_HYPOTHESIS", "tests"))
 
 TESTS = Path(__file__).parent
+
+HAS_ROBOTS = find_spec("fcntl") is not None
+collect_ignore = (
+    []
+    if HAS_ROBOTS
+    else ["bridge/commands", "bridge/conform", "bridge/mavlink", "bridge/robot", "faults", "journeys"]
+)
+"""Folders whose tests start robots. Robots run on Linux and macOS only."""
 
 
 def pytest_configure() -> None:

@@ -220,8 +220,9 @@ class Controller:
         return run, mission
 
     def position(self) -> Position:
-        ns = self._clock.now_ns()
-        return Position(self._base.pose(), self._base.speed(), ns)
+        ns, pose, speed = self._clock.now_ns(), self._base.pose(), self._base.speed()
+        self._driver.standstill.take(pose, speed)
+        return Position(pose, speed, ns)
 
     def battery(self) -> float:
         return self._base.battery()

@@ -158,18 +158,26 @@ def _start(order: Order, mission: Mission, situation: Situation) -> Change | Ref
 
 
 def _starting_leg(order: Order, mission: Mission, pose: Pose) -> int | Refused:
-    tolerance = mission.stops[0].tolerance_m
     start = mission.start
-    away = math.hypot(pose.x - start.x, pose.y - start.y)
+    away, limit = math.hypot(pose.x - start.x, pose.y - start.y), _limit(mission, 0)
     if not order.from_here:
-        if away <= tolerance:
+        if away <= limit:
             return 0
         return Refused("not_at_start", f"the robot is {away:.2f} m from the mission's start {_xy(start)}; "
-                       "drive it there, or start --from-here on the route")  # fmt: skip
+                       f"drive it there, within {limit:g} m, or start --from-here on the route")  # fmt: skip
     leg, place = route_position.nearest_leg(mission, pose)
-    if place.distance > mission.stops[leg].tolerance_m:
+    if place.distance > _limit(mission, leg):
         return Refused("off_route", f"the robot is {place.distance:.2f} m from the route's nearest point")
     return leg
+
+
+def _limit(mission: Mission, stop: int) -> float:
+    """Return the distance from its route within which a robot drives straight back to it, metres.
+
+    The robot's circle is free where it is and on the route. On the straight line of at most a radius between
+    the two, no more than a seventh of the radius lies outside of both circles.
+    """
+    return max(mission.robot.radius, mission.stops[min(stop, len(mission.stops) - 1)].tolerance_m)
 
 
 def _pause(order: Order, mission: Mission, situation: Situation) -> Change:
@@ -182,14 +190,10 @@ def _resume(order: Order, mission: Mission, situation: Situation) -> Change | Re
 
 
 def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
-    """Return a refusal if the robot is farther from its leg than its radius, and than the stop's tolerance.
-
-    The robot's circle is free where it is and on the route. On the straight line of at most a radius between
-    the two, no more than a seventh of the radius lies outside of both circles.
-    """
+    """Return a refusal if the robot is farther from its leg than its radius, and the stop's tolerance."""
     legs = route_position.legs_of(mission)
     leg = min(run.leg, len(legs) - 1)
-    limit = max(mission.robot.radius, mission.stops[min(leg, len(mission.stops) - 1)].tolerance_m)
+    limit = _limit(mission, leg)
     near = [route_position.nearest(legs[index], pose) for index in (leg, max(0, leg - 1))]
     back = min(near, key=lambda point: point.distance)
     if back.distance <= limit:

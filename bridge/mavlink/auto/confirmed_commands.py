@@ -7,7 +7,13 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.vehicle_link.messages import command_long, interval, set_current
+from stopgo.bridge.mavlink.vehicle_link.messages import (
+    command_long,
+    every_component,
+    interval,
+    request,
+    set_current,
+)
 from stopgo.bridge.mavlink.vehicle_link.peer import Ack, Peer
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
@@ -61,13 +67,12 @@ class ConfirmedCommands:
         for number, hertz in REPEATED_HZ.items():
             self._peer.send(interval(self._peer.who, number, hertz))
 
-    def ask_for(self, number: int) -> None:
-        """Request a message again, without waiting; at most twice a second."""
+    def ask_for_picture(self) -> None:
+        """Request the last picture of every component, at most twice a second, without waiting."""
         now_ns = self._clock.now_ns()
-        if now_ns < self._asked_ns + ASK_AGAIN_NS:
-            return
-        self._asked_ns = now_ns
-        self._peer.request(number)
+        if now_ns >= self._asked_ns + ASK_AGAIN_NS:
+            self._asked_ns = now_ns
+            self._peer.send(request(every_component(self._peer.who), MessageId.CAMERA_IMAGE_CAPTURED))
 
     def hold(self) -> None:
         """Put the vehicle on hold."""
