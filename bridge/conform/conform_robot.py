@@ -20,7 +20,7 @@ from stopgo.bridge.conform.requirements import (
     tried,
 )
 from stopgo.bridge.conform.robot_bench import OVER, Forger, OtherStation, RobotBench
-from stopgo.bridge.conform.robot_orders import IDLE, ORDERS
+from stopgo.bridge.conform.robot_commands import IDLE, ORDERS
 from stopgo.bridge.conform.robot_pushes import PUSHES
 from stopgo.bridge.conform.robot_questions import QUESTIONS
 from stopgo.bridge.conform.robot_restarts import RESTARTS
