@@ -264,9 +264,9 @@ def member_line(member: FleetMember, before: LastSeen | None) -> str:
     if member.state is not None:
         return state_line(member.state)
     last = (
-        "never seen from here"
+        "never answered from here"
         if before is None
-        else f"{before.state} when last seen, {before.at:%Y-%m-%d %H:%M} UTC"
+        else f"{before.state} at its last report, {before.at:%Y-%m-%d %H:%M} UTC"
     )
     return f"{member.robot}: NO DATA; {last}; {member.trouble}"
 
