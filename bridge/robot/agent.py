@@ -198,10 +198,14 @@ class Agent:
         try:
             work()
         except Exception as error:  # noqa: BLE001 (the end of a thread)
-            self._runner.stand_still(error)
-            self._error = error
-            self._failed.set()
-            self._on_failure(error)
+            self.fail(error)
+
+    def fail(self, error: Exception) -> None:
+        """Stand still because of an error that ended a thread; `wait` raises it."""
+        self._runner.stand_still(error)
+        self._error = error
+        self._failed.set()
+        self._on_failure(error)
 
     def close(self) -> None:
         self._runner.close()
