@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import msgspec
 
+from stopgo.bridge.conform.command_requirements import as_another, ready, refuses_what_means_nothing
 from stopgo.bridge.conform.requirements import NotTried, Requirement, must
 from stopgo.bridge.conform.robot_bench import OVER, RobotBench
-from stopgo.bridge.conform.robot_commands import as_another, ready, refuses_what_means_nothing
 from stopgo.bridge.conform.robot_queries import describe, must_reject, read, read_event
 from stopgo.bridge.conform.robot_questions import keeps_a_record, states_are_bounded
 from stopgo.bridge.link.capabilities import RECORD
