@@ -30,10 +30,8 @@ def job(name: str, hours: float, site: str = "") -> DayJob:
     return DayJob(name, site or name, hours * HOUR, stops=10)
 
 
-def planned(
-    jobs: Sequence[DayJob], robots: Sequence[DayRobot], ways: dict[Any, float] | None = None
-) -> DayPlan:
-    return plan_day(jobs, robots, ways or {}, default_s=0.5 * HOUR, setup_s=0.0)
+def planned(jobs: Sequence[DayJob], robots: Sequence[DayRobot]) -> DayPlan:
+    return plan_day(jobs, robots, {}, default_s=0.5 * HOUR, setup_s=0.0)
 
 
 def test_two_robots_share_what_one_shift_cannot_hold() -> None:
@@ -168,9 +166,8 @@ def test_a_day_has_a_page_for_each_robot(tmp_path: Path, monkeypatch: pytest.Mon
     day = '[day]\nrobots = [{ name = "r1", shift = "8h" }, { name = "r/2", shift = "1min" }]\n'
     batch_file(tmp_path, day + '[[floors]]\nfiles = "*.dxf"')
     out = tmp_path / "out"
-    done = called(
-        "batch", str(tmp_path / "plans.toml"), "-o", str(out), "--day", "2026-11-25", "--workers", "1"
-    )
+    batch = ("batch", str(tmp_path / "plans.toml"), "-o", str(out))
+    done = called(*batch, "--day", "2026-11-25", "--workers", "1")
     assert done.returncode == 0, done.stderr
     folder = out / "days" / "2026-11-25"
     assert str(folder / "index.html") in done.stderr
