@@ -58,8 +58,8 @@ from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import Answer, Order
 from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run
 
 REPORT_WITHIN_S = 0.1
@@ -126,7 +126,7 @@ class Controller:
 
     # Commands and missions, from the link's threads
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, however often it comes, and store the answer."""
         with self._control.standing_on_error():
             return self._commands.execute(order)
@@ -220,8 +220,9 @@ class Controller:
         return run, mission
 
     def position(self) -> Position:
-        ns = self._clock.now_ns()
-        return Position(self._base.pose(), self._base.speed(), ns)
+        ns, pose, speed = self._clock.now_ns(), self._base.pose(), self._base.speed()
+        self._driver.standstill.take(pose, speed)
+        return Position(pose, speed, ns)
 
     def battery(self) -> float:
         return self._base.battery()

@@ -224,6 +224,11 @@ class Vehicle:
         return True
 
     @property
+    def camera_is_apart(self) -> bool:
+        """True if its scanner is a component of its own, which has the pictures and counts them itself."""
+        return self._setup.faults.any("camera") is not None
+
+    @property
     def is_unplaced(self) -> bool:
         """True if its origin is of no use to it."""
         return self._setup.faults.any("unplaced") is not None
@@ -267,7 +272,7 @@ class Vehicle:
         self.target.forget()
         self.auto.pause(self.now_ns)
         self.auto.reset()
-        self.camera.reset()
+        self.camera.reset(is_apart=self.camera_is_apart)
         self.transfers.reset()
         self.streams = Streams(self._wall, self._makers)
         self.time.boot()
@@ -303,7 +308,8 @@ class Vehicle:
         message, why = self.camera.end(self.now_ns, self.time.boot_ms)
         if why:
             self.text(why)
-        self.send(message)
+        if not self._mishaps.once("lostpicture", self.camera.count):
+            self.send(message)
         self.auto.scan_over(self.now_ns)
 
     def _stored(self, kind: int, marked: int | None) -> None:

@@ -161,7 +161,9 @@ def image_captured(vehicle: Vehicle) -> Message | None:
 
 
 def capture_status(vehicle: Vehicle) -> Message:
-    scans, count = int(vehicle.camera.under_way is not None), vehicle.camera.count
+    """Of the autopilot: one that only passes triggers on counts these (source: AP_Camera)."""
+    scans = int(vehicle.camera.under_way is not None)
+    count = vehicle.camera.triggers if vehicle.camera_is_apart else vehicle.camera.count
     return dialect.MAVLink_camera_capture_status_message(vehicle.time.boot_ms, scans, 0, 0.0, 0, 0.0, count)
 
 
