@@ -56,7 +56,7 @@ ReplayAlign = Annotated[
         help="first: the log begins at the start; stops: fit standstills to stops.",
     ),
 ]
-ReplayLevel = Annotated[
+ReplayHeight = Annotated[
     float | None,
     typer.Option(
         rich_help_panel="Position of the log",
@@ -130,7 +130,7 @@ def replay(
     map_: ReplayMap = None,
     align: ReplayAlign = None,
     time_offset: ReplayTimeOffset = 0.0,
-    level: ReplayLevel = None,
+    floor_height: ReplayHeight = None,
     poses: ReplayPoses = None,
     robot_name: ReplayRobot = None,
     stamps: ReplayStamps = "header",
@@ -157,7 +157,7 @@ def replay(
     files = _ReplayFiles(logs, mission or [], floor, clouds, out, csv, top_up, html, plan)
     files.check()
     driven = _missions(mission or [], read)
-    placing = replace(_placing(map_, align, time_offset, poses, robot_name), level_m=_level(level))
+    placing = replace(_placing(map_, align, time_offset, poses, robot_name), level_m=_height(floor_height))
     plans = None if plan is None else _plans(plan, driven[0])
     replays = files.compare_and_write(_replays(read, driven, placing, plans), plans, driven)
     _print_replays(replays, as_json=json_)
@@ -314,9 +314,9 @@ def _placing(
     return Placing(to_map, known[align], time_offset, poses, robot)
 
 
-def _level(level: float | None) -> float | None:
+def _height(level: float | None) -> float | None:
     if level is not None and not (math.isfinite(level) and abs(level) < 1e5):
-        raise InputError(f"--level {level}: must be a height in metres")
+        raise InputError(f"--floor-height {level}: must be a height in metres")
     return level
 
 
