@@ -99,7 +99,7 @@ def other_storey(replay: Replay, stop: int) -> str:
         where = f"{abs(climbed_m):.1f} m {'higher' if climbed_m > 0 else 'lower'} than at the start"
         return f"the robot was {where}; give a log of its storey"
     if all(abs(begin_m - level_m) > LEVEL_M for level_m in _levels(replay)):
-        return f"the log's heights begin at {begin_m:.1f} m; give that of the mission's floor with --floor-height"
+        return f"the log's heights begin at {begin_m:.1f} m; give the floor's with --floor-height"
     return ""
 
 
