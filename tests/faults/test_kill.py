@@ -143,12 +143,6 @@ def give(station: Station, order: Order, outcome: Outcome) -> bool:
     return carried_out[0]
 
 
-def drive(station: Station, chance: random.Random, outcome: Outcome) -> int:
-    """Start, pause and resume until the run is finished; how many pauses were carried out."""
-    begin(station, outcome)
-    return see_through(station, chance, outcome, pauses=0.15)
-
-
 def begin(station: Station, outcome: Outcome) -> None:
     """Order the start; anew if the robot was started anew in between, which refuses the old order."""
     while not give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome):
@@ -170,10 +164,27 @@ def see_through(station: Station, chance: random.Random, outcome: Outcome, *, pa
         time.sleep(0.05)
 
 
-def faults_of(chance: random.Random) -> list[str]:
+@dataclass(frozen=True)
+class Severity:
+    """How many kills a trial has, and how soon after a boot they come."""
+
+    crashes: tuple[int, int] = (0, 3)
+    """Least and greatest number of boots that die at a journal entry."""
+    entries: int = ENTRIES
+    """Entry of a boot at which it dies at the latest."""
+    timers: tuple[int, int] = (0, 2)
+    """Least and greatest number of kills at random times."""
+    pauses: float = 0.15
+
+
+USUAL = Severity()
+HARSH = Severity(crashes=(4, 8), entries=12, timers=(1, 3), pauses=0.4)
+
+
+def faults_of(chance: random.Random, severity: Severity) -> list[str]:
     """Crashes at journal entries for the first boots."""
-    kinds = [chance.choice(["crash", "crashed"]) for _ in range(chance.randint(0, 3))]
-    return [f"{kind}@{chance.randint(1, ENTRIES)}" for kind in kinds]
+    kinds = [chance.choice(["crash", "crashed"]) for _ in range(chance.randint(*severity.crashes))]
+    return [f"{kind}@{chance.randint(1, severity.entries)}" for kind in kinds]
 
 
 @dataclass(frozen=True)
@@ -196,18 +207,21 @@ def guarded(folder: Path) -> Site:
     return Site("tls", ("--keys", str(robot.folder)), station.folder)
 
 
-def trial(seed: int, folder: Path, site: Site = OPEN) -> Outcome:
+def trial(seed: int, folder: Path, site: Site = OPEN, severity: Severity = USUAL) -> Outcome:
+    """Start, pause and resume until the run is finished, with kills at any time; check what is left of it."""
     chance, outcome = random.Random(seed), Outcome()
     endpoint = f"{site.protocol}/127.0.0.1:{free_port()}"
-    with Supervisor(folder, faults_of(chance), endpoint, extra=site.robot) as supervisor:
+    with Supervisor(folder, faults_of(chance, severity), endpoint, extra=site.robot) as supervisor:
         timers = [
-            threading.Timer(chance.uniform(0.1, 3.0), supervisor.kill) for _ in range(chance.randint(0, 2))
+            threading.Timer(chance.uniform(0.1, 3.0), supervisor.kill)
+            for _ in range(chance.randint(*severity.timers))
         ]
         for timer in timers:
             timer.start()
         with reached(endpoint, outcome, keys=site.station) as station:
             stubbornly(lambda: station.push(mission()), outcome)
-            paused = drive(station, chance, outcome)
+            begin(station, outcome)
+            paused = see_through(station, chance, outcome, pauses=severity.pauses)
         for timer in timers:
             timer.cancel()
         outcome.kills = supervisor.kills
