@@ -1,7 +1,7 @@
 """Many kill trials of `test_kill`, several at a time, and their counts.
 
-Run: python -m tests.faults.kill_campaign --trials 300 [--first 50000] [--at-once 4]. Trials are seeded. Of ten,
-five kill a robot without keys, four a robot with keys, each some six times; in one a revision waits. A
+Run: python -m tests.faults.kill_campaign --trials 300 [--first 50000] [--at-once 4]. Seeded. Of ten trials,
+five kill a robot without keys, four one with keys, each some six times; in one a revision waits. A
 violation is printed with its seed, and the exit code is then 1.
 """
 
