@@ -31,7 +31,7 @@ from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.orders import FREE_VERBS, Order, Verb
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
 from tests.ports import free_port
@@ -299,6 +299,19 @@ def test_kills_of_a_robot_with_keys_lose_nothing_and_repeat_nothing(tmp_path: Pa
 def test_kills_while_a_revision_waits_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
     seeds = range(size(short=2, full=100))
     count([trial_of_a_revision(seed, tmp_path / str(seed)) for seed in seeds])
+
+
+@pytest.mark.parametrize("at_s", [1.0, 30.0])
+@pytest.mark.parametrize("verb", FREE_VERBS)
+def test_a_kill_between_any_two_steps_of_a_stop_leaves_a_robot_that_stands(
+    tmp_path: Path, verb: Verb, at_s: float
+) -> None:
+    """While it drives, and while it scans."""
+    every = str(size(short=60, full=1))
+    command = [sys.executable, "-m", "tests.faults.killed_stop", str(tmp_path), verb, str(at_s), every]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert int(result.stdout.split()[1]) >= size(short=5, full=300)
 
 
 @pytest.mark.parametrize("seed", range(size(short=2, full=40)))
