@@ -40,7 +40,7 @@ test: lint
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
-	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission
+	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/bridge/mavlink/driving/test_driving_processes.py
 
 benchmarks: $(STAMP)
 	for name in paper models shares quality least_time proofs visibility tours growth logs bridge fleet mavlink; do $(BIN)/python -m benchmarks.$$name || exit 1; done

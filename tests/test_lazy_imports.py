@@ -11,6 +11,7 @@ from tests.test_house import MODULES, tree_of
 
 REASONS = {
     "stopgo": "`import stopgo` loads nothing but itself",
+    "stopgo.batches.work": "a batch whose plans are all kept loads no planner",
     "stopgo.command_line": "`stopgo --version` and a refused argument load no table",
     "stopgo.commands.demo_command": "only the demo starts a robot and unpacks the sample",
     "stopgo.bridge.station.shared_session": "Windows has no fcntl; the options of sessions are read there",

@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from stopgo.bridge.console import say
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
@@ -73,6 +74,7 @@ class AutoRunner:
         self._follower = AutoFollower(book, peer, self._observer, self._commands, looks_only=looks_only)
         self.works: tuple[Callable[[], None], ...] = (self._look, self._act, self._follower.guard)
         self._reported_ns = 0
+        self._late = False
         self._closing = threading.Event()
         self._observer.take(peer.heartbeat, book.listed, book.clock.now_ns())
 
@@ -150,9 +152,17 @@ class AutoRunner:
                     self._commands.ask_for_telemetry()
                 self._take_next(waiting)
 
+    def _is_late(self) -> bool:
+        """True while the link delivers the vehicle's reports so late that they do not show its state."""
+        late_s = 0.0 if self._looks_only else self._book.boots.late_s
+        was_late, self._late = self._late, is_lost(late_s)
+        if self._late and not was_late:
+            say(f"{self._peer}: the link delivers its reports {late_s:.0f} s late; they count as no data")
+        return self._late
+
     def _take_next(self, waiting: MessageQueue) -> None:
         message = waiting.get(TICK_S)
-        self._board.cut = is_lost(self._peer.silent_s)  # then nothing answers for it
+        self._board.cut = is_lost(self._peer.silent_s) or self._is_late()  # then nothing answers for it
         if message is None:
             return
         if message.get_type() in UPLOAD_MESSAGES:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
+from stopgo.bridge.console import say
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.auto.commanded_standstill import stand
 from stopgo.bridge.mavlink.auto.confirmed_commands import SHOWS_S, ConfirmedCommands, Denied
@@ -32,7 +33,7 @@ from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.resuming import ON_LINE_M, resume_place, route_lines
 from stopgo.mission.mavlink.following.steps import Observation
-from stopgo.mission.mavlink.local_frame import apart
+from stopgo.mission.mavlink.local_frame import VehicleOrigin, apart
 from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.decision import Decision, decide, handed_over
@@ -156,7 +157,7 @@ class VehicleOrders:
         """Refuse a vehicle whose local frame has not the mission's origin: its position means nothing."""
         if self._consent.any_origin:
             return None
-        origin = self._peer.origin()
+        origin = self._peer.origin() or self._origin_given_again(listed)
         if origin is None:
             return Refused(
                 "wrong_origin",
@@ -167,8 +168,20 @@ class VehicleOrders:
         satellites = "; or add --skip-origin-check, if it finds its position by satellites"
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 
+    def _origin_given_again(self, listed: ListedMission) -> VehicleOrigin | None:
+        """Give a vehicle the mission's origin that lost it by a restart during the run; its new origin."""
+        if self._book.run.over:
+            return None
+        site = listed.sent.origin
+        origin = self._peer.set_origin(VehicleOrigin(lat=site.lat, lon=site.lon, alt=site.alt))
+        if origin is not None:
+            say(f"{self._peer}: it had no origin after its restart, and got the mission's again")
+            with self._commands.news:
+                self._commands.news.wait_for(lambda: self._pose is not None, SHOWS_S)
+        return origin
+
     def _decided(self, order: Order) -> Decision | Refused:
-        listed, run, here = self._book.listed, self._book.run, self._pose
+        listed, run = self._book.listed, self._book.run
         if listed is None:
             return Refused("no_mission", UNREMEMBERED)
         if order.verb in DRIVING and self._observer.position.items == 0:
@@ -176,6 +189,7 @@ class VehicleOrders:
         wrong_origin = self._wrong_origin(listed) if order.verb in DRIVING else None
         if wrong_origin is not None:
             return wrong_origin
+        here = self._pose
         if here is None and order.verb not in FREE_VERBS:
             return Refused("no_position", "the vehicle reports no position; does its navigation run?")
         if here is not None and order.verb != "start":

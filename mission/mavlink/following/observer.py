@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.autopilots.kind import AUTO, Autopilot
 from stopgo.mission.mavlink.captures import Capture, Picture, capture_of
 from stopgo.mission.mavlink.following.capture_reports import CaptureReports, scan_pose
 from stopgo.mission.mavlink.following.list_position import ListPosition
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.progress_watch import ProgressWatch
 from stopgo.mission.mavlink.following.scan_watch import ScanWatch
 from stopgo.mission.mavlink.following.steps import Observation
 from stopgo.mission.mavlink.following.vehicle_poses import VehiclePoses
 from stopgo.mission.mavlink.following.vehicle_status import VehicleStatus
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.run.events import Arrived
+from stopgo.mission.run.events import Arrived, Pose
 from stopgo.mission.run.states import Run
 
 USED_MESSAGES = (
@@ -34,6 +35,7 @@ class Observer:
         self.position = ListPosition()
         self.poses = VehiclePoses()
         self.captures = CaptureReports()
+        self.progress = ProgressWatch()
         self._scan_watch = ScanWatch()
         self._came_ns: dict[str, int] = {}
         """Time of the last message of each name."""
@@ -46,6 +48,7 @@ class Observer:
         fix = self.poses.take(name, message, listed, now_ns)
         if fix is not None:
             self._scan_watch.take_pose(fix.pose, fix.speed)
+            self._note_progress(fix.pose, listed, now_ns)
         if name == "MISSION_CURRENT":
             self._take_current(message, listed, now_ns)
         elif name == "MISSION_ITEM_REACHED":
@@ -61,6 +64,12 @@ class Observer:
         same = self.position.take_current(message, listed, boot_ms=boot_ms, now_ns=now_ns)
         if listed is not None:
             self._scan_watch.take_item(listed, self.position.place(listed), same=same)
+
+    def _note_progress(self, pose: Pose, listed: ListedMission | None, now_ns: int) -> None:
+        known = listed is not None and self.position.is_known
+        place = self.position.place(listed) if listed is not None and known else None
+        drives = self.status.mode == AUTO and self.status.armed
+        self.progress.take(pose, listed, place, now_ns, drives=drives)
 
     def fresh(self, within_s: float, now_ns: int) -> bool:
         """Return True if the most important messages come often enough."""

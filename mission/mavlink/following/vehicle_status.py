@@ -55,9 +55,9 @@ class VehicleStatus:
             self._mode_began_ns = now_ns
 
     @property
-    def began_ns(self) -> int | None:
-        """Time of the vehicle's boot, by the newest message that contains its time."""
-        return None if self._clock is None else self._clock.ns - self.boot_ms * 10**6
+    def clock(self) -> TimestampedMessage | None:
+        """The newest message that contains the vehicle's time."""
+        return self._clock
 
     @property
     def boot_ms(self) -> int:

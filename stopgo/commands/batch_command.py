@@ -1,0 +1,232 @@
+"""`stopgo batch`: plan many floors, storeys, dates and variants; each again only if it changed."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from stopgo.mission.console.notice import notice
+from stopgo.mission.console.running_step import RunningStep, running
+from stopgo.mission.console.table import duration, printable, printable_lines, table
+from stopgo.mission.errors import InputError
+from stopgo.result_files import result_folder
+
+if TYPE_CHECKING:
+    from stopgo.batches.batch_run import Batch
+    from stopgo.batches.entries import Entry, Expansion
+    from stopgo.batches.record import BatchRecord, EntryRecord
+    from stopgo.batches.store import ResultStore
+
+EXAMPLE = "Example: stopgo batch plans.toml -o campus"
+UNITS = {"h": 3600.0, "d": 86400.0, "w": 7 * 86400.0}
+
+FileArgument = Annotated[Path, typer.Argument(metavar="PLANS.toml", help="Floors, storeys, dates, options.")]
+OutOption = Annotated[Path, typer.Option("-o", "--out", help="Folder for the results and the index page.")]
+StoreOption = Annotated[
+    Path | None,
+    typer.Option(help="Folder of finished plans; several machines may share it.  [default: OUT/.store]"),
+]
+WorkersOption = Annotated[int, typer.Option(help="Plans at the same time on this machine.", min=1, max=1024)]
+SchedulerOption = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Plan on the workers of this dask scheduler.")
+]
+WhyOption = Annotated[
+    str | None, typer.Option(metavar="ENTRY", help="Print what changed in an entry, and leave.")
+]
+GcOption = Annotated[bool, typer.Option("--gc", help="Remove old results from the store, and leave.")]
+AgeOption = Annotated[
+    str | None,
+    typer.Option(metavar="TIME", help="With --gc: also results not used for 12h, 30d, 2w."),
+]
+SizeOption = Annotated[
+    float, typer.Option("--store-gb", help="Largest size of the store; the longest unused results go first.")
+]
+
+
+SkipFaultyOption = Annotated[bool, typer.Option(help="Plan the sound entries even if others have faults.")]
+BatchAllPartsOption = Annotated[bool, typer.Option(help="Also plan parts not connected with the first.")]
+BatchStrictOption = Annotated[bool, typer.Option(help="Exit 1 if floor is left out or a plan is doubtful.")]
+
+
+def add_commands(app: typer.Typer) -> None:
+    """Add `batch` to the app."""
+    app.command(name="batch", epilog=EXAMPLE)(batch_command)
+
+
+def batch_command(
+    file: FileArgument,
+    out: OutOption = Path(),
+    *,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the entries, and leave.")] = False,
+    why: WhyOption = None,
+    store: StoreOption = None,
+    workers: WorkersOption = 2,
+    scheduler: SchedulerOption = None,
+    skip_faulty: SkipFaultyOption = False,
+    all_parts: BatchAllPartsOption = False,
+    strict: BatchStrictOption = False,
+    gc: GcOption = False,
+    unused_for: AgeOption = None,
+    store_gb: SizeOption = 20.0,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> int:
+    """Plan every entry of a file of floors, storeys, dates and variants, each into its folder.
+
+    Unchanged plans come from the store. The exit code is the worst of all. After Ctrl-C, call it again.
+    """
+    from stopgo.batches.batch_run import Batch, ResultStore, expanded
+
+    folder = result_folder(out)
+    kept = ResultStore.at(folder / ".store" if store is None else store)
+    if gc:
+        return _collect(kept, unused_for, store_gb)
+    found = expanded(file, kept.folder, workers=workers)
+    batch = Batch(file, folder, found.entries, kept.folder, found.left_out, all_parts, strict)
+    if why is not None:
+        return _print_why(batch, why)
+    faults = _print_problems(found)
+    if faults and not skip_faulty:
+        return faults
+    if dry_run:
+        _print_entries(found.entries, as_json=as_json)
+        return faults
+    record = _run(batch, workers, scheduler, store_gb)
+    _print_record(record, folder, as_json=as_json)
+    return max(record.exit_code, faults)
+
+
+def _collect(store: ResultStore, unused_for: str | None, store_gb: float) -> int:
+    oldest = None if unused_for is None else _seconds(unused_for)
+    removed, freed = store.collect_garbage(most_bytes=int(store_gb * 1e9), oldest_s=oldest)
+    typer.echo(f"{printable(str(store.folder))}: removed {removed} results, {freed / 1e6:.1f} MB")
+    return 0
+
+
+def _seconds(text: str) -> float:
+    unit = UNITS.get(text[-1:])
+    if unit is None or not text[:-1].replace(".", "", 1).isdigit():
+        raise InputError(f"--unused-for {text}: give hours, days or weeks, such as 12h, 30d or 2w")
+    return float(text[:-1]) * unit
+
+
+def _print_why(batch: Batch, name: str) -> int:
+    """Print what differs between an entry's floor now and its last plan."""
+    reasons = batch.reasons(name)
+    for line in reasons.present:
+        typer.echo(printable(f"{name}: would be planned again: {line}"))
+    if reasons.present:
+        return 0
+    typer.echo(printable(f"{name}: unchanged; its plan is of this floor and these options"))
+    for line in reasons.past:
+        typer.echo(printable(f"{name}: was planned because: {line}"))
+    return 0
+
+
+def _print_problems(found: Expansion) -> int:
+    """Print the faults of a batch's file; returns their exit code."""
+    for problem in found.problems:
+        notice(str(problem))
+    if found.problems:
+        notice(f"{len(found.problems)} faults, {len(found.entries)} sound entries; correct the file")
+    return 2 if found.problems else 0
+
+
+def _print_entries(entries: Sequence[Entry], *, as_json: bool) -> None:
+    rows = [(entry.name, str(entry.floor), *(value for _, value in entry.axes[1:])) for entry in entries]
+    header = ("entry", "file", "storey", "date", "variant")
+    if as_json:
+        listed = [dict(zip(header, cells, strict=True)) for cells in rows]
+        typer.echo(json.dumps({"entries": listed}, ensure_ascii=False))
+        return
+    typer.echo(table(header, rows))
+    typer.echo(f"{len(entries)} entries")
+
+
+def _run(batch: Batch, workers: int, scheduler: str | None, store_gb: float) -> BatchRecord:
+    """Plan what the store does not have; the record is written also if that is ended."""
+    from stopgo.batches.engine import Running, engine_for, free_memory
+    from stopgo.batches.store import ResultStore
+
+    with running(f"looking up {len(batch.entries)} plans") as step:
+        try:
+            left = batch.take_kept()
+            if left:
+                progress = BatchProgress(step, total=len(left))
+                engine = engine_for(workers=workers, scheduler=scheduler)
+                work = Running(engine, left, free_memory(), progress.begun, progress.show)
+                with work:
+                    for outcome in work.outcomes():
+                        progress.ended(batch.take(outcome))
+        finally:
+            record = batch.write()
+        ResultStore(batch.store).collect_garbage(most_bytes=int(store_gb * 1e9))
+    return record
+
+
+class BatchProgress:
+    """Entries in progress, and the time that is left with its spread."""
+
+    def __init__(self, step: RunningStep, *, total: int) -> None:
+        self._step, self._total = step, total
+        self._begun: dict[str, float] = {}
+        self._spans: list[float] = []
+        self._first = time.monotonic()
+        self._failed = 0
+
+    def begun(self, name: str) -> None:
+        """Note that an entry begins."""
+        self._begun[name] = time.monotonic()
+
+    def ended(self, record: EntryRecord) -> None:
+        """Note that an entry has ended; a failure is reported at once."""
+        self._spans.append(time.monotonic() - self._begun.pop(record.name))
+        if record.status == "failed":
+            self._failed += 1
+            notice(f"{record.name}: {record.problem}")
+
+    def show(self) -> None:
+        """Name what runs, and the time that is left."""
+        done = f"{len(self._spans)} of {self._total} planned"
+        failed = f", {self._failed} failed" if self._failed else ""
+        now = time.monotonic()
+        names = ", ".join(f"{name} {duration(now - begun)}" for name, begun in self._begun.items())
+        self._step.progress(f"{done}{failed}; {self._left()}; {names}")
+
+    def _left(self) -> str:
+        """The time that is left as a range of two standard deviations, by the entries so far."""
+        count = len(self._spans)
+        if count < 2:
+            return "time left: not known yet"
+        mean = sum(self._spans) / count
+        variance = sum((span - mean) ** 2 for span in self._spans) / (count - 1)
+        rest = self._total - count
+        pace = (time.monotonic() - self._first) / sum(self._spans)
+        spread = 2 * (variance * rest * (1 + rest / count)) ** 0.5 * pace
+        least, most = max(0.0, rest * mean * pace - spread), rest * mean * pace + spread
+        return f"{duration(least)} to {duration(most)} left"
+
+
+def _print_record(record: BatchRecord, out: Path, *, as_json: bool) -> None:
+    import msgspec
+
+    if as_json:
+        typer.echo(msgspec.json.encode(record).decode())
+        return
+    rows = [_cells(item) for item in record.entries]
+    typer.echo(table(("entry", "status", "stops", "coverage %", "route m", "changes"), rows))
+    for line in record.left_out:
+        typer.echo(printable_lines(f"left out: {line}"))
+    counts = ", ".join(f"{count} {name}" for name, count in record.counts().items() if count)
+    typer.echo(printable_lines(f"{counts}; {duration(record.seconds)}; {out / 'index.html'}"))
+
+
+def _cells(item: EntryRecord) -> tuple[str, ...]:
+    if item.stops is None or item.coverage is None or item.route_m is None:
+        return item.name, item.status, "-", "-", "-", item.problem or item.changed
+    coverage, route = f"{100 * item.coverage:.1f}", f"{item.route_m:.1f}"
+    return item.name, item.status, str(item.stops), coverage, route, item.changed
