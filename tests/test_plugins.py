@@ -328,7 +328,7 @@ def test_a_base_that_fails_is_stopped_and_drives_no_more() -> None:
     guarded.stop()
     assert stops == ["stop", "stop"]
     base.stop = fail
-    with pytest.raises(InputError, match="^--controller my:robot: ValueError: motor 2 is hot"):
+    with pytest.raises(InputError, match="my:robot: ValueError: motor 2 is hot"):
         guarded.stop()
 
 
