@@ -132,9 +132,12 @@ class GuardedBase:
 
     def stop(self) -> None:
         """Stop the base, also after it has failed; raises `InputError` if it does not take the command."""
-        took: list[None] = []
-        self._tried(lambda: took.append(self._base.stop()), None, lambda _: True)
-        if not took:
+
+        def is_taken() -> bool:
+            self._base.stop()
+            return True
+
+        if not self._tried(is_taken, False, bool):
             raise InputError(self.fault)
 
     def unfit(self, mission: Mission) -> str:
