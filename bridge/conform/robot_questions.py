@@ -32,7 +32,7 @@ from stopgo.bridge.link.protocol import (
 )
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.run_commands import RunCommand
 
 STATE_BYTES = 16 * 1024
 """Largest size of a state, with fifty stops done and fifty skipped."""
@@ -245,7 +245,7 @@ def _unsent(bench: RobotBench) -> Mission:
     return trial_mission(f"{bench.missions.mission_id}-unsent", 1, Pose(x=0.0, y=0.0, heading=0.0))
 
 
-def _stop_order(bench: RobotBench) -> Order:
+def _stop_order(bench: RobotBench) -> RunCommand:
     return bench.commands.order("pause", issued_ns=0)
 
 

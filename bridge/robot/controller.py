@@ -58,8 +58,8 @@ from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import Answer, Order
 from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run
 
 REPORT_WITHIN_S = 0.1
@@ -128,7 +128,7 @@ class Controller:
 
     # Commands and missions, from the link's threads
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, however often it comes, and store the answer."""
         with self._control.standing_on_error():
             return self._commands.execute(order)

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run, stop_of
 
 
@@ -41,7 +41,7 @@ class Runner(Protocol):
     def battery(self) -> float:
         """0 to 1."""
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, however often it comes."""
 
     def on_link_silence(self, silent_s: float) -> None:

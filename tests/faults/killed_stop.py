@@ -18,7 +18,7 @@ from typing import Any
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.mission.run.events import Aborted, Finished, Paused
-from stopgo.mission.run.orders import Order, Verb
+from stopgo.mission.run.run_commands import RunCommand, Verb
 from tests.bridge.world import Field, corridor
 
 ROBOT = f"{os.sep}bridge{os.sep}robot{os.sep}"
@@ -73,7 +73,7 @@ def driving(journal: Journal) -> Field:
     return field
 
 
-def stop_order(field: Field, verb: Verb) -> Order:
+def stop_order(field: Field, verb: Verb) -> RunCommand:
     return field.command(verb, cmd_id="stop", issued_ns=0)
 
 

@@ -31,7 +31,7 @@ from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
-from stopgo.mission.run.orders import FREE_VERBS, Order, Verb
+from stopgo.mission.run.run_commands import FREE_VERBS, RunCommand, Verb
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
 from tests.ports import free_port
@@ -129,7 +129,7 @@ def reached(
         )
 
 
-def give(station: Station, order: Order, outcome: Outcome) -> bool:
+def give(station: Station, order: RunCommand, outcome: Outcome) -> bool:
     """Give the order twice, each time until it is answered; whether it was carried out."""
     outcome.orders += 1
     carried_out = []
@@ -144,7 +144,7 @@ def give(station: Station, order: Order, outcome: Outcome) -> bool:
 
 
 def begin(station: Station, outcome: Outcome) -> None:
-    """Order the start; anew if the robot was started anew in between, which refuses the old order."""
+    """RunCommand the start; anew if the robot was started anew in between, which refuses the old order."""
     while not give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome):
         assert stubbornly(station.status, outcome).state == "READY"
 

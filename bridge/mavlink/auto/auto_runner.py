@@ -15,7 +15,7 @@ from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
 from stopgo.bridge.mavlink.auto.list_guard import UPLOAD_MESSAGES
 from stopgo.bridge.mavlink.auto.logbook import Logbook
-from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
+from stopgo.bridge.mavlink.auto.vehicle_commands import Consent, VehicleCommands
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
 from stopgo.bridge.robot.runner import Position
@@ -25,7 +25,7 @@ from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.following.observer import USED_MESSAGES, Observer
 from stopgo.mission.mavlink.following.steps import run_on_vehicle
 from stopgo.mission.mavlink.telemetry import Message, is_lost
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run
 
 TICK_S = 0.2
@@ -62,7 +62,7 @@ class AutoRunner:
         looks_only: bool = False,
         stands: bool = False,
     ) -> None:
-        """`stands` as for `VehicleOrders`."""
+        """`stands` as for `VehicleCommands`."""
         self.changed: Callable[[], None] = lambda: None
         self._peer = peer
         self._book = book
@@ -70,7 +70,9 @@ class AutoRunner:
         self._looks_only = looks_only
         self._observer = Observer(peer.autopilot)
         self._commands = ConfirmedCommands(peer, self._observer, book.clock)
-        self._orders = VehicleOrders(book, peer, self._observer, self._commands, wall, consent, stands=stands)
+        self._vehicle_commands = VehicleCommands(
+            book, peer, self._observer, self._commands, wall, consent, stands=stands
+        )
         self._follower = AutoFollower(book, peer, self._observer, self._commands, looks_only=looks_only)
         self.works: tuple[Callable[[], None], ...] = (self._look, self._act, self._follower.guard)
         self._reported_ns = 0
@@ -97,9 +99,9 @@ class AutoRunner:
     def battery(self) -> float:
         return self._observer.status.battery
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command; raises `OutcomeUnknown` if the vehicle does not show its effect."""
-        answer = self._orders.execute(order)
+        answer = self._vehicle_commands.execute(order)
         self._follower.run = self._book.run
         self.changed()
         return answer

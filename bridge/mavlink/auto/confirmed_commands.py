@@ -20,7 +20,7 @@ from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
 from stopgo.mission.mavlink.enums import CommandResult, MessageId
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.items import Command
-from stopgo.mission.run.orders import Refused
+from stopgo.mission.run.run_commands import Refused
 
 SHOWS_S = 5.0
 """Longest wait for the effect of a command; a vehicle sends a heartbeat every second."""

@@ -21,7 +21,7 @@ from stopgo.bridge.robot.storage_watchdog import ANSWERS_WITHIN_S, LATE, LOOK_EV
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Verb
+from stopgo.mission.run.run_commands import FREE_VERBS, Answer, RunCommand, Verb
 from stopgo.mission.run.states import Run
 from tests.bridge.world import Field, corridor
 from tests.ports import free_port
@@ -208,7 +208,7 @@ def test_on_the_link_a_stop_waits_behind_no_other_command(monkeypatch: pytest.Mo
         monkeypatch.setattr(field.base, "stop", stopped.set)
         monkeypatch.setattr(field.journal.rows, "commit_hook", disk)
 
-        def ask(order: Order) -> None:
+        def ask(order: RunCommand) -> None:
             answers.append(station.ask(field.keys.command(order.verb), encode(order), timeout_s=NET_S))
 
         asking = [threading.Thread(target=ask, args=(order,)) for order in (skip, abort)]

@@ -33,7 +33,7 @@ Reason = Literal[
 """Reason why a robot refuses a command, or a mission."""
 
 
-class Order(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is"):
+class RunCommand(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is"):
     """A command; sent again with the same `cmd_id` it is executed once."""
 
     cmd_id: ShortText

@@ -39,7 +39,7 @@ from stopgo.mission.run import states as runs
 from stopgo.mission.run.decision import Decision, decide, handed_over
 from stopgo.mission.run.events import Pose
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused, Verb
+from stopgo.mission.run.run_commands import DRIVING, FREE_VERBS, Answer, Refused, RunCommand, Verb
 from stopgo.mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
@@ -68,7 +68,7 @@ class Consent:
     """The vehicle finds its position by satellites, whatever its origin."""
 
 
-class VehicleOrders:
+class VehicleCommands:
     """Carries out commands to one vehicle."""
 
     def __init__(
@@ -90,10 +90,10 @@ class VehicleOrders:
         self._wall = wall
         self._consent = consent
         self._stands = stands
-        self._stops: OrderedDict[str, tuple[Order, Answer]] = OrderedDict()
+        self._stops: OrderedDict[str, tuple[RunCommand, Answer]] = OrderedDict()
         """Answered stops of this process: one that comes again must not stop a resumed vehicle."""
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, and store the answer.
 
         Raises
@@ -118,7 +118,7 @@ class VehicleOrders:
                 return self._stored(order, denied.refused, None)
             return self._stored(order, change, decision.lease, decision.note)
 
-    def _stop_once(self, order: Order) -> Answer:
+    def _stop_once(self, order: RunCommand) -> Answer:
         known = self._stops.get(order.cmd_id)
         if known is not None and known[0] == order:
             return known[1]
@@ -128,7 +128,7 @@ class VehicleOrders:
             self._stops.popitem(last=False)
         return answer
 
-    def _stop(self, order: Order) -> Answer:
+    def _stop(self, order: RunCommand) -> Answer:
         """Have the vehicle stand, whatever the run's state; then change the run, if its state allows that."""
         with _Stopping(self._book, ordered_by(order.verb, order.commander)) as stopping:
             try:
@@ -146,7 +146,7 @@ class VehicleOrders:
                 return self._stored(order, Change(self._book.run), None)
             return self._stored(order, decision.change, decision.lease)
 
-    def _conflict(self, order: Order) -> Refused | None:
+    def _conflict(self, order: RunCommand) -> Refused | None:
         """Refuse a second command at a time."""
         other = self._book.ordered
         if other is None or other.until_ns <= self._book.clock.now_ns():
@@ -180,7 +180,7 @@ class VehicleOrders:
                 self._commands.news.wait_for(lambda: self._pose is not None, SHOWS_S)
         return origin
 
-    def _decided(self, order: Order) -> Decision | Refused:
+    def _decided(self, order: RunCommand) -> Decision | Refused:
         listed, run = self._book.listed, self._book.run
         if listed is None:
             return Refused("no_mission", UNREMEMBERED)
@@ -203,7 +203,7 @@ class VehicleOrders:
 
     # One function per verb
 
-    def _start(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _start(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         run = decision.change.run
         observed = self._observe(run, listed)
         self._ready(listed)
@@ -211,7 +211,7 @@ class VehicleOrders:
         self._go(listed, first, None)
         return decision.change
 
-    def _resume(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _resume(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         run = self._book.run
         observed = self._observe(run, listed)
         self._ready(listed)
@@ -220,7 +220,7 @@ class VehicleOrders:
         self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
-    def _resumed(self, run: Run, order: Order, decision: Decision) -> Change:
+    def _resumed(self, run: Run, order: RunCommand, decision: Decision) -> Change:
         """Let the run go on, under its present commander."""
         before = self._book.journal.fact("lease", Lease)
         change = runs.resumed(run, order.commander)
@@ -230,7 +230,7 @@ class VehicleOrders:
         items = listed.stops[run.at]
         return items.at < observed.place < items.after
 
-    def _retry(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _retry(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         """Drive to the stop again; the vehicle is on the path to it, or next to it."""
         run = runs.changed(self._book.run, stop_state="WAITING", approaches=0)
         observed = self._observe(run, listed)
@@ -238,7 +238,7 @@ class VehicleOrders:
         self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
-    def _skip(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _skip(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         """Skip the stop: the vehicle still drives the path to it, and passes its waits once it is there."""
         before, after = self._book.run, decision.change.run
         observed = self._observe(after, listed)
@@ -255,7 +255,7 @@ class VehicleOrders:
             self._commands.jump(listed.sequence(beyond))
         return decision.change
 
-    def _home(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _home(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         raise Denied(Refused("unsupported", HOMEWARD))
 
     # Shared by several verbs
@@ -313,11 +313,13 @@ class VehicleOrders:
 
     # Storing
 
-    def _ordering(self, order: Order) -> _Ordering:
+    def _ordering(self, order: RunCommand) -> _Ordering:
         ordered = ordered_by(order.verb, order.commander)
         return _Ordering(self._book, ordered, self._commands)
 
-    def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None, note: str = "") -> Answer:
+    def _stored(
+        self, order: RunCommand, outcome: Change | Refused, lease: Lease | None, note: str = ""
+    ) -> Answer:
         """Store the answer together with the changes by the command."""
         refused = outcome if isinstance(outcome, Refused) else None
         journal = self._book.journal
@@ -397,12 +399,12 @@ class _Stopping(_Noted):
             self._extend(ORDERING_NS)
 
 
-VERBS: dict[str, Callable[[VehicleOrders, Order, ListedMission, Decision], Change]] = {
-    "start": VehicleOrders._start,
-    "resume": VehicleOrders._resume,
-    "skip": VehicleOrders._skip,
-    "retry": VehicleOrders._retry,
-    "home": VehicleOrders._home,
+VERBS: dict[str, Callable[[VehicleCommands, RunCommand, ListedMission, Decision], Change]] = {
+    "start": VehicleCommands._start,
+    "resume": VehicleCommands._resume,
+    "skip": VehicleCommands._skip,
+    "retry": VehicleCommands._retry,
+    "home": VehicleCommands._home,
 }
 
 
