@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 STATUS_KEYS = (
     "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "outside",
-    "battery",
+    "battery", "battery_ok", "position_ok", "fence_ok",
 )  # fmt: skip
 
 
@@ -289,6 +289,7 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
 
 def state_line(report: StateReport) -> str:
     """Return the state as one line of text."""
+    from stopgo.mission.run.health_text import health_text
     from stopgo.mission.run.tolerance import stops_outside_text
 
     mission = (
@@ -303,5 +304,5 @@ def state_line(report: StateReport) -> str:
         mission += f" (revision {report.next_revision} from the next stop on)"
     return (
         f"{report.robot}: {report.state}{stop}; {mission}; {report.done_count} done{outside}{skipped};"
-        f" battery {report.battery:.0%}"
+        f" {health_text(report)}"
     )
