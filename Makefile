@@ -1,7 +1,11 @@
 # Both targets do all their set-up: `make demo` runs the main job, `make test` checks everything.
 PYTHON ?= python3
 VENV := .venv
+ifeq ($(OS),Windows_NT)
+BIN := $(VENV)/Scripts
+else
 BIN := $(VENV)/bin
+endif
 STAMP := $(VENV)/.installed
 # The kernels that are compiled at installation: one that changed is compiled again.
 TYPES := $(wildcard planner/*/*_compiled.pxd planner/*/*/*_compiled.pxd)
@@ -38,7 +42,7 @@ test: lint
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
-	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission
+	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/bridge/mavlink/driving/test_driving_processes.py
 
 benchmarks: $(STAMP)
 	for name in paper models shares quality least_time proofs visibility tours growth logs bridge fleet mavlink; do $(BIN)/python -m benchmarks.$$name || exit 1; done

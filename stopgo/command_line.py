@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "plan_command": ("plan",),
     "floor_commands": ("convert", "floors"),
+    "batch_command": ("batch",),
     "prove_command": ("prove",),
     "demo_command": ("demo",),
     "bridge_commands": (

@@ -178,3 +178,20 @@ def test_the_hooks_run_ruff_at_the_pinned_version() -> None:
     hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
     assert pinned is not None
     assert f"rev: v{pinned[1]}\n" in hooks
+
+
+def test_the_workflow_runs_make_test_on_every_promised_system_and_version() -> None:
+    workflow = (ROOT / ".github" / "workflows" / "test.yml").read_text(encoding="utf-8")
+    assert "os: [ubuntu-latest, macos-latest, windows-latest]" in workflow
+    named = [item.rpartition(" ")[2] for item in PROJECT["project"]["classifiers"] if ":: 3." in item]
+    assert f"python: {named}".replace("'", '"') in workflow
+    assert "run: make test" in workflow
+
+
+def test_the_next_release_in_the_changelog_is_newer_than_the_version() -> None:
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    following = re.search(r"^## \[(\d+)\.(\d+)\.(\d+)\] - unreleased$", changelog, re.MULTILINE)
+    assert following is not None
+    assert [int(part) for part in following.groups()] > [
+        int(part) for part in PROJECT["project"]["version"].split(".")
+    ]

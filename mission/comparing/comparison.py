@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,12 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.run.events import State
 from stopgo.mission.run.run_log import RunLog
 from stopgo.mission.run.tolerance import is_outside, position_error_text
+
+COLUMNS = (
+    *("stop", "outcome", "planned s", "arrived s", "late s", "along mm", "across mm", "heading °"),
+    *("settle s", "tries", "lost %", "why"),
+)
+"""Headings of a table of stops: times from the run's start, offsets in the planned direction of arrival."""
 
 DONE = {"scanned": "scanned", "unconfirmed": "passed"}
 """Outcomes of a stop that is done, in words."""
@@ -84,6 +91,36 @@ class StopComparison:
         if self.disputed_m is not None or self.outcome not in DONE or not self.outside_tolerance:
             return ""
         return f"{DONE[self.outcome]} {position_error_text(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
+
+    @property
+    def why(self) -> str:
+        """Everything that is not as planned, in words."""
+        return "; ".join(text for text in (self.outside_text, self.disputed_text, self.reason) if text)
+
+    @property
+    def cells(self) -> dict[str, str]:
+        """The row of a table: text by the heading of COLUMNS."""
+        offsets = ((self.late_s, 1), (self.along_m, 1000), (self.across_m, 1000))
+        signed = (*offsets, (self.heading_rad, 180 / math.pi))
+        row = (
+            *(self.stop, self.outcome, _number(self.planned_s), _number(self.arrived_s)),
+            *(_number(value, scale, sign="+") for value, scale in signed),
+            *(_number(self.settle_s), str(self.tries), _number(self.lost, 100), self.why),
+        )
+        return dict(zip(COLUMNS, row, strict=True))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the row for a program."""
+        keys = (
+            *("stop", "outcome", "reason", "planned_s", "arrived_s", "late_s", "deviation_m", "along_m"),
+            *("across_m", "heading_rad", "tolerance_m", "settle_s", "tries", "lost", "disputed_m"),
+        )
+        return {**{key: getattr(self, key) for key in keys}, "outside_tolerance": bool(self.outside_text)}
+
+
+def _number(value: float | None, scale: float = 1.0, *, sign: str = "-") -> str:
+    """Format a number with one decimal; `-` for None, and never a minus before a zero."""
+    return "-" if value is None else f"{round(value * scale, 1) + 0.0:{sign}.1f}"
 
 
 @dataclass(frozen=True)

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from stopgo.mission.comparing.acquired import Acquired
-from stopgo.mission.comparing.comparison import Comparison, StopComparison
+from stopgo.mission.comparing.comparison import COLUMNS, Comparison
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.console.table import duration, printable, table
 from stopgo.mission.run.events import JUMPED_OVER, Aborted, Finished
-from stopgo.mission.stages.figures import Share, percent
+from stopgo.mission.stages.figures import Share, pair_cells
 from stopgo.mission.stages.network import apart_in_words, network_of
 
 FOLLOW_UP = "stopgo replay RECORDING --mission mission.json --floor FLOOR --top-up next.json"
-HEADER = (
-    *("stop", "outcome", "planned s", "arrived s", "late s", "along mm", "across mm", "heading °"),
-    *("settle s", "tries", "lost %", "why"),
-)
 MOST_ROOMS = 12
 """Rooms listed on a terminal; --json has all."""
 
@@ -31,28 +26,8 @@ def comparison_text(comparison: Comparison) -> str:
 
 
 def comparison_table(comparison: Comparison) -> str:
-    """Return the table: times in seconds from the run's start, offsets in mm in the direction of arrival."""
-    return table(HEADER, [stop_cells(item) for item in comparison.stops])
-
-
-def stop_cells(item: StopComparison) -> tuple[str, ...]:
-    """Return a row of the table, with the columns of HEADER."""
-    return (
-        *(item.stop, item.outcome, _number(item.planned_s), _number(item.arrived_s)),
-        *(_number(item.late_s, sign="+"), _number(item.along_m, 1000, sign="+")),
-        _number(item.across_m, 1000, sign="+"),
-        _number(item.heading_rad, 180 / math.pi, sign="+"),
-        *(_number(item.settle_s), str(item.tries)),
-        _number(item.lost, 100),
-        "; ".join(why for why in (item.outside_text, item.disputed_text, item.reason) if why),
-    )
-
-
-def _number(value: float | None, scale: float = 1.0, *, sign: str = "-") -> str:
-    """Format a number with one decimal; `-` for None, and never a minus before a zero."""
-    if value is None:
-        return "-"
-    return f"{round(value * scale, 1) + 0.0:{sign}.1f}"
+    """Return the table of stops."""
+    return table(COLUMNS, [tuple(item.cells.values()) for item in comparison.stops])
 
 
 def _totals(comparison: Comparison) -> list[str]:
@@ -100,16 +75,10 @@ def _millimetres(metres: float | None) -> str:
 def _coverage_lines(acquired: Acquired) -> list[str]:
     whole = (acquired.planned.whole, acquired.shares.whole)
     pairs = [whole, *acquired.kinds, *acquired.rooms[:MOST_ROOMS]]
-    rows = [_share_cells(planned, share) for planned, share in pairs]
+    rows = [(*pair_cells(planned, share), "" if share.met else "too little") for planned, share in pairs]
     lines = [table(("coverage", "planned %", "acquired %", "required %", ""), rows)]
     rest = len(acquired.rooms) - MOST_ROOMS
     return [*lines, f"and {rest} more rooms, with higher coverage"] if rest > 0 else lines
-
-
-def _share_cells(planned: Share, share: Share) -> tuple[str, ...]:
-    shown = (planned.coverage, share.coverage, share.required)
-    cells = (percent(value).removesuffix(" %") for value in shown)
-    return (share.name, *cells, "" if share.met else "too little")
 
 
 def comparison_json(comparison: Comparison) -> dict[str, Any]:
@@ -134,7 +103,7 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         **_seen_json(comparison),
         "pieces": _pieces(comparison),
         "coverage": None if comparison.acquired is None else _acquired_json(comparison.acquired),
-        "stops": [_stop_json(item) for item in comparison.stops],
+        "stops": [item.as_json() for item in comparison.stops],
         "states": [
             {"state": span.state, "begin_s": span.begin_s, "end_s": span.end_s, "why": span.why}
             for span in comparison.spans
@@ -173,14 +142,6 @@ def _pieces(comparison: Comparison) -> list[list[str]] | None:
     """Return the connected scans, with those that may still be made; None if no network was planned."""
     network = network_of(comparison.mission)
     return None if network is None else [list(piece) for piece in network.among(_expected(comparison)).pieces]
-
-
-def _stop_json(item: StopComparison) -> dict[str, Any]:
-    keys = (
-        *("stop", "outcome", "reason", "planned_s", "arrived_s", "late_s", "deviation_m", "along_m"),
-        *("across_m", "heading_rad", "tolerance_m", "settle_s", "tries", "lost", "disputed_m"),
-    )
-    return {**{key: getattr(item, key) for key in keys}, "outside_tolerance": bool(item.outside_text)}
 
 
 def _acquired_json(acquired: Acquired) -> dict[str, Any]:

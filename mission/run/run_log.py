@@ -7,6 +7,7 @@ them, and `RunLog.alignment` records the transform.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -141,6 +142,18 @@ class Alignment:
     @property
     def transform(self) -> Transform:
         return Transform(x=self.x, y=self.y, heading=self.heading)
+
+    @property
+    def text(self) -> str:
+        """The transform and its residuals in one line."""
+        line = (
+            f"{self.how}: rotated by {math.degrees(self.heading):.3f}°, shifted by "
+            f"({self.x:.3f}, {self.y:.3f}) m, times by {self.time_offset_ns / 1e9:+.3f} s"
+        )
+        if self.residual_rms_m is None:
+            return line
+        rms, greatest = 1000 * self.residual_rms_m, 1000 * (self.residual_max_m or 0.0)
+        return f"{line}; residuals of {self.pairs} pairs: {rms:.1f} mm rms, {greatest:.1f} mm at most"
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,6 +51,14 @@ class Share:
         return self.required is None or self.seen >= (self.required - 1e-9) * self.visible
 
 
+def pair_cells(planned: Share, share: Share) -> tuple[str, str, str, str]:
+    """Return name, planned, present and required coverage in percent, as tables print them."""
+    before, now, least = (
+        percent(value).removesuffix(" %") for value in (planned.coverage, share.coverage, share.required)
+    )
+    return share.name, before, now, least
+
+
 @dataclass(frozen=True)
 class Shares:
     """Coverage of all targets, by room and kind."""

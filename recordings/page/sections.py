@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
 from stopgo.mission.console.table import duration
-from stopgo.mission.document import Stop
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.files.mission_text import route_length
+from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.run.events import Scanned
 from stopgo.mission.stages.figures import Share, percent
 from stopgo.recordings.page.floor_picture import legend, line_sample, plan_picture
@@ -99,10 +98,9 @@ def _least_time(subject: ReportSubject, scan_s: float) -> str:
 
 
 def _plan_tables(subject: ReportSubject) -> str:
-    mission = subject.mission
-    arrivals = schedule(mission).arrival_s.tolist()
-    rows = [row(_planned_cells(stop, s)) for stop, s in zip(mission.stops, arrivals, strict=True)]
-    stops = section("Stops", grid(("stop", "x m", "y m", "arrival", "sees units", "new"), rows))
+    columns = ("stop", "x m", "y m", "arrives", "units", "new")
+    rows = [row(shown(stop.cells[name]) for name in columns) for stop in stop_list(subject.mission)]
+    stops = section("Stops", grid(columns, rows))
     if subject.sight is None:
         return stops
     planned = subject.sight.planned
@@ -111,11 +109,6 @@ def _plan_tables(subject: ReportSubject) -> str:
         section("Kinds", _plan_shares(planned.kinds, "kind")),
     ]
     return tag("div", stops, tag("div", *tables), class_="columns")
-
-
-def _planned_cells(stop: Stop, arrival_s: float) -> list[str]:
-    position = (number(stop.x, digits=3), number(stop.y, digits=3))
-    return [shown(stop.id), *position, duration(arrival_s), str(stop.sees.units), str(stop.sees.new_units)]
 
 
 def _plan_shares(shares: Sequence[Share], what: str) -> str:
@@ -217,21 +210,7 @@ def _pictured(subject: ReportSubject, comparison: Comparison | None) -> str:
     return legend(marks) + plan_picture(subject, comparison)
 
 
-STOP_HEADER = (
-    *(
-        "stop",
-        "outcome",
-        "planned",
-        "arrived",
-        "delay s",
-        "along mm",
-        "across mm",
-        "heading °",
-        "settle s",
-        "tries",
-    ),
-    "coverage lost",
-)
+DRIVEN = ("late s", "along mm", "across mm", "heading °", "settle s", "tries", "lost %")
 
 
 def _stop_grid(comparison: Comparison) -> str:
@@ -240,19 +219,14 @@ def _stop_grid(comparison: Comparison) -> str:
         row(_stop_cells(item), **({"class_": "missing"} if item.stop in missing else {}))
         for item in comparison.stops
     ]
-    return grid(STOP_HEADER, rows)
+    return grid(("stop", "outcome", "planned", "arrived", *DRIVEN), rows)
 
 
 def _stop_cells(item: StopComparison) -> list[str]:
     words = (item.outside_text or item.outcome, item.disputed_text, item.reason)
     outcome = ": ".join(word for word in words if word)
-    return [
-        *(shown(item.stop), shown(outcome), _clock(item.planned_s), _clock(item.arrived_s)),
-        *(number(item.late_s, sign=True), number(item.along_m, 1000, sign=True)),
-        *(number(item.across_m, 1000, sign=True), number(item.heading_rad, 180 / math.pi, sign=True)),
-        *(number(item.settle_s), str(item.tries)),
-        "" if item.lost is None else f"−{number(item.lost, 100)} %",
-    ]
+    driven = (item.cells[name] for name in DRIVEN)
+    return [shown(item.stop), shown(outcome), _clock(item.planned_s), _clock(item.arrived_s), *driven]
 
 
 def _clock(seconds: float | None) -> str:
@@ -345,7 +319,7 @@ _ROWS = (
     ("run time", lambda run: _clock(run.driven_s)),
     ("greatest position error at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
     ("greatest cross-track error", _path_error),
-    ("path seen", lambda run: percent(run.sighted.fraction) if len(run.log.poses) else ""),
+    ("path recorded", lambda run: percent(run.sighted.fraction) if len(run.log.poses) else ""),
     ("stationary", lambda run: duration(run.seconds_in("PAUSED", "HELD"))),
 )
 """Rows of the table of runs."""
@@ -366,24 +340,10 @@ def _findings(subject: ReportSubject) -> str:
 
 def _alignments(subject: ReportSubject) -> str:
     runs = subject.comparisons
-    lines = [
-        tag("li", shown(f"{name}: {_aligned(run)}. {_read(run)}"))
-        for run, name in zip(runs, run_names(runs), strict=True)
-    ]
+    how = (run.log.alignment.text if run.log.alignment else "recorded in the mission's frame" for run in runs)
+    named = zip(runs, run_names(runs), how, strict=True)
+    lines = [tag("li", shown(f"{name}: {aligned}. {_read(run)}")) for run, name, aligned in named]
     return section("Alignment", tag("ul", *lines)) if lines else ""
-
-
-def _aligned(run: Comparison) -> str:
-    fit = run.log.alignment
-    if fit is None:
-        return "recorded in the mission's frame"
-    rotation, shift = math.degrees(fit.heading), f"({fit.x:.3f}, {fit.y:.3f}) m"
-    seconds = f"{fit.time_offset_ns / 1e9:+.3f} s"
-    how = f"{fit.how}: rotated by {rotation:.3f}°, shifted by {shift}, times by {seconds}"
-    if fit.residual_rms_m is None:
-        return how
-    rms, greatest = 1000 * fit.residual_rms_m, 1000 * (fit.residual_max_m or 0.0)
-    return f"{how}; residuals of {fit.pairs} pairs: {rms:.1f} mm rms, {greatest:.1f} mm at most"
 
 
 def _read(run: Comparison) -> str:

@@ -32,7 +32,7 @@ def _cell(content: str, cell: str) -> str:
     return tag(cell, content, **({"class_": "number"} if _NUMBER.fullmatch(content) else {}))
 
 
-_NUMBER = re.compile(r"[+−]?[\d.:]+( %| mm)?( / \d+)?")
+_NUMBER = re.compile(r"[+−-]?[\d.:]+( %| mm)?( / \d+)?|-")
 
 
 def grid(header: Sequence[str], rows: Iterable[str], **attributes: Any) -> str:

@@ -11,8 +11,7 @@ from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_table
 from stopgo.mission.comparing.measured import Measured
 from stopgo.mission.console.table import printable, table
-from stopgo.mission.run.run_log import Alignment
-from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.figures import pair_cells, percent
 from stopgo.recordings.logs.field_log import FieldLog
 from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.path_and_time import driven_path, lost_times
@@ -28,7 +27,7 @@ def as_text(replay: Replay) -> str:
     lines = [
         _head(replay.log),
         f"  poses      {replay.placed.source.source}, {len(replay.placed.track)} of them",
-        f"  placed     {alignment_text(replay.run.alignment)}",
+        f"  placed     {replay.run.alignment.text if replay.run.alignment else 'unchanged'}",
         *(f"  note       {line}" for line in notes_of(replay)),
         "",
         *(f"  {line}" for line in comparison_table(replay.comparison).split("\n")),
@@ -45,22 +44,6 @@ def as_text(replay: Replay) -> str:
 
 def _head(log: FieldLog) -> str:
     return f"{log.path}: {log.format}, {log.messages} messages, sha256 {log.digest[:12]}…"
-
-
-def alignment_text(alignment: Alignment | None) -> str:
-    """Return the log's transform to the mission's frame, in one line."""
-    if alignment is None:
-        return "unchanged"
-    transform = (
-        f"rotated {math.degrees(alignment.heading):.2f}°, then shifted by "
-        f"({alignment.x:.3f}, {alignment.y:.3f}) m; times {alignment.time_offset_ns / 1e9:+.3f} s"
-    )
-    if alignment.residual_rms_m is None or alignment.residual_max_m is None:
-        return f"{alignment.how}: {transform}"
-    residuals = (
-        f"{1000 * alignment.residual_rms_m:.0f} mm rms, {1000 * alignment.residual_max_m:.0f} mm at most"
-    )
-    return f"{alignment.how}: {transform}; residuals {residuals}"
 
 
 def notes_of(replay: Replay) -> tuple[str, ...]:
@@ -100,16 +83,7 @@ def _sight(replay: Replay) -> list[str]:
     """Return the visible fractions, lowest first, next to those planned."""
     if replay.sight is None:
         return []
-    rows = [
-        (
-            share.name,
-            *(
-                percent(value).removesuffix(" %")
-                for value in (planned.coverage, share.coverage, share.required)
-            ),
-        )
-        for planned, share in replay.sight.pairs
-    ]
+    rows = [pair_cells(planned, share) for planned, share in replay.sight.pairs]
     lines = table(("visible", "planned %", "as driven %", "required %"), rows).split("\n")
     return ["", *(f"  {line}" for line in lines), ""]
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from stopgo.commands.plan_files import plan_files
 from stopgo.mission.errors import OutcomeUnknown
+from stopgo.plan_files import plan_files
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.station import Station

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from stopgo.commands.plan_files import PrintOptions, plan_files
-from stopgo.commands.result_files import result_folder
 from stopgo.mission.console.notice import notice
 from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files.plan_toml import read_settings, settings_json, settings_toml
 from stopgo.mission.settings.parameter import FIRST
+from stopgo.plan_files import PrintOptions, plan_files
 from stopgo.planner.commands.options import values_of, with_options
+from stopgo.result_files import result_folder
 
 if TYPE_CHECKING:
     from stopgo.mission.settings import Settings

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from stopgo.commands.result_files import JsonOption, report_missing_rerun, result_folder
 from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable
 from stopgo.mission.files.atomic import must_be_writable, replacing
+from stopgo.result_files import JsonOption, report_missing_rerun, result_folder
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan

@@ -20,7 +20,8 @@ from msgspec.structs import replace
 
 from stopgo.command_line import main
 from stopgo.mission.comparing.compare import arrival_direction
-from stopgo.mission.comparing.comparison_text import HEADER, comparison_json, comparison_text
+from stopgo.mission.comparing.comparison import COLUMNS
+from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission, Stop, sealed
@@ -248,7 +249,7 @@ def _plans_of(story: Story, stop: Stop) -> list[float]:
 
 def _is_true_in_text(story: Story, text: str) -> None:
     lines = [re.split(r"\s{2,}", line.strip()) for line in text.splitlines()]
-    rows = {cells[0]: dict(zip(HEADER, cells, strict=False)) for cells in lines if len(cells) >= 11}
+    rows = {cells[0]: dict(zip(COLUMNS, cells, strict=False)) for cells in lines if len(cells) >= 11}
     for stop in story.stops:
         _is_true_of_cells(story, stop, rows[stop.id])
     scanned = sum(map(story.scanned, story.stops))

@@ -14,10 +14,10 @@ import pytest
 
 import stopgo
 from stopgo.command_line import main
-from stopgo.commands.plan_files import plan_files
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import Settings
+from stopgo.plan_files import plan_files
 from tests.disk import small_disk
 from tests.planner.worlds import FLOORS, SHARED
 

@@ -138,7 +138,7 @@ def test_a_time_offset_moves_the_run_and_is_told() -> None:
     track = logged(driven(MISSION))
     found = replay(log_of(track), MISSION, Placing(align="first", time_offset_s=-2.5))
     assert found.run.poses.ns[0] == track.ns[0] - 2_500_000_000
-    assert "times -2.500 s" in as_text(found)
+    assert "times by -2.500 s" in as_text(found)
 
 
 def test_a_halt_too_short_for_a_scan_is_none() -> None:

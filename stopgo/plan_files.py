@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.commands.result_files import is_missing, report_missing_rerun, result_folder
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
 from stopgo.planner import plan
+from stopgo.result_files import is_missing, report_missing_rerun, result_folder
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
