@@ -57,7 +57,7 @@ _HOME: dict[str, NewName | Dropped | Unavailable] = {
 
 RENAMED: Mapping[str, Mapping[str, NewName | Dropped | Unavailable]] = {
     "plan": {**_OF_PLANS, **_OF_FLOORS},
-    "floors": _OF_FLOORS,
+    "floors": {**_OF_FLOORS, "--svg": NewName("--picture")},
     "convert": _OF_FLOORS,
     "check": _OF_COVERAGE,
     "export": {**_OF_COVERAGE, **_OF_ITEMS},

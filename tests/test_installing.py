@@ -32,6 +32,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
     subprocess.run(
         [*pip, "--no-deps", "--no-build-isolation", "--target", str(site), str(tree)],
+        env={**os.environ, "STOPGO_PURE": "yes"},
         check=True,
         capture_output=True,
     )
@@ -58,7 +59,7 @@ def run(code: str, site: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-P", "-c", code],
         cwd=site.parent,
-        env={**os.environ, "PYTHONPATH": str(site), "NUMBA_DISABLE_JIT": "1"},
+        env={**os.environ, "PYTHONPATH": str(site)},
         capture_output=True,
         text=True,
         check=False,
@@ -177,3 +178,20 @@ def test_the_hooks_run_ruff_at_the_pinned_version() -> None:
     hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
     assert pinned is not None
     assert f"rev: v{pinned[1]}\n" in hooks
+
+
+def test_the_workflow_runs_make_test_on_every_promised_system_and_version() -> None:
+    workflow = (ROOT / ".github" / "workflows" / "test.yml").read_text(encoding="utf-8")
+    assert "os: [ubuntu-latest, macos-latest, windows-latest]" in workflow
+    named = [item.rpartition(" ")[2] for item in PROJECT["project"]["classifiers"] if ":: 3." in item]
+    assert f"python: {named}".replace("'", '"') in workflow
+    assert "run: make test" in workflow
+
+
+def test_the_next_release_in_the_changelog_is_newer_than_the_version() -> None:
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    following = re.search(r"^## \[(\d+)\.(\d+)\.(\d+)\] - unreleased$", changelog, re.MULTILINE)
+    assert following is not None
+    assert [int(part) for part in following.groups()] > [
+        int(part) for part in PROJECT["project"]["version"].split(".")
+    ]

@@ -12,11 +12,13 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Base, Scanner
 from stopgo.bridge.robot.current_task import faces, has_work, label, moved
 from stopgo.bridge.robot.run_store import RunStore
+from stopgo.bridge.robot.scan_standstill import ScanStandstill
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission, Point
 from stopgo.mission.run import route_position
 from stopgo.mission.run import states as runs
-from stopgo.mission.run.events import Pose
+from stopgo.mission.run.events import Pose, Scanned
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 from stopgo.mission.run.states import Run
 from stopgo.mission.run.tolerance import deviation, is_outside
 
@@ -36,6 +38,7 @@ class RunDriver:
         self._base = base
         self._scanner = scanner
         self._clock = clock
+        self.standstill = ScanStandstill(base)
         self.silent_s = 0.0
         """Seconds without data from any station; written by the link's thread."""
 
@@ -68,7 +71,7 @@ class RunDriver:
         advance, battery, silent_s = self._store.advance, self._base.battery(), self.silent_s
         if self.link_is_lost(mission):
             advance(run, lambda now: runs.link_lost(now, mission, silent_s))
-        elif battery < mission.policy.battery_min:
+        elif battery is not None and battery < mission.policy.battery_min:
             reason = f"battery at {battery:.0%}, below {mission.policy.battery_min:.0%}"
             advance(run, lambda now: runs.sent_home(now, mission, then="PAUSED", reason=reason))
         else:
@@ -146,8 +149,19 @@ class RunDriver:
 
     def _scan(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
-        result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._control.scan_interrupt)
+        with self.standstill.watching(stop.tolerance_m):
+            result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._control.scan_interrupt)
+        if isinstance(result, ScanResult):
+            why = self.standstill.why or self._counted_before(run, result)
+            result = ScanFailed(reason=why) if why else result
         self._store.advance(run, lambda now: runs.scan_ended(now, mission, result))
+
+    def _counted_before(self, run: Run, result: ScanResult) -> str:
+        """Return which stop the same file was counted for already; empty if it is a new one."""
+        for event in self._store.journal.events(run_id=run.run_id):
+            if isinstance(event, Scanned) and (event.file, event.sha256) == (result.file, result.sha256):
+                return f"the scanner named {event.file} again, which is the scan of {event.stop}"
+        return ""
 
     def _verify(self, run: Run, mission: Mission) -> None:
         here = self._base.pose()

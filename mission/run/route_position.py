@@ -56,9 +56,14 @@ def _from(here: NearestPoint, path: tuple[Point, ...], within_m: float) -> tuple
 
 
 def nearest_leg(mission: Mission, pose: Pose) -> tuple[int, NearestPoint]:
-    """Return the leg to a stop that passes nearest to the robot, the first of equals."""
+    """Return the leg to a stop that passes nearest to the robot, the first of equals.
+
+    Legs within the stop's tolerance of the robot are equals: a robot at a stop is still on the leg to it.
+    """
     candidates = [nearest(stop.approach, pose) for stop in mission.stops]
-    leg = min(range(len(candidates)), key=lambda index: candidates[index].distance)
+    offsets = zip((point.distance for point in candidates), mission.stops, strict=True)
+    beyond = [max(0.0, offset_m - stop.tolerance_m) for offset_m, stop in offsets]
+    leg = min(range(len(candidates)), key=lambda index: (beyond[index], index))
     return leg, candidates[leg]
 
 

@@ -26,6 +26,15 @@ from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
 from stopgo.planner.floors.units.unit_lengths import METRES
+from stopgo.planner.floors.wall_layers import (
+    NOT_ENCLOSING,
+    Deriving,
+    WallLayers,
+    has_wall_layers,
+    labelled,
+    wall_layers,
+    with_layers,
+)
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
@@ -37,9 +46,61 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
         When the bytes are no complete DXF, when they show no floor, or several and none is chosen.
     """
     drawing, odd_file = open_drawing(file.data, source=file.path)
-    sheet = sheet_of(drawing, options, source=file.path)
-    floor = _floor_of(sheet, file.path, _source(file, options))
+    sheet, untold = _sheet(drawing, options, file.path)
+    floor = _floor_of(sheet, file.path, _source(file, options), untold)
     return replace(floor, findings=in_order((*odd_file, *floor.findings)))
+
+
+def _sheet(drawing: Drawing, options: FloorOptions, path: Path) -> tuple[DxfSheet, WallLayers | None]:
+    """The drawing as interpreted; and layers that may hold its walls, where nothing tells for certain."""
+
+    def derive(sheet: DxfSheet) -> Derived:
+        return _derived(sheet, path)
+
+    if has_wall_layers(drawing, options, source=path):
+        return _named_sheet(drawing, options, path, derive)
+    found = wall_layers(drawing, options, derive, source=path)
+    if found is None or not found.is_told:
+        return _sheet_without_unit(drawing, options, path), found or WallLayers()
+    return _told_sheet(drawing, options, found, path), None
+
+
+def _named_sheet(
+    drawing: Drawing, options: FloorOptions, path: Path, derive: Deriving
+) -> tuple[DxfSheet, WallLayers | None]:
+    """The drawing by the names of its layers; if the walls named so enclose no floor, with other layers."""
+    sheet = sheet_of(drawing, options, source=path)
+    if "walls" in options.layers.values():
+        return labelled(sheet), None
+    if not sheet.layered and not sheet.outlined:
+        try:
+            derive(sheet)
+        except NothingEnclosed:
+            found = wall_layers(drawing, options, derive, source=path, roles=NOT_ENCLOSING)
+            if found is not None and found.is_told:
+                return _told_sheet(drawing, options, found, path), None
+        except InputError:
+            pass  # the floor is derived again, and the message given there
+    return sheet, None
+
+
+def _told_sheet(drawing: Drawing, options: FloorOptions, found: WallLayers, path: Path) -> DxfSheet:
+    sheet = labelled(sheet_of(drawing, with_layers(options, found), source=path))
+    return replace(sheet, findings=[found.finding, *sheet.findings])
+
+
+def _sheet_without_unit(drawing: Drawing, options: FloorOptions, path: Path) -> DxfSheet:
+    """The sheet of a drawing without walls; its unit does not matter, and is not asked for."""
+    for units in (options.units, *ANY_UNIT):
+        try:
+            return sheet_of(drawing, replace(options, units=units), source=path)
+        except InputError:
+            continue
+    return sheet_of(drawing, options, source=path)
+
+
+ANY_UNIT = ("m", "cm", "mm")
+"""Units in which a drawing is shown that is no floor."""
 
 
 def _source(file: FloorFile, options: FloorOptions) -> FloorSource:
@@ -53,7 +114,11 @@ def floor_in(drawing: Drawing, *, source: Path, digest: str, d_dis: float) -> Fl
     return _floor_of(sheet, source, FloorSource(source.name, digest))
 
 
-def _floor_of(sheet: DxfSheet, path: Path, source: FloorSource) -> FloorPlan:
+def _floor_of(
+    sheet: DxfSheet, path: Path, source: FloorSource, untold: WallLayers | None = None
+) -> FloorPlan:
+    if untold is not None:
+        raise InputError(f"{path}: {_no_walls(sheet, untold)}")
     made = _derived(sheet, path)
     parts = parts_of(
         made.strokes,
@@ -104,11 +169,15 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
         )
     if not any(stroke.role == "floor" for stroke in made.strokes):
         walls = _listed(sorted({stroke.layer for stroke in sheet.strokes if stroke.role == "walls"}))
-        raise InputError(
+        raise NothingEnclosed(
             f"{path}: the walls on {walls} enclose no floor; draw its outline on a layer FLOOR, "
             "close the walls, or say which layer holds more of them (--layer NAME=walls)"
         )
     return made
+
+
+class NothingEnclosed(InputError):
+    """The walls of a drawing enclose no floor."""
 
 
 def _size(sheet: DxfSheet) -> float:
@@ -122,15 +191,21 @@ LARGEST_FLOOR = 2000.0
 """Greatest length of a storey, in metres."""
 
 
-def _no_walls(sheet: DxfSheet) -> str:
+def _no_walls(sheet: DxfSheet, untold: WallLayers | None = None) -> str:
     """Message for a drawing without any known layer, with the remedy."""
     layers = sorted({shape.layer for shape in sheet.shapes}, key=str.casefold)
     why = (
         f"no closed outline on layer FLOOR, and no layer that shows walls; layers present: {_listed(layers)}"
     )
-    if len(layers) < 2:
-        return f"{why} (walls cannot be distinguished from other lines; ask for an export with layers)"
-    return f"{why} (say which one holds the walls, such as {layer_option(layers[0], 'walls')})"
+    if untold is None or not untold.layers:
+        return f"{why}; say which one holds the walls, such as {layer_option('NAME', 'walls')}"
+    if untold.refusal:
+        return f"{why}; say which one holds the walls (with {untold.option}: {untold.refusal})"
+    seen = f" ({'; '.join(untold.evidence)})" if untold.evidence else ""
+    return (
+        f"{why}; the lines on {_listed(untold.layers)} enclose {untold.area:.4g} m²{seen}, which is not "
+        f"enough to tell that they are walls; {untold.option} accepts them"
+    )
 
 
 def _listed(names: Sequence[str], *, most: int = 20) -> str:
@@ -153,7 +228,7 @@ def metres_in(drawing: Drawing, *, source: Path, options: FloorOptions | None = 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:
     """Return the survey of a DXF: drawings, meanings of layers, elements inferred and left out."""
     drawing, _ = open_drawing(file.data, source=file.path)
-    sheet = sheet_of(drawing, options, source=file.path)
+    sheet, _ = _sheet(drawing, options, file.path)
     try:
         floor, refusal = read(file, options), None
     except InputError as error:

@@ -54,6 +54,37 @@ def sheet_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> DxfShe
     InputError
         When the given unit makes no building, or the given drawing or region does not exist.
     """
+    seen = layers_of(drawing, options, source=source)
+    scale, odd_units = unit_of(drawing, seen.shapes, options.units, outlined=seen.outlined, source=source)
+    strokes, words, odd_strokes = strokes_of(seen.shapes, scale=scale, chord=options.d_dis)
+    sheet = DxfSheet(
+        *(seen.layers, seen.shapes, scale, strokes, words, [*odd_units, *seen.findings, *odd_strokes]),
+        *(seen.layered, seen.outlined),
+    )
+    return _one_drawing(_in_region(sheet, options, source), options, source)
+
+
+@dataclass(frozen=True, eq=False)
+class LayersSeen:
+    """The shapes of a drawing with the meanings of their layers, before its unit is known."""
+
+    layers: Layers
+    shapes: Sequence[Shape]
+    findings: list[Finding]
+    layered: bool
+    """True if layers with stopgo's own names show all of the floor."""
+    outlined: bool
+    """True if the layer FLOOR shows the floor."""
+
+
+def layers_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> LayersSeen:
+    """Return the shapes of a drawing with the meanings of their layers for these options.
+
+    Raises
+    ------
+    InputError
+        When nothing is drawn in the model space, or far too much.
+    """
     shapes, odd = shapes_of(drawing, source=source, layers=Layers(options.layers))
     _check_model_space(drawing, source)
     own = frozenset(shape.role for shape in shapes if not shape.is_text)
@@ -63,13 +94,7 @@ def sheet_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> DxfShe
     if by_name or options.layer_map:
         shapes, odd = shapes_of(drawing, source=source, layers=layers)
         odd = [*odd, *_by_name(shapes)]
-    outlined = "floor" in own
-    scale, odd_units = unit_of(drawing, shapes, options.units, outlined=outlined, source=source)
-    strokes, words, odd_strokes = strokes_of(shapes, scale=scale, chord=options.d_dis)
-    sheet = DxfSheet(
-        layers, shapes, scale, strokes, words, [*odd_units, *odd, *odd_strokes], layered, outlined
-    )
-    return _one_drawing(_in_region(sheet, options, source), options, source)
+    return LayersSeen(layers, shapes, odd, layered, "floor" in own)
 
 
 def _check_model_space(drawing: Drawing, source: Path) -> None:

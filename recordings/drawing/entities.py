@@ -78,7 +78,6 @@ WORLD_PROVED_PAIRS = "/world/proof/pairs"
 
 FIELD = "/field"
 
-METRICS = "/metrics"
 METRIC_COVERAGE = "/metrics/coverage"
 COVERAGE_CHOSEN = "/metrics/coverage/chosen"
 COVERAGE_REQUIRED = "/metrics/coverage/required"

@@ -216,7 +216,7 @@ def _findings(stages: StageResults) -> list[str]:
 
 
 _COLOURS = (
-    "- targets: blue seen by a stop, light grey not seen, dark grey seen from no candidate, yellow new",
+    "- targets: blue covered, light grey not covered, dark grey visible from no candidate, yellow new",
     "- of a run: bold blue was scanned, thick orange-red was planned and lost; a cross is a stop left out",
     "- stops light green with their number, doorway stops light blue",
     "- route yellow, return path dark yellow; run purple",

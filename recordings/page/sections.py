@@ -319,7 +319,7 @@ _ROWS = (
     ("run time", lambda run: _clock(run.driven_s)),
     ("greatest position error at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
     ("greatest cross-track error", _path_error),
-    ("path seen", lambda run: percent(run.sighted.fraction) if len(run.log.poses) else ""),
+    ("path recorded", lambda run: percent(run.sighted.fraction) if len(run.log.poses) else ""),
     ("stationary", lambda run: duration(run.seconds_in("PAUSED", "HELD"))),
 )
 """Rows of the table of runs."""

@@ -30,13 +30,15 @@ def add_commands(app: typer.Typer) -> None:
     floors = with_options(floors_command, (*FLOOR_PARAMETERS, "layers"))
     convert = with_options(convert_command, (*FLOOR_PARAMETERS, "layers"))
     app.command(name="convert", epilog="Example: stopgo convert building.ifc --storey EG -o eg.dxf")(convert)
-    app.command(name="floors", epilog="Example: stopgo floors building.ifc --svg floors.svg")(floors)
+    app.command(name="floors", epilog="Example: stopgo floors building.ifc --picture floors.svg")(floors)
 
 
 def floors_command(
     file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, .ifc, .ifczip or map.yaml.")],
     *,
-    svg: Annotated[Path | None, typer.Option(help="Draw the elements read and those left out.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="SVG to draw: the elements read, and the lines left out.")
+    ] = None,
     write_map: Annotated[
         Path | None, typer.Option(help="Write the meaning assigned to each layer, for correction.")
     ] = None,
@@ -50,13 +52,13 @@ def floors_command(
     from stopgo.planner.floors import options_of, survey_floor
     from stopgo.planner.floors.layer_map import layer_map
 
-    for out in (svg, write_map):
+    for out in (picture, write_map):
         must_not_replace(out, file)
     options = options_of(read_settings(None, values_of(given)))
     with running(f"reading {file}"):
         found = survey_floor(file, options)
-    if svg is not None:
-        _draw(svg, file, found, options)
+    if picture is not None:
+        _draw(picture, file, found, options)
     if write_map is not None:
         write_atomic(write_map, layer_map(found).encode("utf-8"))
     if as_json:

@@ -7,14 +7,20 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.mavlink.vehicle_link.messages import command_long, interval, set_current
+from stopgo.bridge.mavlink.vehicle_link.messages import (
+    command_long,
+    every_component,
+    interval,
+    request,
+    set_current,
+)
 from stopgo.bridge.mavlink.vehicle_link.peer import Ack, Peer
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
 from stopgo.mission.mavlink.enums import CommandResult, MessageId
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.items import Command
-from stopgo.mission.run.orders import Refused
+from stopgo.mission.run.run_commands import Refused
 
 SHOWS_S = 5.0
 """Longest wait for the effect of a command; a vehicle sends a heartbeat every second."""
@@ -28,6 +34,10 @@ REPEATED_HZ = {
     MessageId.GLOBAL_POSITION_INT: 2.0,
     MessageId.ATTITUDE: 10.0,
     MessageId.SYS_STATUS: 1.0,
+    MessageId.BATTERY_STATUS: 0.5,
+    MessageId.EKF_STATUS_REPORT: 1.0,
+    MessageId.ESTIMATOR_STATUS: 1.0,
+    MessageId.FENCE_STATUS: 1.0,
     MessageId.GPS_GLOBAL_ORIGIN: 0.5,
 }
 """Wanted rate of each message, in Hz; so a lost one is followed by another."""
@@ -61,13 +71,12 @@ class ConfirmedCommands:
         for number, hertz in REPEATED_HZ.items():
             self._peer.send(interval(self._peer.who, number, hertz))
 
-    def ask_for(self, number: int) -> None:
-        """Request a message again, without waiting; at most twice a second."""
+    def ask_for_picture(self) -> None:
+        """Request the last picture of every component, at most twice a second, without waiting."""
         now_ns = self._clock.now_ns()
-        if now_ns < self._asked_ns + ASK_AGAIN_NS:
-            return
-        self._asked_ns = now_ns
-        self._peer.request(number)
+        if now_ns >= self._asked_ns + ASK_AGAIN_NS:
+            self._asked_ns = now_ns
+            self._peer.send(request(every_component(self._peer.who), MessageId.CAMERA_IMAGE_CAPTURED))
 
     def hold(self) -> None:
         """Put the vehicle on hold."""

@@ -13,7 +13,7 @@ from typing import Literal
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
 from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
-from stopgo.bridge.mavlink.vehicle_link.messages import request
+from stopgo.bridge.mavlink.vehicle_link.messages import every_component, request
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who, sender
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import InputError, OutcomeUnknown, RobotUnreachable
@@ -41,9 +41,10 @@ AGAIN_S = 3.0
 """Interval at which a result is requested again: it may have been lost on the link."""
 COUNT_S = 1.0
 """Time that the camera may take to report its number of pictures."""
-EVERY_COMPONENT = 0
 NO_MESSAGE = 0.0
 """Number of a script message that means nothing: the scans' number is `SCAN_MESSAGE`."""
+OLD_AGAIN_S = 0.2
+"""Interval at which the last picture is requested before a scan."""
 BUSY_S = 1.0
 """Interval between two tries of a trigger, while an older scan is under way."""
 
@@ -99,15 +100,17 @@ class MavlinkScanner:
         self._tolerances_m = dict(zip(ids, (stop.tolerance_m for stop in mission.stops), strict=True))
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
-        until_s = self._now_s() + scan.timeout_s
         watch = StandstillWatch(self._autopilot, self._tolerances_m.get(stop_of(label), TOLERANCE_M))
         with self._autopilot.peer.wire.waiting("CAMERA_IMAGE_CAPTURED") as waiting:
             next_index = self._next_index(waiting)
+            self._learn_old_pictures(waiting)
+            until_s = self._now_s() + scan.timeout_s
             command = self._trigger_command(label, scan, next_index)
             refused = self._send_trigger(command, waiting, until_s, interrupt)
             if refused:
                 return ScanFailed(reason=refused)
-            captured = self._await_picture(waiting, next_index, until_s, interrupt, watch)
+            due_s = self._now_s() + scan.duration_s
+            captured = self._await_picture(waiting, next_index, (due_s, until_s), interrupt, watch)
         spoilt = watch.why()
         if spoilt:
             self._end_spoilt(captured is None)
@@ -132,16 +135,29 @@ class MavlinkScanner:
             self._autopilot.control.stop()
 
     def _next_index(self, waiting: MessageQueue) -> int | None:
-        """Lowest index of the next picture, if the camera reports it; all reports until now are old."""
+        """Lowest index of the autopilot's next picture, if it reports it."""
         status = None if self._has_own_component else self._ask(MessageId.CAMERA_CAPTURE_STATUS)
         if status is not None:
             return int(status.image_count)
-        if self._has_own_component:
-            self._discard_old(waiting)
-            return None
-        last = self._ask(MessageId.CAMERA_IMAGE_CAPTURED)
-        self._discard_old(waiting)
+        last = None if self._has_own_component else self._ask(MessageId.CAMERA_IMAGE_CAPTURED)
         return None if last is None else int(last.image_index) + 1
+
+    def _learn_old_pictures(self, waiting: MessageQueue) -> None:
+        """Have the last picture reported, and take it and all before as old ones.
+
+        It may have come while nobody listened, or before a restart of this program: reported again during
+        the scan, it would count for this stop.
+        """
+        self._discard_old(waiting)
+        known, end_s = len(self._reported), self._now_s() + COUNT_S
+        while len(self._reported) == known and self._now_s() < end_s:
+            self._request_picture(None)
+            message = waiting.get(OLD_AGAIN_S)
+            if message is not None and message.get_srcSystem() == self._autopilot.peer.who.system:
+                old = picture_of(message) in self._reported
+                self._reported.add(picture_of(message))
+                if old:
+                    return
 
     @property
     def _has_own_component(self) -> bool:
@@ -175,7 +191,8 @@ class MavlinkScanner:
         number, params = command
         while True:
             try:
-                ack = self._autopilot.peer.command(number, *params, patience_s=COMMAND_S)
+                # Not again into silence: after a stall each repeated trigger would arrive, and count.
+                ack = self._autopilot.peer.command(number, *params, patience_s=COMMAND_S, unheard=0)
             except OutcomeUnknown:
                 return ""
             if ack.result != CommandResult.TEMPORARILY_REJECTED:
@@ -190,19 +207,22 @@ class MavlinkScanner:
         self,
         waiting: MessageQueue,
         next_index: int | None,
-        until_s: float,
+        times_s: tuple[float, float],
         interrupt: Event,
         watch: StandstillWatch,
     ) -> Message | None:
-        """The first report of a new picture; `None` if there is none in time, or the scan ends early."""
-        asked_s = self._now_s()
+        """The first report of a new picture; `None` if there is none in time, or the scan ends early.
+
+        From the first of the two times on, when it should have ended, it is requested again.
+        """
+        asked_s, until_s = times_s[0] - AGAIN_S, times_s[1]
         while not (interrupt.is_set() or watch.why()) and (left := until_s - self._now_s()) > 0:
             message = waiting.get(min(LOOK_S, left))
             if message is not None and self._is_new(message, next_index):
                 return message
             if self._now_s() - asked_s >= AGAIN_S:
                 asked_s = self._now_s()
-                self._request_picture(0 if next_index is None else next_index)
+                self._request_picture(next_index)
         return None
 
     def _is_new(self, message: Message, next_index: int | None) -> bool:
@@ -223,11 +243,18 @@ class MavlinkScanner:
         while (message := waiting.get(0.0)) is not None:
             self._reported.add(picture_of(message))
 
-    def _request_picture(self, index: int) -> None:
-        """Request it of the component that has it, or of each while that is not known."""
+    def _request_picture(self, index: int | None) -> None:
+        """Request the last picture of the component that has it, or of each while that is not known.
+
+        `index` is the number that the autopilot gives its next picture, if it is known.
+        """
         peer = self._autopilot.peer
-        camera = self._camera or Who(peer.who.system, EVERY_COMPONENT)
-        peer.send(request(camera, MessageId.CAMERA_IMAGE_CAPTURED, index))
+        if self._camera != peer.who:
+            peer.send(request(self._camera or every_component(peer.who), MessageId.CAMERA_IMAGE_CAPTURED))
+        if self._camera in (None, peer.who) and index is not None:
+            peer.send(request(peer.who, MessageId.CAMERA_IMAGE_CAPTURED, index))
+        elif self._camera == peer.who:
+            peer.send(request(peer.who, MessageId.CAMERA_IMAGE_CAPTURED))
 
     def _break_off(self) -> None:
         """Command the vehicle to stop scanning; its answer changes nothing here."""

@@ -28,6 +28,8 @@ class Camera:
         self._scanner = VehicleScanner(mishaps)
         self.last = 0
         """Number in the trigger of the newest scan."""
+        self.triggers = 0
+        """Commands to take a picture since the boot, as an autopilot counts them, also repeated ones."""
         self.reports: dict[int, Message] = {}
         """Report of each scan since the boot, by its index."""
 
@@ -70,8 +72,14 @@ class Camera:
         """Break the scan off without a report."""
         self._scanner.stop()
 
-    def reset(self) -> None:
-        """Forget the reports, as a reboot does, but not their number."""
+    def reset(self, *, is_apart: bool) -> None:
+        """Forget the reports, but not their number, as a reboot of the autopilot does.
+
+        A camera that is a component of its own goes on.
+        """
+        self.triggers = 0
+        if is_apart:
+            return
         self._scanner.stop()
         self.reports.clear()
 

@@ -15,7 +15,7 @@ from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Mode, ModeName
-from stopgo.mission.mavlink.enums import CommandResult, MessageId, ModeFlag
+from stopgo.mission.mavlink.enums import CommandResult, Component, MessageId, ModeFlag
 from stopgo.mission.mavlink.items import Command, MavFrame
 from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.mavlink.writing import SCAN_MESSAGE
@@ -27,6 +27,7 @@ IGNORE_X_Y, IGNORE_VELOCITY, IGNORE_YAW = 0b11, 0b11000, 1 << 10
 LOCAL_NED, LOCAL_OFFSET_NED = MavFrame.LOCAL_NED, MavFrame.LOCAL_OFFSET_NED
 NORTHMOST = 89.0
 """Degrees; at the poles there is no east."""
+OF_CAMERA = (MessageId.CAMERA_IMAGE_CAPTURED, MessageId.CAMERA_CAPTURE_STATUS)
 CHANGE_MODE = 1
 """MAV_DO_REPOSITION_FLAGS."""
 
@@ -43,6 +44,8 @@ class ReceivedCommand:
     """Its position is good to a centimetre: it came in a COMMAND_INT."""
     again: bool
     """Sent again by a station that received no answer."""
+    to: int
+    """The component that it is for; 0: every one."""
 
     def whole(self, index: int, default: int = -1) -> int:
         """A param as a whole number; `default` if it is none."""
@@ -66,12 +69,14 @@ def handlers(vehicle: Vehicle) -> Handlers:
 def _long(message: Message) -> ReceivedCommand:
     params = (message.param1, message.param2, message.param3, message.param4)
     x, y = (_steps(value) for value in (message.param5, message.param6))
-    return ReceivedCommand(message.command, params, x, y, exact=False, again=message.confirmation > 0)
+    again, to = message.confirmation > 0, message.target_component
+    return ReceivedCommand(message.command, params, x, y, exact=False, again=again, to=to)
 
 
 def _int(message: Message) -> ReceivedCommand:
     params = (message.param1, message.param2, message.param3, message.param4)
-    return ReceivedCommand(message.command, params, message.x, message.y, exact=True, again=False)
+    x, y, to = message.x, message.y, message.target_component
+    return ReceivedCommand(message.command, params, x, y, exact=True, again=False, to=to)
 
 
 def _steps(degrees: float) -> int:
@@ -80,6 +85,8 @@ def _steps(degrees: float) -> int:
 
 def _answer(vehicle: Vehicle, who: Who, command: ReceivedCommand) -> None:
     """Carry out and acknowledge a command; one that makes the vehicle silent is acknowledged first."""
+    if vehicle.camera_is_apart and _answer_as_camera(vehicle, who, command):
+        return
     if command.command == Command.PREFLIGHT_REBOOT_SHUTDOWN:
         return _reboot(vehicle, who, command)
     if command.command == Command.COMPONENT_ARM_DISARM and command.params[0] == 1 and vehicle.refuses_arming:
@@ -89,6 +96,20 @@ def _answer(vehicle: Vehicle, who: Who, command: ReceivedCommand) -> None:
     _acknowledge(vehicle, who, command.command, UNSUPPORTED if execute is None else execute(vehicle, command))
     if command.command == Command.REQUEST_MESSAGE:
         _send_requested(vehicle, command.whole(0), command.whole(1))
+
+
+def _answer_as_camera(vehicle: Vehicle, who: Who, command: ReceivedCommand) -> bool:
+    """Answer for a scanner that is a component of its own; true if nothing is left for the autopilot.
+
+    It reports its pictures itself: the autopilot, if asked for them, answers UNSUPPORTED.
+    """
+    for_camera, all_of = command.to == Component.CAMERA, command.to == 0
+    asked = command.command == Command.REQUEST_MESSAGE and command.whole(0) in OF_CAMERA
+    if asked and (for_camera or all_of):
+        _send_requested(vehicle, command.whole(0), command.whole(1))
+    if asked and not for_camera and command.whole(0) == MessageId.CAMERA_IMAGE_CAPTURED:
+        _acknowledge(vehicle, who, command.command, UNSUPPORTED)
+    return for_camera or (asked and command.whole(0) == MessageId.CAMERA_IMAGE_CAPTURED)
 
 
 def _send_requested(vehicle: Vehicle, number: int, index: int) -> None:
@@ -243,6 +264,7 @@ def _report_home(vehicle: Vehicle, command: ReceivedCommand) -> int:
 
 def _capture(vehicle: Vehicle, command: ReceivedCommand) -> int:
     """IMAGE_START_CAPTURE: param4 is the number; param2, the interval (unused for one picture), seconds."""
+    vehicle.camera.triggers += 1
     return _scan(vehicle, command, command.whole(3, 0), command.params[1])
 
 

@@ -13,6 +13,7 @@ from stopgo.bridge.mavlink.simulated.camera import Camera
 from stopgo.bridge.mavlink.simulated.estimator import Estimate
 from stopgo.bridge.mavlink.simulated.exact_drive import ExactDrive
 from stopgo.bridge.mavlink.simulated.guided_target import GuidedTarget
+from stopgo.bridge.mavlink.simulated.lasting_failsafes import LastingFailsafes
 from stopgo.bridge.mavlink.simulated.parameters import Parameters, parameter_handlers
 from stopgo.bridge.mavlink.simulated.real_drive import RealDrive
 from stopgo.bridge.mavlink.simulated.rover import STANDING, Rover
@@ -95,6 +96,7 @@ class Vehicle:
         self.armed = False
         self.failsafe = False
         """True while it holds because setpoints were missing, and no command has come since."""
+        self.failsafes = LastingFailsafes(setup.faults)
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setup.state)
@@ -224,6 +226,11 @@ class Vehicle:
         return True
 
     @property
+    def camera_is_apart(self) -> bool:
+        """True if its scanner is a component of its own, which has the pictures and counts them itself."""
+        return self._setup.faults.any("camera") is not None
+
+    @property
     def is_unplaced(self) -> bool:
         """True if its origin is of no use to it."""
         return self._setup.faults.any("unplaced") is not None
@@ -267,7 +274,8 @@ class Vehicle:
         self.target.forget()
         self.auto.pause(self.now_ns)
         self.auto.reset()
-        self.camera.reset()
+        self.camera.reset(is_apart=self.camera_is_apart)
+        self.failsafes.reset()
         self.transfers.reset()
         self.streams = Streams(self._wall, self._makers)
         self.time.boot()
@@ -296,6 +304,7 @@ class Vehicle:
             self.reboot()
             self.time.prolong_silence(round(restart.amount * 1e9))
         for failsafe in self._mishaps.by("failsafe", up_s):
+            self.failsafes.begin(int(failsafe.amount), self.time.wall_ns)
             self.text(self.autopilot.failsafe_texts[int(failsafe.amount)])
             self.set_mode("hold")
 
@@ -303,7 +312,8 @@ class Vehicle:
         message, why = self.camera.end(self.now_ns, self.time.boot_ms)
         if why:
             self.text(why)
-        self.send(message)
+        if not self._mishaps.once("lostpicture", self.camera.count):
+            self.send(message)
         self.auto.scan_over(self.now_ns)
 
     def _stored(self, kind: int, marked: int | None) -> None:

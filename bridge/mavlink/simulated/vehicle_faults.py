@@ -12,7 +12,7 @@ from stopgo.mission.errors import InputError
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
     "beside", "finish", "scanner", "unsigned", "unplaced", "camera", "jump", "gap", "restart",
-    "failsafe",
+    "failsafe", "lostpicture", "stuck",
 ]  # fmt: skip
 
 
@@ -49,6 +49,8 @@ FAULTS: dict[VehicleFaultKind, str] = {
     "restart": "N seconds after it was switched on, it reboots, and takes AMOUNT seconds more for that",
     "failsafe": "N seconds after it was switched on, a failsafe holds it; AMOUNT is the cause: 0 battery,"
     " 1 remote control, 2 ground station, 3 geofence, 4 crash, 5 position estimate",
+    "stuck": "on the path to item N it stands, in AUTO, for AMOUNT s (0: until AUTO is commanded again)",
+    "lostpicture": "the report of scan N is not sent, unless a station requests it",
     "unplaced": "its origin came too soon: it reports it, but no position on earth (N means nothing)",
     "camera": "its scanner reports scans as a component of its own, 100 (N means nothing)",
     "unsigned": "it signs nothing, though it has a key; it accepts only signed messages (N means nothing)",
@@ -121,6 +123,7 @@ def _nonsense(fault: VehicleFault) -> str | None:
     results = f"RESULT is a MAV_MISSION_RESULT, {RESULTS[0]} to {RESULTS[-1]} (0: ERROR)"
     rules: dict[VehicleFaultKind, tuple[bool, str]] = {
         "loss": percent, "duplicates": percent, "lostack": counted, "scanner": counted,
+        "lostpicture": counted,
         "beside": metres, "finish": metres, "jump": metres,
         "jitter": (at > MOST_JITTER_MS, f"N is milliseconds, 0 to {MOST_JITTER_MS}, such as jitter@300"),
         "gap": (amount == 0, f"AMOUNT is seconds, more than 0, such as gap@{at}=2"),

@@ -20,13 +20,14 @@ from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
 from stopgo.bridge.mavlink.vehicle_link.url import Url
-from stopgo.bridge.mavlink.vehicle_link.wire import Who, Wire, read_link
+from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who, Wire, read_link
 from stopgo.mission.errors import InputError
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.enums import Component
 from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.run.events import Pose
 
+OF_CAMERA = ("CAMERA_IMAGE_CAPTURED", "CAMERA_INFORMATION")
 OPTION = "--mavlink"
 VEHICLE = Who(1, 1)
 STEP_S = 0.02
@@ -65,6 +66,16 @@ def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
     raise SystemExit(1)  # its thread has printed why
 
 
+class ForVehicle(MessageQueue):
+    """Messages for the vehicle, also those for its camera."""
+
+    overhears = True
+
+    def wants(self, message: Message) -> bool:
+        system, component = (getattr(message, f"target_{part}", 0) for part in ("system", "component"))
+        return system in (0, VEHICLE.system) and component in (0, VEHICLE.component, Component.CAMERA)
+
+
 class Stopped(threading.Event):
     """Set when a vehicle has stopped, by itself or on command."""
 
@@ -89,7 +100,7 @@ def vehicle_on(
         apart = setup.faults.any("camera") is not None
 
         def send(message: Message) -> None:
-            of_camera = apart and message.get_type() == "CAMERA_IMAGE_CAPTURED"
+            of_camera = apart and message.get_type() in OF_CAMERA
             wire.send(message, component=Component.CAMERA if of_camera else None)
 
         vehicle = complete_vehicle(setup, clock=WallClock(speed_up=speed_up), wall=WallClock(), send=send)
@@ -105,7 +116,7 @@ def vehicle_on(
 
 def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: Stopped) -> None:
     try:
-        with wire.waiting() as waiting:
+        with wire.filling(ForVehicle()) as waiting:
             while not stop.is_set():
                 message = waiting.get(STEP_S)
                 if message is None:

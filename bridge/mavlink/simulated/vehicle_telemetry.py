@@ -38,9 +38,11 @@ def heartbeat(vehicle: Vehicle) -> Message:
 
 def sys_status(vehicle: Vehicle) -> Message:
     sensors = dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO | dialect.MAV_SYS_STATUS_SENSOR_GPS
+    sensors |= vehicle.failsafes.enabled
+    bad = vehicle.failsafes.enabled & ~vehicle.failsafes.healthy(vehicle.time.wall_ns)
     left = round(100 * vehicle.battery)
     return dialect.MAVLink_sys_status_message(
-        sensors, sensors, sensors, 100, 24_000, 150, left, 0, 0, 0, 0, 0, 0
+        sensors, sensors, sensors & ~bad, 100, 24_000, 150, left, 0, 0, 0, 0, 0, 0
     )
 
 
@@ -161,7 +163,9 @@ def image_captured(vehicle: Vehicle) -> Message | None:
 
 
 def capture_status(vehicle: Vehicle) -> Message:
-    scans, count = int(vehicle.camera.under_way is not None), vehicle.camera.count
+    """Of the autopilot: one that only passes triggers on counts these (source: AP_Camera)."""
+    scans = int(vehicle.camera.under_way is not None)
+    count = vehicle.camera.triggers if vehicle.camera_is_apart else vehicle.camera.count
     return dialect.MAVLink_camera_capture_status_message(vehicle.time.boot_ms, scans, 0, 0.0, 0, 0.0, count)
 
 

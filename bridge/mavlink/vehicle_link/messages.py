@@ -54,6 +54,11 @@ def request(to: Who, message: int, index: int = 0) -> Message:
     return command_long(to, Command.REQUEST_MESSAGE, message, index)
 
 
+def every_component(of: Who) -> Who:
+    """All components of a system."""
+    return Who(of.system, 0)
+
+
 def interval(to: Who, message: int, hertz: float) -> Message:
     """A request to send a message at a rate."""
     return command_long(to, Command.SET_MESSAGE_INTERVAL, message, 1e6 / hertz)

@@ -39,6 +39,10 @@ PATIENCE_S = 5.0
 """Time without data after which a wait for a vehicle ends."""
 AGAIN_S = 0.3
 """Interval between two tries of the same query or command."""
+LONGEST_AGAIN_S = 1.0
+"""Longest interval between two tries of a command: each further one comes later."""
+UNHEARD = 2
+"""Number of times that a command is sent again while no data come from the vehicle."""
 OTHERS_S = 1.3
 """Wait for a second vehicle after the first: every one sends a heartbeat once a second."""
 KNOCK_S = 0.3
@@ -187,8 +191,13 @@ class Peer:
     def send(self, message: Message) -> None:
         self.wire.send(message)
 
-    def command(self, number: int, *params: float, patience_s: float | None = None) -> Ack:
+    def command(
+        self, number: int, *params: float, patience_s: float | None = None, unheard: int = UNHEARD
+    ) -> Ack:
         """Send a COMMAND_LONG until it is answered; params that are not given are 0.
+
+        While no data come from the vehicle it is sent again `unheard` times at most. So after a stall of the
+        link no pile of commands arrives.
 
         Raises
         ------
@@ -196,7 +205,7 @@ class Peer:
             If there is no answer.
         """
         return self._commanded(
-            number, lambda nth: command_long(self.who, number, *params, again=nth), patience_s
+            number, lambda nth: command_long(self.who, number, *params, again=nth), patience_s, unheard
         )
 
     def command_int(
@@ -211,7 +220,7 @@ class Peer:
     ) -> Ack:
         """Send a COMMAND_INT with up to four params and a position (1e-7 degrees); as `command`."""
         message = command_int(self.who, number, *params, x=x, y=y, z=z, frame=frame)
-        return self._commanded(number, lambda _: message, patience_s)
+        return self._commanded(number, lambda _: message, patience_s, UNHEARD)
 
     def order(self, number: int, *params: float, what: str = "", patience_s: float | None = None) -> Ack:
         """Send a command as `command`; anything but ACCEPTED is an error.
@@ -294,13 +303,20 @@ class Peer:
             return " (it signs its messages, and may want ours signed: --signing-key FILE)"
         return " (its heartbeats come: does it want signed messages, or is the link one-way?)"
 
-    def _commanded(self, number: int, message: Callable[[int], Message], patience_s: float | None) -> Ack:
+    def _commanded(
+        self, number: int, message: Callable[[int], Message], patience_s: float | None, unheard: int
+    ) -> Ack:
         with self._commanding, self.waiting("COMMAND_ACK") as waiting:
             patience = self.patience_s if patience_s is None else patience_s
             until = time.monotonic() + patience
-            for nth in count():
-                self.wire.send(message(nth))
-                while (ack := _ack(waiting, number, min(AGAIN_S, until - time.monotonic()))) is not None:
+            nth, sent_s = 0, -math.inf
+            while True:
+                if nth <= unheard or self._newest.heard_s > sent_s:
+                    sent_s = time.monotonic()
+                    self.wire.send(message(nth))
+                    nth += 1
+                wait_s = min(LONGEST_AGAIN_S, AGAIN_S * nth)
+                while (ack := _ack(waiting, number, min(wait_s, until - time.monotonic()))) is not None:
                     if ack.result != CommandResult.IN_PROGRESS:
                         return ack
                     until = time.monotonic() + patience

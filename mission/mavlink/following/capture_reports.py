@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from stopgo.mission.mavlink.captures import STEPS_M, Capture, Picture
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.run.events import Arrived, Pose
+from stopgo.mission.run.scans import ScanResult
 from stopgo.mission.run.states import Run
 
 CAPTURES_KEPT = 100
+ScanFile = tuple[str, str]
+"""Name and sha256 of a scan's file: they stay the same over restarts, as no counter of pictures does."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,8 @@ class CaptureReports:
 
     def __init__(self) -> None:
         self._reports: deque[CaptureReport] = deque(maxlen=CAPTURES_KEPT)
+        self.counted: frozenset[ScanFile] = frozenset()
+        """Files of scans that have counted for a stop: none counts twice, whatever its camera calls it."""
 
     def take(self, capture: Capture, pose: Pose | None, now_ns: int, *, at_stop: bool) -> None:
         """Store a new report, with the vehicle's own pose if it agrees with the camera's position."""
@@ -48,12 +53,22 @@ class CaptureReports:
         for report in reversed(self._reports):
             capture = report.capture
             new = capture.name[1] > after[1] and capture.name != after
-            if new and (
-                capture.may_be_of(stops[run.at])
-                or (report.ns > since_ns and capture.is_nearest(run.at, stops))
+            if (
+                new
+                and file_of(capture) not in self.counted
+                and (
+                    capture.may_be_of(stops[run.at])
+                    or (report.ns > since_ns and capture.is_nearest(run.at, stops))
+                )
             ):
                 return report
         return None
+
+
+def file_of(capture: Capture) -> ScanFile | None:
+    """Return the file of a scan; `None` if it failed."""
+    result = capture.result
+    return (result.file, result.sha256) if isinstance(result, ScanResult) else None
 
 
 def scan_pose(report: CaptureReport | None, arrived: Arrived | None) -> Pose | None:

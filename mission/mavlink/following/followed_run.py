@@ -28,7 +28,7 @@ from stopgo.mission.mavlink.following.steps import (
 from stopgo.mission.mavlink.following.vehicle_status import CLOCKS
 from stopgo.mission.mavlink.telemetry import Message, has_restarted
 from stopgo.mission.run import states as runs
-from stopgo.mission.run.events import AnyEvent, Arrived, Pose
+from stopgo.mission.run.events import AnyEvent, Arrived, Pose, Scanned
 from stopgo.mission.run.states import Change, Run, changed, events_of
 
 
@@ -148,6 +148,9 @@ class FollowedRun:
         self._run = change.run
         for event in events_of(change, robot=self._robot, boot_id="", now_ns=now_ns):
             self.events.append(changed(event, number=len(self.events) + 1))
+            if isinstance(event, Scanned):
+                captures = self._observer.captures
+                captures.counted = captures.counted | {(event.file, event.sha256)}
 
     def _arrived(self) -> Arrived | None:
         """Return the arrival at the current stop, if the vehicle was seen there."""

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.autopilots.kind import AUTO, Autopilot
 from stopgo.mission.mavlink.captures import Capture, Picture, capture_of
 from stopgo.mission.mavlink.following.capture_reports import CaptureReports, scan_pose
 from stopgo.mission.mavlink.following.list_position import ListPosition
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.progress_watch import ProgressWatch
 from stopgo.mission.mavlink.following.scan_watch import ScanWatch
 from stopgo.mission.mavlink.following.steps import Observation
 from stopgo.mission.mavlink.following.vehicle_poses import VehiclePoses
 from stopgo.mission.mavlink.following.vehicle_status import VehicleStatus
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.run.events import Arrived
+from stopgo.mission.run.events import Arrived, Pose
 from stopgo.mission.run.states import Run
 
 USED_MESSAGES = (
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
-    "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
-    "STATUSTEXT",
+    "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS",
+    "EKF_STATUS_REPORT", "ESTIMATOR_STATUS", "FENCE_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN",
+    "SYSTEM_TIME", "STATUSTEXT",
 )  # fmt: skip
 """Messages that are used."""
 WANTED = ("MISSION_CURRENT", "LOCAL_POSITION_NED", "ATTITUDE")
@@ -33,7 +35,8 @@ class Observer:
         self.status = VehicleStatus(autopilot)
         self.position = ListPosition()
         self.poses = VehiclePoses()
-        self._captures = CaptureReports()
+        self.captures = CaptureReports()
+        self.progress = ProgressWatch()
         self._scan_watch = ScanWatch()
         self._came_ns: dict[str, int] = {}
         """Time of the last message of each name."""
@@ -46,6 +49,7 @@ class Observer:
         fix = self.poses.take(name, message, listed, now_ns)
         if fix is not None:
             self._scan_watch.take_pose(fix.pose, fix.speed)
+            self._note_progress(fix.pose, listed, now_ns)
         if name == "MISSION_CURRENT":
             self._take_current(message, listed, now_ns)
         elif name == "MISSION_ITEM_REACHED":
@@ -53,7 +57,7 @@ class Observer:
         elif name == "CAMERA_IMAGE_CAPTURED":
             capture = capture_of(message, None if listed is None else listed.sent)
             at_stop = self.position.is_at_stop(listed)
-            self._captures.take(capture, self.poses.pose(now_ns), now_ns, at_stop=at_stop)
+            self.captures.take(capture, self.poses.pose(now_ns), now_ns, at_stop=at_stop)
         return name
 
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
@@ -61,6 +65,12 @@ class Observer:
         same = self.position.take_current(message, listed, boot_ms=boot_ms, now_ns=now_ns)
         if listed is not None:
             self._scan_watch.take_item(listed, self.position.place(listed), same=same)
+
+    def _note_progress(self, pose: Pose, listed: ListedMission | None, now_ns: int) -> None:
+        known = listed is not None and self.position.is_known
+        place = self.position.place(listed) if listed is not None and known else None
+        drives = self.status.mode == AUTO and self.status.armed
+        self.progress.take(pose, listed, place, now_ns, drives=drives)
 
     def fresh(self, within_s: float, now_ns: int) -> bool:
         """Return True if the most important messages come often enough."""
@@ -87,7 +97,7 @@ class Observer:
             return None
         newest = self.poses.fix
         fix = newest if newest is not None and newest.ns > self.position.since_ns else None
-        report = self._captures.of_stop(run, listed, arrived, after)
+        report = self.captures.of_stop(run, listed, arrived, after)
         return Observation(
             mode=self.status.mode, armed=self.status.armed, place=self.position.place(listed),
             pose=None if fix is None else fix.pose,
@@ -106,5 +116,5 @@ class Observer:
         self, run: Run, listed: ListedMission, arrived: Arrived | None, after: Picture
     ) -> Capture | None:
         """Return the last report of a scan at the current stop."""
-        report = self._captures.of_stop(run, listed, arrived, after)
+        report = self.captures.of_stop(run, listed, arrived, after)
         return None if report is None else report.capture

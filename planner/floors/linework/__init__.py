@@ -17,7 +17,14 @@ from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.planner.floors.drawn import drawn
 from stopgo.planner.floors.linework.groups import outlines_of
 from stopgo.planner.floors.linework.labels import parted_by_labels
-from stopgo.planner.floors.linework.spaces import Spaces, floor_within, rooms_within, sides_of, tiled_floor
+from stopgo.planner.floors.linework.spaces import (
+    LEAST_ROOM,
+    Spaces,
+    floor_within,
+    rooms_within,
+    sides_of,
+    tiled_floor,
+)
 from stopgo.planner.floors.linework.wall_gaps import WallGap, gaps_of, passages_of, without_doors
 from stopgo.planner.floors.linework.walls import SolidWalls, walls_of
 from stopgo.planner.floors.parts import outline_of
@@ -32,8 +39,30 @@ _TREADS = 0.4
 """Lines of stairs no farther apart than this, in metres, are one flight."""
 _PIECE = 0.02
 """Lines of furniture this close, in metres, are one piece."""
+_STRAY = 0.1
+"""Lines farther than this from the floor, in metres, lie off it."""
+_LABEL_CUT = 0.05
+"""Depth in metres of the lines that part rooms by their names."""
 PATTERN = 150
 """This many small cells among the lines of walls are a pattern of tiles or a hatch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Traits of a building in line work, by which it is told from other lines."""
+
+    double: float = 0.0
+    """Fraction of the walls' lines that run in pairs and bound a solid."""
+    doors: int = 0
+    """Door swings in a gap of the walls, with walls on both sides."""
+    passages: int = 0
+    """Gaps between ends of walls that face each other, from room to room."""
+    rooms: tuple[shapely.Polygon, ...] = ()
+    """In the drawing's frame, metres."""
+    closed_over: float = 0.0
+    """The widest gap of the outer walls that was closed, metres."""
+    stray: float = 0.0
+    """Fraction of the walls' lines that lie off the floor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +74,8 @@ class Derived:
     findings: list[Finding]
     cells: int = 0
     """Small spaces among the lines of walls."""
+    shown: Shown = Shown()
+    """Traits of a building in the line work."""
 
 
 @dataclass(eq=False)
@@ -134,7 +165,37 @@ def derived(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
         *_room_strokes(site, rooms),
         *_things(site),
     ]
-    return Derived(made, [as_room_name(word) for word in words], site.findings, walls.cells)
+    named = [as_room_name(word) for word in words]
+    return Derived(made, named, site.findings, walls.cells, _shown(site, whole, gaps, rooms, spaces))
+
+
+def _shown(
+    site: _Site,
+    walls: SolidWalls,
+    gaps: Sequence[WallGap],
+    rooms: Sequence[shapely.Polygon],
+    spaces: Spaces,
+) -> Shown:
+    """Traits of a building; rooms that a layer shows are those."""
+    thick = sum(solid.length for solid in walls.solids)
+    single = sum(line.length for line in walls.lines)
+    free = spaces.floor.difference(walls.shape) if not spaces.floor.is_empty else spaces.floor
+    found = rooms or [part for part in polygons_of(free) if part.area > LEAST_ROOM]
+    return Shown(
+        double=thick / (thick + single) if thick else 0.0,
+        doors=sum(gap.kind == "door" and gap.held for gap in gaps),
+        passages=sum(gap.kind == "passage" and gap.depth > _LABEL_CUT for gap in gaps),
+        rooms=tuple(shapely.transform(list(found), lambda xy: xy + site.origin)),
+        closed_over=spaces.closed_over or 0.0,
+        stray=_stray(walls, spaces.floor),
+    )
+
+
+def _stray(walls: SolidWalls, floor: Region) -> float:
+    """Fraction of the walls' outlines that lie off a floor."""
+    drawn = shapely.MultiLineString([*(solid.exterior for solid in walls.solids), *walls.lines])
+    away = drawn.difference(floor.buffer(_STRAY)).length if not floor.is_empty else drawn.length
+    return float(away / drawn.length) if drawn.length else 0.0
 
 
 def _origin(strokes: Sequence[Stroke]) -> FloatArray:
@@ -205,7 +266,7 @@ def _rooms(
     kept = _parting(gaps, rooms_within(spaces.floor, _barriers(site, walls, gaps)))
     rooms = rooms_within(spaces.floor, _barriers(site, walls, kept))
     parted, cuts = parted_by_labels(rooms, [at for _, at in site.names()])
-    return [*kept, *(WallGap("passage", cut, 0.05, held=True) for cut in cuts)], parted
+    return [*kept, *(WallGap("passage", cut, _LABEL_CUT, held=True) for cut in cuts)], parted
 
 
 def _entered(rooms: Sequence[shapely.Polygon], gaps: Iterable[WallGap]) -> list[shapely.Polygon]:

@@ -260,7 +260,7 @@ def _areas(shapes: Sequence[Shape], written: Sequence[Shape]) -> Iterator[tuple[
     if not labels:
         return
     rings = [line for line in _closed(shapes) if len(line) > 3]
-    faces = [face for face in shapely.polygons(rings) if face.is_valid and face.area > 0] if rings else []
+    faces = [face for face in map(shapely.Polygon, rings) if face.is_valid and face.area > 0]
     tree = shapely.STRtree(faces)
     for area, at in labels:
         around = tree.query(shapely.Point(at), predicate="within")

@@ -38,6 +38,7 @@ class Lossy:
         self._far = open_transport(Url("udpout", "127.0.0.1", target))
         self._due: list[tuple[float, int, Transport, bytes]] = []
         self._carried = 0
+        self._stalled_until_s = 0.0
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._threads = [
@@ -56,6 +57,10 @@ class Lossy:
             thread.join()
         self._near.close()
         self._far.close()
+
+    def stall(self, seconds: float) -> None:
+        """Hold everything back for so long; then all of it arrives at once."""
+        self._stalled_until_s = time.monotonic() + seconds
 
     def _work(self, source: Transport, sink: Transport) -> None:
         """Take what comes in at one end, and give what is due at either."""
@@ -77,4 +82,5 @@ class Lossy:
             for _ in range(2 if chance() < rough.doubled else 1):
                 late = rough.delay_s * (2 if chance() < rough.overtaken else 1)
                 self._carried += 1
-                heapq.heappush(self._due, (time.monotonic() + late, self._carried, sink, data))
+                at_s = max(time.monotonic() + late, self._stalled_until_s)
+                heapq.heappush(self._due, (at_s, self._carried, sink, data))

@@ -131,9 +131,26 @@ def test_from_here_begins_at_the_nearest_leg_and_leaves_out_what_is_behind() -> 
     assert field.controller.run.done == ("s2", "s3")
 
 
+def test_a_start_within_the_robots_radius_of_the_start_is_accepted() -> None:
+    field = loaded()
+    field.base.stand_at(field.base.pose().__class__(x=0.08, y=0.0, heading=0.0))
+    assert field.order("start").outcome == "ok"
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
+
+
+@pytest.mark.parametrize("x", [1.96, 2.0, 2.008, 2.04])
+def test_from_here_at_a_stop_leaves_that_stop_not_out(x: float) -> None:
+    field = loaded()
+    field.base.stand_at(field.base.pose().__class__(x=x, y=0.0, heading=0.0))
+    field.order("start", from_here=True)
+    field.work()
+    assert field.controller.run.skipped == () and field.controller.run.done == ("s1", "s2", "s3")
+
+
 def test_from_here_off_the_route_is_refused() -> None:
     field = loaded()
-    field.base.stand_at(field.base.pose().__class__(x=3.0, y=0.2, heading=0.0))
+    field.base.stand_at(field.base.pose().__class__(x=3.0, y=0.5, heading=0.0))
     assert field.order("start", from_here=True).reason == "off_route"
 
 

@@ -90,7 +90,7 @@ def test_if_one_of_them_finds_no_room_none_changes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        ["floors", "office.dxf", "--svg", "office.dxf"],
+        ["floors", "office.dxf", "--picture", "office.dxf"],
         ["floors", "office.dxf", "--write-map", "./office.dxf"],
         ["convert", "office.dxf", "-o", "office.dxf"],
         ["review", "office.dxf", "--html", "office.dxf"],

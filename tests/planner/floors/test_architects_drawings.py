@@ -386,13 +386,10 @@ def test_walls_that_enclose_nothing_are_refused(tmp_path: Path) -> None:
         read(drawing, tmp_path)
 
 
-def test_a_drawing_in_which_nothing_tells_walls_is_refused(tmp_path: Path) -> None:
+def test_a_drawing_all_on_layer_0_is_read_by_its_geometry(tmp_path: Path) -> None:
     drawing = new_drawing()
     flat(drawing.modelspace(), walls="0", doors="0")
-    with pytest.raises(
-        InputError, match="walls cannot be distinguished from other lines; ask for an export with layers"
-    ):
-        read(drawing, tmp_path)
+    is_the_flat(read(drawing, tmp_path))
     is_the_flat(read(drawing, tmp_path, layers={"0": "walls"}))
 
 

@@ -155,7 +155,8 @@ def test_the_layers_that_are_present_are_named(tmp_path: Path) -> None:
     drawing.saveas(path)
     message = refusal(path)
     assert "no closed outline on layer FLOOR, and no layer that shows walls" in message
-    assert "layers present: PLAN-1, PLAN-2 (say which one holds the walls, such as --layer PLAN-1=" in message
+    assert "layers present: PLAN-1, PLAN-2; the lines on PLAN-2 enclose 24.96 m²" in message
+    assert message.endswith("--layer PLAN-2=walls accepts them")
 
 
 def test_a_floor_of_open_lines_says_so(tmp_path: Path) -> None:

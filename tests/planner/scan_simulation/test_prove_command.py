@@ -95,6 +95,15 @@ def test_a_missing_library_is_told_with_its_extra(
     )
 
 
+def test_only_scans_without_poses_need_the_matcher(planned: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has no wheels for Windows, 64-bit ARM Linux and the newest Python."""
+    monkeypatch.setitem(sys.modules, "kiss_matcher", None)
+    assert prove(planned).returncode in (0, 1)
+    refused = prove(planned, "--without-poses")
+    assert (refused.returncode, refused.stdout, refused.stderr.count("\n")) == (2, "", 1)
+    assert refused.stderr.startswith("stopgo: --without-poses: kiss-matcher is not installed; ")
+
+
 @pytest.mark.parametrize(
     ("option", "value"),
     [("--angular-step", "0.0001"), ("--scanner-height", "3"), ("--coverage-file", "none.json")],

@@ -81,6 +81,16 @@ def test_a_scanner_that_is_a_component_of_its_own_is_believed(tmp_path: Path) ->
     assert told(site.events) == ALL
 
 
+@pytest.mark.parametrize("camera", [[], ["camera@1"]])
+def test_a_report_of_a_scan_that_is_lost_is_requested_of_the_component_that_has_it(
+    tmp_path: Path, camera: list[str]
+) -> None:
+    site = Site(tmp_path, "ardupilot", faults=[*camera, "lostpicture@2"])
+    with site.up(), watched(site):
+        site.order("start")
+    assert told(site.events) == ALL
+
+
 def test_a_stop_that_may_be_left_out_does_not_hold_the_run(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot", faults=["beside@7=0.6"], mission=real_tour(on_failure="skip"))
     with site.up(), watched(site):

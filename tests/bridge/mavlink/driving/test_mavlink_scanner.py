@@ -62,7 +62,7 @@ class Camera:
             return None
         return dialect.MAVLink_camera_capture_status_message(0, 0, 0, 0.0, 0, 0.0, self._taken)
 
-    def command(self, number: int, *params: float, patience_s: float) -> Ack:
+    def command(self, number: int, *params: float, patience_s: float, unheard: int = 2) -> Ack:
         self.orders.append((number, params))
         result = self._acks.pop(0) if self._acks else 0
         if result < 0:
@@ -146,7 +146,7 @@ def test_another_vehicles_picture_is_not_ours() -> None:
 
 def test_a_result_that_was_lost_is_asked_for() -> None:
     camera = Camera(taken=4)
-    camera.answers = lambda request: captured(4) if (request.param1, request.param2) == (263, 4) else None
+    camera.answers = lambda request: captured(4) if camera.orders and request.param2 == 4 else None
     slow = Scan(profile="default", duration_s=2.0, timeout_s=30.0)
     scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
     assert scanner.scan("run-s2-1", slow, interrupt=Event()) == GOOD
@@ -240,18 +240,42 @@ def test_a_scanner_of_its_own_component_is_asked_itself_and_not_measured_by_the_
     slow = Scan(profile="default", duration_s=2.0, timeout_s=60.0)
     assert scanner.scan("run-s1-1", slow, interrupt=Event()) == GOOD
     camera._taken = 14  # the autopilot counted a command that was repeated ten times
-    camera.answers = lambda request: captured(1, component=100, boot_ms=9000)
+    camera.asked.clear()
+    camera.answers = lambda request: captured(len(camera.orders) - 1, component=100)
     assert scanner.scan("run-s2-1", slow, interrupt=Event()) == GOOD
     assert {request.target_component for request in camera.asked} == {100}
 
 
 def test_while_no_component_has_reported_a_scan_each_is_asked() -> None:
     camera = Camera(taken=4)
-    camera.answers = lambda request: captured(0, component=100)
+    camera.answers = lambda request: captured(0, component=100) if camera.orders else None
     slow = Scan(profile="default", duration_s=2.0, timeout_s=60.0)
     scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
     assert scanner.scan("run-s1-1", slow, interrupt=Event()) == GOOD
-    assert {request.target_component for request in camera.asked} == {0}
+    assert {request.target_component for request in camera.asked} == {0, 1}
+    assert all(request.param2 == 4 for request in camera.asked if request.target_component == 1)
+
+
+@pytest.mark.parametrize("taken", [None, 4])
+def test_a_picture_from_before_a_restart_of_the_gateway_counts_for_no_stop(taken: int | None) -> None:
+    """It is the camera's last one, so the camera reports it whenever it is asked."""
+    camera = Camera(taken=taken)
+    camera.answers = lambda request: captured(3, component=100)
+    slow = Scan(profile="default", duration_s=2.0, timeout_s=30.0)
+    scanner = MavlinkScanner(camera, clock=WallClock(speed_up=100))  # type: ignore[arg-type]
+    assert scanner.scan("run-s2-1", slow, interrupt=Event()) == ScanFailed(reason="no result within 30 s")
+    camera.orders.clear()
+    camera.answers = lambda request: captured(3 + len(camera.orders), component=100)
+    assert scanner.scan("run-s2-2", slow, interrupt=Event()) == GOOD
+
+
+def test_a_picture_that_came_late_while_nobody_listened_counts_for_no_later_stop() -> None:
+    camera = Camera(taken=None)
+    slow = Scan(profile="default", duration_s=2.0, timeout_s=30.0)
+    scanner = MavlinkScanner(camera, clock=WallClock(speed_up=100))  # type: ignore[arg-type]
+    assert isinstance(scanner.scan("run-s1-1", slow, interrupt=Event()), ScanFailed)
+    camera.answers = lambda request: captured(0, component=100)  # the first scan's, after its time
+    assert isinstance(scanner.scan("run-s2-1", slow, interrupt=Event()), ScanFailed)
 
 
 def test_another_scanner_of_the_vehicle_is_not_the_one_that_counts() -> None:

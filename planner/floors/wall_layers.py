@@ -1,0 +1,254 @@
+"""Choice of the layers that hold a drawing's walls where no name tells: each is tried, its floor judged.
+
+A trial reads the drawing as if the user had given the layers. What its floor shows counts as evidence: doors
+in gaps of the walls, walls of two lines, rooms with a name in them, written areas that are true of their
+rooms. Layers with enough evidence are used, and a finding names them and the evidence. Else the message
+names the most probable layers, and the option that accepts them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import shapely
+from ezdxf.document import Drawing
+
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import polyline_length
+from stopgo.mission.settings.layer_kinds import layer_option
+from stopgo.planner.floors.drawn_shapes import Shape
+from stopgo.planner.floors.dxf_sheet import DxfSheet, layers_of, sheet_of
+from stopgo.planner.floors.linework import Derived
+from stopgo.planner.floors.reader import FloorOptions
+from stopgo.planner.floors.strokes import Word, sketch
+from stopgo.planner.floors.units.unit_evidence import area_in
+
+ENOUGH = 2
+"""Evidence of this weight tells walls; one kind of it alone does not."""
+_MANY = 3
+"""So many doors in gaps of walls are evidence of double weight."""
+_DOUBLE = 0.6
+"""Walls are drawn as two lines if this fraction of the lines bounds a solid."""
+_LEAST_SHARE = 0.08
+"""A layer with less than this fraction of the unknown lines holds no walls."""
+_MOST_LAYERS = 4
+_ALIKE = 0.05
+"""A written area is true of a room if it differs by less than this fraction …"""
+_ROUNDED = 0.3
+"""… or by less than this many m²."""
+_LIKE_FLOOR = 0.9
+"""Floors are the same if the smaller one has this fraction of the larger one."""
+_FLOOR_M2 = (5.0, 50_000.0)
+_WIDEST_GAP = 1.6
+"""Outer walls with a wider gap, in metres, may be those of several drawings."""
+_MOST_STRAY = 0.3
+"""Walls of which more than this fraction lies off the floor are other lines too."""
+UNTOLD = ("other", "rooms")
+"""Roles whose lines may be walls in a drawing without a layer of walls …"""
+NOT_ENCLOSING = (*UNTOLD, "walls", "doors", "openings", "windows", "columns")
+"""… and in one whose layers of walls enclose no floor."""
+_NAME = re.compile(r"[^\W\d_]{3,}|\bWC\b", re.IGNORECASE)
+_NO_PLAN = re.compile(
+    r"\b(ELEVATION|SECTION|ANSICHT|SCHNITT|COUPE|FA[CÇ]ADE|ALZADO|PROSPETTO|SEZIONE|GEVEL|DOORSNEDE|ELEVACI[OÓ]N|"
+    r"SITE PLAN|LAGEPLAN)\b",
+    re.IGNORECASE,
+)
+"""Titles of drawings that show no storey from above."""
+
+Deriving = Callable[[DxfSheet], Derived]
+"""Derives a floor from a sheet; raises InputError if there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class WallLayers:
+    """Layers of walls that a drawing was tried with, and the evidence for them."""
+
+    layers: tuple[str, ...] = ()
+    weight: int = 0
+    evidence: tuple[str, ...] = ()
+    count: int = 0
+    """Doors, passages, names and areas that are evidence."""
+    area: float = 0.0
+    refusal: str = ""
+    """Reason why these layers give no floor."""
+
+    @property
+    def is_told(self) -> bool:
+        return self.weight >= ENOUGH
+
+    @property
+    def option(self) -> str:
+        """The options that choose these layers, quoted for a shell."""
+        return " ".join(layer_option(name, "walls") for name in self.layers)
+
+    @property
+    def given(self) -> Mapping[str, str]:
+        return MappingProxyType({name.upper(): "walls" for name in self.layers})
+
+    @property
+    def finding(self) -> Finding:
+        names = ", ".join(self.layers)
+        why = "; ".join(self.evidence)
+        return Finding(
+            "walls_by_geometry",
+            f"no layer's name tells the walls: they are read from {names}, where {why} "
+            f"({self.option} confirms it)",
+        )
+
+
+def has_wall_layers(drawing: Drawing, options: FloorOptions, *, source: Path) -> bool:
+    """Return True if a layer shows the floor or its walls, by name or as given."""
+    seen = layers_of(drawing, options, source=source)
+    return seen.outlined or any(shape.role == "walls" for shape in seen.shapes)
+
+
+def wall_layers(
+    drawing: Drawing,
+    options: FloorOptions,
+    derive: Deriving,
+    *,
+    source: Path,
+    roles: tuple[str, ...] = UNTOLD,
+) -> WallLayers | None:
+    """Return the layers of these roles that most probably hold the walls; None if none has lines."""
+    seen = layers_of(drawing, options, source=source)
+    candidates = _candidates([shape for shape in seen.shapes if shape.role in roles])
+    return _best([_trial(drawing, options, names, derive, source) for names in candidates])
+
+
+def with_layers(options: FloorOptions, found: WallLayers) -> FloorOptions:
+    """Return the options as if the user had given the layers."""
+    return replace(options, layers={**options.layers, **found.given})
+
+
+def labelled(sheet: DxfSheet) -> DxfSheet:
+    """Return the sheet whose unknown texts name rooms, if they can be names or areas."""
+    words = [
+        replace(word, role="names") if word.role in ("other", "walls", "rooms") and _is_label(word) else word
+        for word in sheet.words
+    ]
+    return replace(sheet, words=words)
+
+
+def _is_label(word: Word) -> bool:
+    return bool(_NAME.search(word.text)) or area_in(word.text) is not None
+
+
+def _candidates(shapes: Sequence[Shape]) -> list[tuple[str, ...]]:
+    """Layers to try: those with most lines, each alone and all of them together."""
+    lengths: dict[str, float] = {}
+    for layer, length in _lengths(shapes):
+        lengths[layer] = lengths.get(layer, 0.0) + length
+    whole = sum(lengths.values())
+    names = sorted(lengths, key=lambda name: (-lengths[name], name))[:_MOST_LAYERS]
+    names = [name for name in names if lengths[name] >= _LEAST_SHARE * whole]
+    together = [tuple(sorted(names))] if len(names) > 1 else []
+    return [*((name,) for name in names), *together]
+
+
+def _lengths(shapes: Sequence[Shape]) -> Iterator[tuple[str, float]]:
+    for shape in shapes:
+        if not (shape.is_text or shape.is_note):
+            for points in sketch([shape]):
+                length = polyline_length(points) if len(points) > 1 else 0.0
+                if np.isfinite(length):
+                    yield shape.layer, length
+
+
+def _trial(
+    drawing: Drawing, options: FloorOptions, names: tuple[str, ...], derive: Deriving, source: Path
+) -> WallLayers:
+    found = WallLayers(names)
+    try:
+        sheet = labelled(sheet_of(drawing, with_layers(options, found), source=source))
+        made = derive(sheet)
+    except InputError as error:
+        return replace(found, refusal=str(error).partition(": ")[2])
+    area = sum(room.area for room in made.shown.rooms)
+    if not _FLOOR_M2[0] <= area <= _FLOOR_M2[1]:
+        return replace(found, refusal=f"the walls on {', '.join(names)} enclose {area:.3g} m²", area=area)
+    return replace(_weighed(found, made, sheet.words), area=area)
+
+
+def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLayers:
+    """The layers with the evidence that their lines are walls."""
+    shown, told = made.shown, []
+    true, false, named = _labels(shown.rooms, words)
+    if true and true >= false:
+        told.append((2, f"{_number(true, 'written area')} {'are' if true > 1 else 'is'} true of the rooms"))
+    if shown.doors:
+        told.append((2 if shown.doors >= _MANY else 1, f"{_number(shown.doors, 'door swing')} in gaps"))
+    if shown.double >= _DOUBLE:
+        told.append((1, f"{shown.double:.0%} of the lines are walls of two lines"))
+    if named > 1:
+        told.append((1, f"{named} rooms have a name in them"))
+    if shown.passages > 1 and shown.double >= _DOUBLE:
+        told.append((1, f"{shown.passages} passages lie between facing ends of walls"))
+    weight = sum(item for item, _ in told)
+    is_doubted = false > true or _is_no_storey(made, words)
+    return replace(
+        found,
+        weight=min(weight, ENOUGH - 1) if is_doubted else weight,
+        evidence=tuple(text for _, text in told),
+        count=true + named + shown.doors + shown.passages,
+    )
+
+
+def _is_no_storey(made: Derived, words: Sequence[Word]) -> bool:
+    """Return True if a title names a view that is no storey, or other lines lie among the walls."""
+    shown = made.shown
+    if shown.closed_over > _WIDEST_GAP or shown.stray > _MOST_STRAY:
+        return True
+    return any(_NO_PLAN.search(word.text) for word in words)
+
+
+def _number(count: int, thing: str) -> str:
+    return f"{count} {thing}{'s' if count > 1 else ''}"
+
+
+def _labels(rooms: Sequence[shapely.Polygon], words: Sequence[Word]) -> tuple[int, int, int]:
+    """Numbers of written areas that are true and false of their rooms, and of rooms with a name."""
+    tree = shapely.STRtree(list(rooms))
+    areas: dict[int, list[float]] = {}
+    named: set[int] = set()
+    for word in words:
+        if word.role == "names" and word.at:
+            inside = tree.query(shapely.Point(word.at[0]), predicate="within").tolist()
+            area = area_in(word.text)
+            for room in inside[:1]:
+                if area is not None:
+                    areas.setdefault(room, []).append(area)
+                if _NAME.search(word.text):
+                    named.add(room)
+    true = sum(any(_is_true(area, rooms[room].area) for area in said) for room, said in areas.items())
+    return true, len(areas) - true, len(named)
+
+
+def _is_true(said: float, area: float) -> bool:
+    return abs(said - area) <= max(_ALIKE * area, _ROUNDED)
+
+
+def _best(trials: Sequence[WallLayers]) -> WallLayers | None:
+    """Return the trial with most evidence and fewest layers; untold if others show another floor as well."""
+    if not trials:
+        return None
+    first, *others = sorted(trials, key=_rank)
+    rivals = [item for item in others if _rank(item)[:2] == _rank(first)[:2] and item.is_told]
+    apart = [item for item in rivals if not set(first.layers) < set(item.layers)]
+    if all(min(item.area, first.area) >= _LIKE_FLOOR * max(item.area, first.area) for item in apart):
+        return first
+    return replace(first, weight=ENOUGH - 1)
+
+
+def _rank(trial: WallLayers) -> tuple[int, int, bool, int, float, tuple[str, ...]]:
+    """Sort key: the most probable walls first."""
+    return (
+        *(-trial.weight, -trial.count, bool(trial.refusal)),
+        *(len(trial.layers), -trial.area, trial.layers),
+    )
