@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.stages.network import FLOOR_M, NOISE_M
 from stopgo.planner.overlap.boundary import ShownBoundary
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -27,10 +28,6 @@ EDGE_M = 0.14
 thinned to one per 7.5 cm: nearer to an edge they are of two surfaces."""
 LEAST_STRETCH_M = 2 * EDGE_M
 """Least width of a common stretch. Narrower ones, such as door jambs, have no direction of their own."""
-NOISE_M = 0.33e-3
-"""Error of the mean of one metre of wall, metres (standard deviation, times the root of the metres)."""
-FLOOR_M = 0.4e-3
-"""Error that no length of wall averages out: that of the thinned cloud."""
 DIGITS = 6
 """Decimals of a pair's figures, so that both stops of a pair have equal figures."""
 
