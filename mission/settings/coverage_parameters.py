@@ -71,7 +71,8 @@ class CoverageParameters:
         bool | None,
         _plan(
             "Choose stops whose scans register with one another, all in one network",
-            undecided="yes; no with --coverage-rule paper",
+            undecided="yes with --overlap, else no",
+            quiet=True,
         ),
     ] = None
     overlap: Annotated[
@@ -110,7 +111,7 @@ class CoverageParameters:
     @property
     def registers(self) -> bool:
         """True if stops are chosen so that their scans register."""
-        return self.coverage_rule != "paper" if self.register is None else self.register
+        return self.least_overlap > 0 if self.register is None else self.register
 
     @property
     def least_overlap(self) -> float:

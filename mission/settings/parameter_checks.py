@@ -60,8 +60,7 @@ def _check_coverage(settings: Settings) -> None:
 def _check_registration(settings: Settings) -> None:
     """Refuse an overlap ratio of scans that need not register."""
     if settings.least_overlap > 0 and not settings.registers:
-        other = "--no-register" if settings.register is False else "--coverage-rule paper"
-        _refuse(settings, "overlap", f"has no effect with {other}; leave one of them out")
+        _refuse(settings, "overlap", "has no effect with --no-register; leave one of them out")
 
 
 def _check_scanner(settings: Settings) -> None:

@@ -21,7 +21,7 @@ from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.settings.scanners import SCANNERS, ScannerName
 
 OTHER: dict[str, Any] = {
-    "register": False,
+    "register": True,
     "overlap": 0.25,
     "overlap_range": 15.0,
     "room_coverage": 0.5,
