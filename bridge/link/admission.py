@@ -182,8 +182,8 @@ class Admission:
     def _turn(self) -> None:
         """Wait for events, and handle them; check times and certificates now and then.
 
-        Admitted connections come first. Handshakes take most of a millisecond of processor time each, so there
-        are few in a turn: at known addresses first, and of those the newest, for an old one may be nobody's.
+        Admitted connections come first. A handshake takes much of a millisecond of processor time, so a turn
+        has few: at known addresses first, then the newest, for an old one may be nobody's.
         """
         due = self._selector.select(0.0 if self._unfinished else LOOK_S / 2)
         ready = {key.data for key, _ in due if key.data is not None} | self._unfinished
