@@ -82,7 +82,7 @@ def test_written_areas_that_are_true_show_rooms_of_single_lines(tmp_path: Path) 
 
 def test_written_areas_that_are_false_tell_against_walls(tmp_path: Path) -> None:
     areas = [lambda model: text(model, "12 m²", 1, 1), lambda model: text(model, "11 m2", 6, 1)]
-    with pytest.raises(InputError, match="not enough to tell that they are walls"):
+    with pytest.raises(InputError, match="not enough to show that they are walls"):
         read([double_walls, names, *areas], tmp_path)
 
 
