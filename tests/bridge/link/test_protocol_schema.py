@@ -13,12 +13,12 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from stopgo.bridge.link.protocol import Malformed, Reply, Tagged, decode, encode
-from stopgo.bridge.link.protocol_schema import protocol_schema
 from stopgo.bridge.link.seals import Seal
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
 from stopgo.mission.run.run_commands import Answer, RunCommand
 from tests.bridge.guarded import GuardedField, keys_of_site
+from tests.bridge.link.protocol_schema import protocol_schema
 from tests.bridge.world import corridor
 
 SHIPPED = files("stopgo.bridge.link").joinpath("protocol.schema.json").read_bytes()
@@ -39,7 +39,7 @@ def valid(name: str, message: object) -> bool:
 
 def test_the_shipped_schema_is_the_generated_one() -> None:
     assert protocol_schema() == SHIPPED, (
-        "python -m stopgo.bridge.link.protocol_schema > bridge/link/protocol.schema.json"
+        "python -m tests.bridge.link.protocol_schema > bridge/link/protocol.schema.json"
     )
 
 

@@ -94,7 +94,7 @@ def test_rooms_drawn_as_closed_lines_on_their_layer_are_walled(tmp_path: Path) -
 
 @pytest.mark.parametrize("title", ["FRONT ELEVATION", "Section A-A", "Ansicht Nord", "Site plan 1:500"])
 def test_a_title_of_another_view_tells_against_walls(title: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="not enough to tell"):
+    with pytest.raises(InputError, match="not enough to show"):
         read([double_walls, swing, names, lambda model: text(model, title, 2, -1)], tmp_path)
 
 

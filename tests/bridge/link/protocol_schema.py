@@ -1,7 +1,7 @@
 """JSON Schema of all messages on the link, generated from the code and shipped as protocol.schema.json.
 
 Regenerate the shipped file with
-`python -m stopgo.bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
+`python -m tests.bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
 """
 
 from __future__ import annotations
