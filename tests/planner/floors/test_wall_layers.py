@@ -109,7 +109,7 @@ def test_lines_that_lie_about_tell_against_walls(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("draw", [[cells], [lambda model: rectangle(model, "0", 0, 0, 20, 30)]])
 def test_one_kind_of_evidence_is_not_enough_and_one_option_accepts(draw: list, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="enough to tell") as refused:
+    with pytest.raises(InputError, match="enough to show") as refused:
         read(draw, tmp_path)
     option = re.search(r"; (--layer .*) accepts them", str(refused.value))
     assert option is not None
