@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 STATUS_KEYS = (
     "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "outside",
-    "battery",
+    "battery", "battery_ok", "position_ok", "fence_ok",
 )  # fmt: skip
 
 
@@ -280,14 +280,16 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
     """Print the robot's answer to a command."""
     with reporting_done(f"{robot}: {answer.verb} was carried out"):
         if json_:
-            print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
-                        "run_id": answer.run_id, "state": answer.state})  # fmt: skip
+            told = {key: getattr(answer, key) for key in ("verb", "outcome", "run_id", "state", "message")}
+            print_json({"robot": robot} | told)
         else:
-            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+            noted = f"; {answer.message}" if answer.message else ""
+            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}{noted}")
 
 
 def state_line(report: StateReport) -> str:
     """Return the state as one line of text."""
+    from stopgo.mission.run.health_text import health_text
     from stopgo.mission.run.tolerance import stops_outside_text
 
     mission = (
@@ -302,5 +304,5 @@ def state_line(report: StateReport) -> str:
         mission += f" (revision {report.next_revision} from the next stop on)"
     return (
         f"{report.robot}: {report.state}{stop}; {mission}; {report.done_count} done{outside}{skipped};"
-        f" battery {report.battery:.0%}"
+        f" {health_text(report)}"
     )

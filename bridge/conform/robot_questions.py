@@ -88,7 +88,8 @@ def states_are_bounded(bench: RobotBench) -> None:
     must(size <= STATE_BYTES, f"a state has {size} bytes")
     must(listed <= STOPS_LISTED, f"a state lists {listed} stops; at most {STOPS_LISTED} are")
     must(state.done_count >= len(state.done), "done_count is less than what `done` lists")
-    must(0 <= state.battery <= 1, f"battery is {state.battery}; 0 to 1 is meant")
+    charge = state.battery
+    must(charge is None or 0 <= charge <= 1, f"battery is {charge}; 0 to 1, or null, is meant")
 
 
 def log_has_no_gaps(bench: RobotBench) -> None:

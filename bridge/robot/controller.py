@@ -45,7 +45,7 @@ from collections.abc import Callable
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.protocol import Commit, Rejected
-from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.base import Base, BaseHealth, Scanner
 from stopgo.bridge.robot.command_execution import CommandExecutor
 from stopgo.bridge.robot.current_mission import CurrentMission
 from stopgo.bridge.robot.journal import Journal
@@ -105,7 +105,9 @@ class Controller:
             store, control=control, base=base, clock=clock, command_clock=command_clock
         )
         self._missions = MissionAcceptance(store, base=base, command_clock=command_clock, revisions=revisions)
-        control.stop_base()
+        fault = control.try_to_stop()
+        if fault is not None and not base.not_ready():
+            raise fault
         store.restore(scanner, command_ns=command_clock.now_ns())
 
     @property
@@ -224,5 +226,8 @@ class Controller:
         self._driver.standstill.take(pose, speed)
         return Position(pose, speed, ns)
 
-    def battery(self) -> float:
+    def battery(self) -> float | None:
         return self._base.battery()
+
+    def health(self) -> BaseHealth:
+        return self._base.health()

@@ -44,7 +44,7 @@ class Situation:
     """On the clock that commands are dated by."""
     new_run_id: str
     lease: Lease | None
-    battery: float
+    battery: float | None
     endurance_s: float | None
     not_ready: str = ""
     """Reason why the robot's base cannot drive at present."""

@@ -48,7 +48,7 @@ def _event_and_state(replay: Replay, event: AnyEvent) -> Iterator[StateReport | 
         state="FINISHED" if kind == "Finished" else "ABORTED" if kind == "Aborted" else "RUNNING",
         run_id=event.run_id, mission_id=event.mission_id, revision=event.revision,
         stop=getattr(event, "stop", None), stop_state="SCANNING" if kind == "Arrived" else "NAVIGATING",
-        done=(), skipped=(), battery=battery[-1] if battery else 1.0, last_event=event.number,
+        done=(), skipped=(), battery=battery[-1] if battery else None, last_event=event.number,
     )  # fmt: skip
 
 

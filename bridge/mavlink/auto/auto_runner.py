@@ -18,6 +18,7 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.auto.vehicle_commands import Consent, VehicleCommands
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
+from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.runner import Position
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import RobotUnreachable
@@ -96,8 +97,12 @@ class AutoRunner:
         self._reported_ns = fix.ns
         return Position(fix.pose, fix.speed, fix.ns)
 
-    def battery(self) -> float:
-        return self._observer.status.battery
+    def battery(self) -> float | None:
+        return self._observer.status.health.charge
+
+    def health(self) -> BaseHealth:
+        now = self._observer.status.health
+        return BaseHealth(battery_ok=now.battery, position_ok=now.position, fence_ok=now.fence)
 
     def execute(self, order: RunCommand) -> Answer:
         """Carry out a command; raises `OutcomeUnknown` if the vehicle does not show its effect."""

@@ -34,6 +34,10 @@ REPEATED_HZ = {
     MessageId.GLOBAL_POSITION_INT: 2.0,
     MessageId.ATTITUDE: 10.0,
     MessageId.SYS_STATUS: 1.0,
+    MessageId.BATTERY_STATUS: 0.5,
+    MessageId.EKF_STATUS_REPORT: 1.0,
+    MessageId.ESTIMATOR_STATUS: 1.0,
+    MessageId.FENCE_STATUS: 1.0,
     MessageId.GPS_GLOBAL_ORIGIN: 0.5,
 }
 """Wanted rate of each message, in Hz; so a lost one is followed by another."""

@@ -197,7 +197,7 @@ class VehicleCommands:
         situation = situation_of(
             self._book.journal, listed.mission, run=run, pose=here or NOWHERE,
             now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
-            battery=self._observer.status.battery, endurance_s=None, boot_id=self._book.boot_id,
+            battery=self._observer.status.health.charge, endurance_s=None, boot_id=self._book.boot_id,
         )  # fmt: skip
         return decide(order, situation)
 
@@ -284,6 +284,9 @@ class VehicleCommands:
         unplaced = self._peer.unplaced()
         if unplaced:
             raise Denied(Refused("no_position", unplaced))
+        lasting = self._observer.status.health.lasting(self._book.run.reason)
+        if lasting:
+            raise Denied(Refused("not_ready", lasting))
         self._check_mission(listed)
         armed = self._observer.status.armed
         if not armed and not self._consent.arm:

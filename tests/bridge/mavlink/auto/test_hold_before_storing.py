@@ -16,6 +16,7 @@ from stopgo.bridge.mavlink.auto.vehicle_commands import Consent, VehicleCommands
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.following.vehicle_health import VehicleHealth
 from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.run_commands import FREE_VERBS, RunCommand, Verb
@@ -67,7 +68,7 @@ class SlowDisk:
 class Still:
     """An observer of a vehicle without a pose: also its status, position and poses."""
 
-    items, battery = None, 1.0
+    items, health = None, VehicleHealth()
 
     def __init__(self) -> None:
         self.status = self.position = self.poses = self
