@@ -229,7 +229,7 @@ def replay(
     ------
     InputError
         When it cannot be read, has no transform to the mission frame, or is of another mission.
-    NegativeResult
+    Undecided
         When its standstills fit the stops by no placing, or by several.
     """
     from stopgo.mission.frames.transform import Transform

@@ -327,6 +327,9 @@ def test_a_base_that_fails_is_stopped_and_drives_no_more() -> None:
     assert guarded.goto([(0, 0)], heading=None, limits=limits, interrupt=Event()) == "blocked"
     guarded.stop()
     assert stops == ["stop", "stop"]
+    base.stop = fail
+    with pytest.raises(InputError, match="my:robot: ValueError: motor 2 is hot"):
+        guarded.stop()
 
 
 @pytest.mark.parametrize("name", ["scan_outcome", "what_became"])

@@ -280,10 +280,11 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
     """Print the robot's answer to a command."""
     with reporting_done(f"{robot}: {answer.verb} was carried out"):
         if json_:
-            print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
-                        "run_id": answer.run_id, "state": answer.state})  # fmt: skip
+            told = {key: getattr(answer, key) for key in ("verb", "outcome", "run_id", "state", "message")}
+            print_json({"robot": robot} | told)
         else:
-            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+            noted = f"; {answer.message}" if answer.message else ""
+            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}{noted}")
 
 
 def state_line(report: StateReport) -> str:

@@ -202,10 +202,12 @@ class Agent:
 
     def fail(self, error: Exception) -> None:
         """Stand still because of an error that ended a thread; `wait` raises it."""
-        self._runner.stand_still(error)
-        self._error = error
-        self._failed.set()
-        self._on_failure(error)
+        try:
+            self._runner.stand_still(error)
+        finally:
+            self._error = error
+            self._failed.set()
+            self._on_failure(error)
 
     def close(self) -> None:
         self._runner.close()

@@ -6,6 +6,8 @@ import hashlib
 import uuid
 from typing import Any
 
+import msgspec
+
 from stopgo.bridge.link.protocol import encode
 from stopgo.bridge.robot.journal import ANSWERS_KEPT, Journal
 from stopgo.mission.document import Mission
@@ -34,6 +36,15 @@ def answer_to(order: RunCommand, refused: Refused | None, run: Run, note: str = 
         reason=refused.reason if refused else None, message=refused.message if refused else note,
         run_id=run.run_id, state=run.state,
     )  # fmt: skip
+
+
+def not_stopped(answer: Answer, fault: Exception) -> Answer:
+    """Return the answer to a stop that the base did not take; the run is paused or aborted all the same."""
+    message = (
+        f"the base did not take the command to stand ({fault or type(fault).__name__}): use the emergency"
+        f" stop; the run is {answer.state}, and the robot's program ends"
+    )
+    return msgspec.structs.replace(answer, outcome="refused", reason="not_stopped", message=message)
 
 
 def remember_answer(journal: Journal, order: RunCommand, answer: Answer, *, keep: int = ANSWERS_KEPT) -> None:

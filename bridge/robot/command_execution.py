@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import msgspec
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
+from stopgo.bridge.robot.answers import answer_to, answered, not_stopped, remember_answer, situation_of
 from stopgo.bridge.robot.base import Base
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.run_store import RunStore
@@ -70,8 +70,10 @@ class CommandExecutor:
         if known is not None and known[0] == order:
             return known[1]
         store = self._store
-        with self._control.standing(), store.lock:
-            answer = self._before(order) or self._carry_out_stop(order, decide(order, self._stop_situation()))
+        with self._control.standing() as fault, store.lock:
+            answer = self._before(order) or self._carry_out_stop(
+                order, decide(order, self._stop_situation()), fault
+            )
         self._stops.setdefault(order.cmd_id, (order, answer))
         if len(self._stops) > STOPS_KEPT:
             self._stops.popitem(last=False)
@@ -90,9 +92,13 @@ class CommandExecutor:
         store = self._store
         return self._situation(store.run, store.current.mission, None)
 
-    def _carry_out_stop(self, order: RunCommand, decision: Decision | Refused) -> Answer:
+    def _carry_out_stop(
+        self, order: RunCommand, decision: Decision | Refused, fault: Exception | None
+    ) -> Answer:
         """Carry out a stop whatever the disk says; what cannot be stored is stored later."""
         answer = self._answer(order, decision)
+        if fault is not None:
+            answer = not_stopped(answer, fault)
         try:
             run = self._store_decision(order, decision, answer)
         except sqlite3.DatabaseError as error:

@@ -105,7 +105,9 @@ class Controller:
             store, control=control, base=base, clock=clock, command_clock=command_clock
         )
         self._missions = MissionAcceptance(store, base=base, command_clock=command_clock, revisions=revisions)
-        control.stop_base()
+        fault = control.try_to_stop()
+        if fault is not None and not base.not_ready():
+            raise fault
         store.restore(scanner, command_ns=command_clock.now_ns())
 
     @property

@@ -132,8 +132,14 @@ class GuardedBase:
         return outcome
 
     def stop(self) -> None:
-        """Stop the base, also after it has failed."""
-        self._tried(self._base.stop, None, lambda _: True)
+        """Stop the base, also after it has failed; raises `InputError` if it does not take the command."""
+
+        def is_taken() -> bool:
+            self._base.stop()
+            return True
+
+        if not self._tried(is_taken, False, bool):
+            raise InputError(self.fault)
 
     def unfit(self, mission: Mission) -> str:
         return self.fault or self._tried(lambda: self._base.unfit(mission), "", _is_text) or self.fault

@@ -28,6 +28,7 @@ Reason = Literal[
     "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
     "storage", "untrusted", "replayed", "way_differs",
     "unsupported", "not_armed", "wrong_origin", "mission_differs", "no_position", "denied", "not_ready",
+    "not_stopped",
 ]  # fmt: skip
 """Reason why a robot refuses a command, or a mission."""
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.errors import InputError, Undecided
 from stopgo.recordings.logs import listing, read_log
 from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
@@ -138,7 +138,7 @@ def answer(path: Path) -> str:
     """Verdict on the drive; `refused` if there is none."""
     try:
         return drive_verdict(replay(read_log(path), MISSION, Placing(align="first"))).answer
-    except (InputError, NegativeResult) as error:
+    except (InputError, Undecided) as error:
         assert "\n" not in str(error)
         return "refused"
 
