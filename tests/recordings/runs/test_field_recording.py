@@ -43,7 +43,7 @@ def test_it_has_the_id_of_its_run_and_names_mission_and_floor(
     about = held.properties["run"]
     assert (about["mission_id"], about["digest"]) == (mission.id, mission.digest)
     assert (about["floor"], about["floor_digest"]) == (mission.origin.floor, mission.origin.floor_digest)
-    assert held.timelines == ("mission_time", "robot_time")
+    assert held.timelines == ("mission_time", "robot_time", "stop")
     assert held.properties["run"]["run_id"] == run.RUN
     names = ("robot", "driven", "arrived", "scanned", "state", "stop_state", "events", "report")
     assert {f"{RUN}/{name}" for name in names} <= set(held.rows)
