@@ -49,7 +49,7 @@ COMPLETING = "_STOPGO_COMPLETE"
 
 EXTRAS = {
     "shapely": "plan", "scipy": "plan", "networkx": "plan", "ezdxf": "plan", "highspy": "plan",
-    "numba": "plan", "pyproj": "plan", "ifcopenshell": "bim",
+    "pyproj": "plan", "ifcopenshell": "bim",
     "rerun": "record", "rosbags": "record", "pyulog": "record",
     "laspy": "clouds", "pye57": "clouds", "reportlab": "plan", "PIL": "plan",
     "embreex": "prove", "small_gicp": "prove", "kiss_matcher": "prove", "pyvrp": "fleet",

@@ -41,12 +41,34 @@ class FloorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     override: list[Override] = []
 
 
+class RobotTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A robot as it stands in the file."""
+
+    name: str
+    shift: str = "8h"
+    at: str = ""
+
+
+class DayTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The table `[day]`: robots, and the ways between floors."""
+
+    robots: list[RobotTable]
+    ways: str | None = None
+    """CSV of from, to, minutes."""
+    way: str = "15min"
+    """Time between floors that the CSV does not name."""
+    setup: str = "10min"
+    """Time before each mission."""
+    begin: str = "07:00"
+
+
 class BatchDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A plans.toml as it stands on the disk."""
 
     include: list[str] = []
     options: EntryOptions = {}
     floors: list[dict[str, Any]] = []
+    day: DayTable | None = None
 
 
 @dataclass(frozen=True)
@@ -83,6 +105,29 @@ def read_batch(path: Path) -> tuple[list[FloorGroup], list[str]]:
     return groups, problems
 
 
+def read_day(path: Path) -> DayTable:
+    """Return the robots and ways of a batch's file.
+
+    Raises
+    ------
+    InputError
+        When it has none.
+    """
+    day = _document(path).day
+    if day is None:
+        raise InputError(
+            f'{path}: has no table [day]; add one with robots = [{{ name = "r1", shift = "8h" }}]'
+        )
+    return day
+
+
+def _document(path: Path) -> BatchDocument:
+    try:
+        return msgspec.convert(read_toml(path), BatchDocument)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{path}: {_plain(error)}") from None
+
+
 def _groups(
     path: Path, options: Mapping[str, Any], includers: tuple[Path, ...], problems: list[str]
 ) -> list[FloorGroup]:
@@ -90,11 +135,7 @@ def _groups(
     if real in includers or len(includers) > DEEPEST:
         circle = " -> ".join(item.name for item in (*includers, real))
         raise InputError(f"{path}: is included by itself ({circle}); remove one include")
-    content = read_toml(path)
-    try:
-        file = msgspec.convert(content, BatchDocument)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{path}: {_plain(error)}") from None
+    file = _document(path)
     shared = {**options, **file.options}
     groups = []
     for included in file.include:

@@ -21,13 +21,14 @@ LIBRARIES = ("numpy", "scipy", "shapely", "highspy", "networkx", "numba", "ezdxf
 """Libraries whose version may change a plan."""
 CODE = ("mission", "planner", "recordings")
 """Folders of stopgo that make a plan's files."""
+TARGETS = "targets"
 ContentParts = dict[str, str]
 
 
 def floor_parts(floor: FloorPlan, bodies: Sequence[object]) -> ContentParts:
     """Return a hash for every part of a floor: its outline, each room, opening and element, the rest.
 
-    The name of the file and the hash of its bytes are not among them.
+    The name of the file and the hash of its bytes are not among them. `targets` is a number, no hash.
     """
     seen: Counter[str] = Counter()
     parts: ContentParts = {"outline": digest(floor.outline)}
@@ -36,6 +37,7 @@ def floor_parts(floor: FloorPlan, bodies: Sequence[object]) -> ContentParts:
             name = f"{kind} {getattr(item, 'global_id', None) or item.id}"
             seen[name] += 1
             parts[name if seen[name] == 1 else f"{name} ({seen[name]})"] = digest(item)
+    parts[TARGETS] = str(sum(item.target and item.to_scan for item in floor.elements))
     parts["bodies"] = digest(tuple(bodies))
     rest = (floor.name, floor.source.chosen, floor.level, floor.georeference, floor.findings, floor.status)
     parts["other content"] = digest((rest, floor.on_robots_map, floor.ceiling_m, floor.ignored))
@@ -62,7 +64,9 @@ def reading_key(path: Path, settings: Settings) -> str | None:
     if path.suffix.lower() in (".yaml", ".yml"):
         return None
     schedule = file_digest(Path(settings.schedule)) if settings.schedule else ""
-    return digest((path.stem, file_digest(path), options_of(settings), schedule, computed_by()))
+    return digest(
+        (path.stem, file_digest(path), options_of(settings), settings.targets, schedule, computed_by())
+    )
 
 
 def file_digest(path: Path) -> str:

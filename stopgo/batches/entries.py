@@ -35,6 +35,8 @@ class Entry:
 
     name: str
     """Folder of the result below the output folder, with `/` between its parts; unique in a batch."""
+    site: str
+    """The first parts of the name: the floor, whatever the date and variant."""
     floor: Path
     settings: Settings
     place: str
@@ -141,8 +143,9 @@ def _entry(group: FloorGroup, floor: Path, axes: Mapping[str, str], variant: Map
     settings = read_settings(group.parameters, options)
     if settings.schedule is not None:
         settings = replace(settings, schedule=str(group.folder / settings.schedule))
-    parts = [group.name or floor.stem, *(axes[key] for key in ("storey", "date", "variant") if axes[key])]
-    return Entry("/".join(map(_folder, parts)), floor, settings, group.place, tuple(axes.items()))
+    site = "/".join(_folder(part) for part in (group.name or floor.stem, axes["storey"]) if part)
+    name = "/".join([site, *(_folder(axes[key]) for key in ("date", "variant") if axes[key])])
+    return Entry(name, site, floor, settings, group.place, tuple(axes.items()))
 
 
 def _chosen(
@@ -165,7 +168,7 @@ def _chosen(
             if not item.planned:
                 left_out[f"{floor}: {item.name}: {item.reason}"] = None
         if not chosen:
-            raise InputError(f"{floor}: has no storey that is planned unasked; give storeys")
+            raise InputError(f"{floor}: has no storey that is planned without storeys; give storeys")
         return chosen
     names: dict[str | None, None] = {}
     for pattern in group.storeys:

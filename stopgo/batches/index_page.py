@@ -12,7 +12,13 @@ from stopgo.recordings.page.words import grid, row, shown, tag
 
 COLUMNS = ("entry", "status", "stops", "coverage %", "route m", "time", "findings", "changes", "files")
 FILES = {"plan": "plan.svg", "mission": "mission.json", "log": "plan.log"}
-WORDS = {"planned": "planned now", "kept": "unchanged", "failed": "failed", "waiting": "not planned yet"}
+WORDS = {
+    "planned": "planned now",
+    "kept": "unchanged",
+    "nothing": "nothing to scan",
+    "failed": "failed",
+    "waiting": "not planned yet",
+}
 
 
 def index_page(record: BatchRecord) -> bytes:

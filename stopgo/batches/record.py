@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from stopgo.batches.store import Result
-from stopgo.batches.work import PlanOutcome
+from stopgo.batches.work import NOTHING, PlanOutcome
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 
@@ -27,7 +27,7 @@ class EntryRecord(msgspec.Struct, frozen=True, kw_only=True):
     floor: str
     place: str
     status: str
-    """`planned`, `kept`, `failed`, or `waiting` if the batch was ended before."""
+    """`planned`, `kept`, `failed`, `nothing` to scan, or `waiting` if the batch was ended before."""
     exit_code: int | None = None
     stops: int | None = None
     coverage: float | None = None
@@ -40,6 +40,8 @@ class EntryRecord(msgspec.Struct, frozen=True, kw_only=True):
     changed: str = ""
     """Difference to the last batch, in words; empty if there is none."""
     key: str = ""
+    missions: list[str] = []
+    """Ids of its missions."""
 
 
 class BatchRecord(msgspec.Struct, frozen=True, kw_only=True):
@@ -61,7 +63,7 @@ class BatchRecord(msgspec.Struct, frozen=True, kw_only=True):
 
     def counts(self) -> dict[str, int]:
         """Number of entries by status."""
-        names = ("planned", "kept", "failed", WAITING)
+        names = ("planned", "kept", NOTHING, "failed", WAITING)
         return {name: sum(item.status == name for item in self.entries) for name in names}
 
 
@@ -83,6 +85,7 @@ def entry_record(outcome: PlanOutcome, floor: str, place: str, before: EntryReco
 def _figures(result: Result) -> dict[str, Any]:
     reports = [part for report in result.reports for part in report.get("shares", (report,))]
     return {
+        "missions": [part["mission"]["id"] for part in reports],
         "stops": sum(part["selection"]["stops"] for part in reports),
         "coverage": min(part["selection"]["coverage"] for part in reports),
         "route_m": round(sum(part["route"]["length_m"] for part in reports), 2),
@@ -136,10 +139,14 @@ def _csv(entries: Iterable[EntryRecord]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
     for entry in entries:
-        writer.writerow(["" if (v := getattr(entry, name)) is None else _cell(v) for name in names])
+        writer.writerow([_cell(getattr(entry, name)) for name in names])
     return text.getvalue()
 
 
 def _cell(value: object) -> object:
     """A cell that no spreadsheet takes for a formula."""
+    if isinstance(value, list):
+        return " ".join(value)
+    if value is None:
+        return ""
     return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@") else value

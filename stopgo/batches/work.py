@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from stopgo.batches.content import (
+    TARGETS,
     ContentParts,
     computed_by,
     file_digest,
@@ -27,6 +28,8 @@ from stopgo.mission.errors import StopgoError
 from stopgo.mission.settings import Settings, recorded_values
 
 LOG = "plan.log"
+NOTHING = "nothing"
+"""Status of an entry without anything that was finished since the last visit."""
 
 
 class PlanTask(msgspec.Struct, frozen=True, kw_only=True):
@@ -97,7 +100,9 @@ def read_parts(task: PlanTask) -> ContentParts:
     if fact is not None:
         return dict(fact)
     options = options_of(task.settings)
-    parts = floor_parts(read_floor(task.floor, options), standing_bodies(task.floor, options))
+    floor, kinds = read_floor(task.floor, options), task.settings.targets
+    floor = floor if kinds is None else floor.with_targets(kinds)
+    parts = floor_parts(floor, standing_bodies(task.floor, options))
     if key is not None:
         store.write_fact("readings", key, parts)
     return parts
@@ -145,6 +150,8 @@ def _work(task: PlanTask) -> PlanOutcome:
 def _found_or_planned(task: PlanTask, log: io.StringIO) -> PlanOutcome:
     store, parts = ResultStore(task.store), read_parts(task)
     key = _key_of(task, parts)
+    if task.settings.since and parts[TARGETS] == "0":
+        return PlanOutcome(name=task.name, status=NOTHING, exit_code=0)
     found, status = store.find(key), "kept"
     if found is None:
         with store.claimed(key):

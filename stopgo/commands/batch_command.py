@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,6 +50,14 @@ SizeOption = Annotated[
 ]
 
 
+SinceOption = Annotated[
+    str | None,
+    typer.Option(metavar="DAY|last", help="Scan what was finished since; last: since a floor's last run."),
+]
+RunsOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Recordings of earlier runs.")]
+DayOption = Annotated[
+    str | None, typer.Option(metavar="DAY", help="Allocate this day's missions to the robots of [day].")
+]
 SkipFaultyOption = Annotated[bool, typer.Option(help="Plan the sound entries even if others have faults.")]
 BatchAllPartsOption = Annotated[bool, typer.Option(help="Also plan parts not connected with the first.")]
 BatchStrictOption = Annotated[bool, typer.Option(help="Exit 1 if floor is left out or a plan is doubtful.")]
@@ -67,6 +77,9 @@ def batch_command(
     store: StoreOption = None,
     workers: WorkersOption = 2,
     scheduler: SchedulerOption = None,
+    since: SinceOption = None,
+    runs: RunsOption = None,
+    day: DayOption = None,
     skip_faulty: SkipFaultyOption = False,
     all_parts: BatchAllPartsOption = False,
     strict: BatchStrictOption = False,
@@ -79,24 +92,73 @@ def batch_command(
 
     Unchanged plans come from the store. The exit code is the worst of all. After Ctrl-C, call it again.
     """
-    from stopgo.batches.batch_run import Batch, ResultStore, expanded
+    return _run_command(BatchCall(**locals()))
 
-    folder = result_folder(out)
-    kept = ResultStore.at(folder / ".store" if store is None else store)
-    if gc:
-        return _collect(kept, unused_for, store_gb)
-    found = expanded(file, kept.folder, workers=workers)
-    batch = Batch(file, folder, found.entries, kept.folder, found.left_out, all_parts, strict)
-    if why is not None:
-        return _print_why(batch, why)
+
+@dataclass(frozen=True)
+class BatchCall:
+    """The options of a call; each as `batch_command` declares it."""
+
+    file: Path
+    out: Path
+    dry_run: bool
+    why: str | None
+    store: Path | None
+    workers: int
+    scheduler: str | None
+    since: str | None
+    runs: Path | None
+    day: str | None
+    skip_faulty: bool
+    all_parts: bool
+    strict: bool
+    gc: bool
+    unused_for: str | None
+    store_gb: float
+    as_json: bool
+
+    def __post_init__(self) -> None:
+        for option, day in (("--since", self.since), ("--day", self.day)):
+            if day is not None and not _is_day(day) and (option, day) != ("--since", "last"):
+                raise InputError(f"{option} {day}: give a day as YYYY-MM-DD")
+        if self.since == "last" and self.runs is None:
+            raise InputError("--since last: needs the recordings of earlier runs; give --runs DIR")
+
+
+def _is_day(text: str) -> bool:
+    try:
+        return datetime.date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        return False
+
+
+def _run_command(call: BatchCall) -> int:
+    from stopgo.batches.batch_run import Batch, ResultStore, expanded
+    from stopgo.batches.day import write_day_of
+    from stopgo.batches.visits import note_missions, read_visits, with_since
+
+    out = result_folder(call.out)
+    store = ResultStore.at(out / ".store" if call.store is None else call.store)
+    if call.gc:
+        return _collect(store, call.unused_for, call.store_gb)
+    found = expanded(call.file, store.folder, workers=call.workers)
+    visits = read_visits(out, call.runs)
+    entries, visited = with_since(found.entries, call.since, visits)
+    left_out = (*found.left_out, *visited)
+    batch = Batch(call.file, out, entries, store.folder, left_out, call.all_parts, call.strict)
+    if call.why is not None:
+        return _print_why(batch, call.why)
     faults = _print_problems(found)
-    if faults and not skip_faulty:
+    if faults and not call.skip_faulty:
         return faults
-    if dry_run:
-        _print_entries(found.entries, as_json=as_json)
+    if call.dry_run:
+        _print_entries(entries, as_json=call.as_json)
         return faults
-    record = _run(batch, workers, scheduler, store_gb)
-    _print_record(record, folder, as_json=as_json)
+    record = _run(batch, call.workers, call.scheduler, call.store_gb)
+    note_missions(out, visits, entries, record.entries)
+    if call.day is not None:
+        notice(f"{call.day}: {write_day_of(call.file, out, call.day, batch, record, visits)}")
+    _print_record(record, out, as_json=call.as_json)
     return max(record.exit_code, faults)
 
 
