@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal
 
-from stopgo.mission.settings.parameter import Parameter
+from stopgo.mission.settings.parameter import Pair, Parameter, millimetres
 
 LEAST_SHARE = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
@@ -86,6 +86,24 @@ class CoverageParameters:
             quiet=True,
         ),
     ] = None
+    accuracy: Annotated[
+        float | None,
+        _plan(
+            "Maximum predicted position error of every registered scan, with a probability of 0.99",
+            "mm",
+            above=0,
+            form="LENGTH",
+            example="5mm",
+            read=millimetres,
+            quiet=True,
+        ),
+    ] = None
+    control: Annotated[
+        tuple[Pair, ...],
+        _plan(
+            "Control point: a target with known coordinates", "m", form="X,Y", example="2.5,3.0", quiet=True
+        ),
+    ] = ()
     overlap_range: Annotated[
         float | None,
         _plan(

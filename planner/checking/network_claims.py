@@ -20,8 +20,10 @@ from stopgo.mission.stages.network import network_of
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_of
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
-from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, links_of
+from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
+from stopgo.planner.overlap.control import seen_control
+from stopgo.planner.overlap.network_error import information_of, network_errors
 from stopgo.planner.overlap.pairs import Overlaps
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door
@@ -43,6 +45,7 @@ def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Prob
     yield from _weak_pairs(mission, space)
     if required and mission.share is msgspec.UNSET and _is_whole(mission, space):
         yield from _separate_scans(mission, space)
+        yield from _inaccurate_scans(mission, space)
 
 
 def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
@@ -63,6 +66,24 @@ def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
                 yield Problem(path, f"is {claimed:g}, but {counted_text}")
             elif counted < needed - ROUNDED:
                 yield Problem(path, f"is {claimed:g}: {counted_text}; a pair that registers has {needed:g}")
+
+
+def _inaccurate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+    """The scan with the greatest predicted error, if this exceeds the accuracy required."""
+    asked, network = space.settings.accuracy, network_of(mission)
+    if asked is None or network is None or not network.overlaps:
+        return
+    overlaps, origin = _overlaps(mission, space), local_origin(space.floor)
+    row = {stop: k for k, stop in enumerate(network.stops)}
+    ends = [(row[pair.a], row[pair.b]) for pair in network.overlaps]
+    xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - origin
+    information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
+    errors, _ = network_errors(xy, ends, information, seen_control(space, xy))
+    found = CONFIDENCE * 1000 * np.where(np.isfinite(errors), errors, 0.0)
+    worst = int(np.argmax(found))
+    if found[worst] > asked * (1 + ROUNDED):
+        text = f"is {asked:g} mm, but the predicted error of {network.stops[worst]} is {found[worst]:.1f} mm"
+        yield Problem("$.origin.parameters.accuracy", f"{text}, counted line by line")
 
 
 def _is_whole(mission: Mission, space: NavigableSpace) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -18,9 +19,10 @@ from stopgo.mission.stages.figures import percent
 from stopgo.mission.stages.network import Network
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
+from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
-from stopgo.planner.overlap.network_error import information_of, scan_errors
+from stopgo.planner.overlap.control import seen_control
+from stopgo.planner.overlap.network_error import information_of, network_errors
 from stopgo.planner.overlap.pairs import error_of
 
 
@@ -39,29 +41,45 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     return tuple(found)
 
 
-def predicted_errors(route: Route) -> FloatArray:
-    """Standard deviation of each stop's scan in its worst direction, metres, in the order of driving (n,).
+@dataclass(frozen=True, eq=False)
+class PredictedErrors:
+    """Standard deviations of a network's scans, and their frame."""
 
-    The frame is that of the stop, of three in the middle, with the least worst error. A scan outside
-    the largest component has the error infinity.
-    """
-    overlaps, network = _overlaps_of_stops(route), Network(stops := _names(route), registered_pairs(route))
+    m: FloatArray
+    """Of each stop's scan in its worst direction, metres, in the order of driving (n,)."""
+    frame: str
+    """The stop that holds the frame, or "control points"."""
+
+
+def predicted_errors(route: Route) -> PredictedErrors:
+    """Predict the error of every stop's scan; a scan that nothing holds has the error infinity."""
+    overlaps, stops = _overlaps_of_stops(route), _names(route)
     number = {stop: k for k, stop in enumerate(stops)}
-    ends = [(number[pair.a], number[pair.b]) for pair in network.overlaps]
+    ends = [(number[pair.a], number[pair.b]) for pair in registered_pairs(route)]
     xy = route.xy - local_origin(route.space.floor)
     information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
-    largest = network.pieces[0] if network.pieces else ()
-    tried = [scan_errors(xy, ends, information, [k]) for k in _middle_first(xy, [number[s] for s in largest])]
-    return min(tried, key=lambda errors: float(np.max(errors[np.isfinite(errors)], initial=0.0)))
+    errors, frame = network_errors(xy, ends, information, seen_control(route.space, xy))
+    return PredictedErrors(errors, "control points" if frame is None else stops[frame])
 
 
-MOST_FRAMES = 3
-"""Stops tried as the frame of a network, those nearest to its middle."""
-
-
-def _middle_first(xy: FloatArray, rows: list[int]) -> list[int]:
-    away = np.hypot(*(xy[rows] - xy[rows].mean(axis=0)).T)
-    return [rows[k] for k in np.argsort(away, kind="stable")[:MOST_FRAMES]]
+def inaccurate(route: Route) -> Iterator[Finding]:
+    """Remedy if a scan's predicted error exceeds the accuracy required."""
+    asked = _settings(route).accuracy
+    if asked is None or not _settings(route).registers:
+        return
+    predicted = predicted_errors(route)
+    errors = CONFIDENCE * 1000 * predicted.m
+    beyond = np.flatnonzero(np.isfinite(errors) & (errors > asked))
+    if len(beyond):
+        worst = int(beyond[np.argmax(errors[beyond])])
+        x, y = route.xy[worst].tolist()
+        yield Finding(
+            "accuracy_not_met",
+            f"the predicted error of {_names(route)[worst]} is {errors[worst]:.1f} mm (99 %) in the frame of "
+            f"{predicted.frame}, with {asked:g} mm required, and no further stop lowers it; measure a target "
+            f"that it sees as a control point, near ({x:.1f}, {y:.1f}), and give it as --control",
+            at=(x, y),
+        )
 
 
 def _names(route: Route) -> tuple[str, ...]:
