@@ -56,7 +56,7 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
         outline=parts.outline,
         rooms=parts.rooms,
         openings=parts.openings,
-        elements=tuple(_as_of(item, found, options) for item in parts.elements) if found else parts.elements,
+        elements=tuple(_as_of(_with_heights(item, there, level), found, options) for item in parts.elements),
         level=level.name,
         georeference=georeference,
         status=status,
@@ -78,11 +78,22 @@ def _statuses(model: Model, options: FloorOptions) -> tuple[Statuses | None, str
     return found, schedule.digest if schedule else ""
 
 
-def _as_of(item: Element, found: Statuses, options: FloorOptions) -> Element:
+def _with_heights(item: Element, model: Model, level: Level) -> Element:
+    """The element with the heights of its body above the floor."""
+    mesh = model.meshes.get(item.global_id or "")
+    if mesh is None:
+        return item
+    low, high = (round(z - level.z, 4) for z in mesh.z)
+    return replace(item, heights=(low, high))
+
+
+def _as_of(item: Element, found: Statuses | None, options: FloorOptions) -> Element:
     """An element as on the day: a target unless scanned before or, by default, under construction.
 
-    An element under construction is an obstacle and may occlude.
+    An element under construction is an obstacle and may occlude. Without a day it stays as it is.
     """
+    if found is None:
+        return item
     guid = item.global_id or ""
     begun = found.on.get(guid) == "in_progress" and options.in_progress != "target"
     if not begun and guid not in found.standing and not (found.since and guid in found.without_task):
