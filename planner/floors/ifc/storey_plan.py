@@ -15,6 +15,7 @@ from stopgo.mission.floor import Element, Finding, FloorPlan
 from stopgo.mission.geometry import frozen
 from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
+from stopgo.planner.floors.ifc.ceilings import without_hidden_beams
 from stopgo.planner.floors.ifc.class_kinds import furniture_findings
 from stopgo.planner.floors.ifc.doors import doors_on
 from stopgo.planner.floors.ifc.georeference import georeference_of
@@ -163,7 +164,8 @@ def drawn_on(
             Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are inferred")
         )
     solids, odd_solids = _near_the_floor(solids, floor)
-    findings += [*odd_solids, *_unknown(solids)]
+    solids, hidden = without_hidden_beams(solids, model, level, heights)
+    findings += [*odd_solids, *_unknown(solids), *hidden]
     findings += furniture_findings(model, {item.product.global_id for item in solids})
     strokes = [
         *_rings("FLOOR", floor),
