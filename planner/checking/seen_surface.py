@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.document.limits import scanner_height
 from stopgo.mission.floor import Element
@@ -120,10 +121,16 @@ class _Columns:
             self._side *= 2
         self._shape = tuple((np.ceil(size / self._side) + 1).astype(int).tolist())
         self._tall = solids.ceiling / LEVELS
+        known = shapely.union_all(
+            [shapely.Polygon(part.exterior, part.holes).buffer(SOLID_M) for part in space.occluders]
+        )
+        shapely.prepare(known)
         bits = np.zeros(self._shape[0] * self._shape[1], dtype=np.uint64)
-        for points in _samples(self._within(solids.triangles)):
+        triangles = self._within(solids.triangles)
+        rings = shapely.linestrings(triangles[:, [0, 1, 2, 0], :2])
+        for points in _samples(triangles[~shapely.covers(known, rings)]):
             self._mark(bits, points)
-        self._bits = self._without_known(bits, space)
+        self._bits = self._without_known(bits, known)
 
     def _within(self, triangles: FloatArray) -> FloatArray:
         """Triangles over the grid that lie between the floor and the next one."""
@@ -142,16 +149,10 @@ class _Columns:
         keys = np.unique(cell * LEVELS + level[good])
         np.bitwise_or.at(bits, keys // LEVELS, np.uint64(1) << (keys % LEVELS).astype(np.uint64))
 
-    def _without_known(self, bits: np.ndarray, space: NavigableSpace) -> np.ndarray:
+    def _without_known(self, bits: np.ndarray, known: BaseGeometry) -> np.ndarray:
         """The patterns without columns in what the plan knows as solid from floor to ceiling."""
         marked = np.flatnonzero(bits)
-        if not len(marked):
-            return bits
         xy = np.column_stack(np.divmod(marked, self._shape[1])) + 0.5
-        known = shapely.union_all(
-            [shapely.Polygon(part.exterior, part.holes).buffer(SOLID_M) for part in space.occluders]
-        )
-        shapely.prepare(known)
         inside = shapely.contains_xy(known, *(xy * self._side + self._low).T)
         bits[marked[inside]] = 0
         return bits
