@@ -115,7 +115,6 @@ def _write_part(
 ) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
     from stopgo.planner.checking.model_clearance import too_near
-    from stopgo.planner.checking.seen_surface import seen_surface
     from stopgo.planner.commands.outputs import names, set_aside_file
     from stopgo.planner.commands.plan_report import PlanReport
 
@@ -124,9 +123,7 @@ def _write_part(
     recording = _recording(part.mission.id)
     if recording is None:
         del files["recording"]
-    surface = None if bodies.solids is None else seen_surface(part.route, bodies.solids)
-    watch.lap("surface")
-    contents = _PartContents(part, plan, options, datetime.date.today().isoformat(), surface)
+    contents = _PartContents(part, plan, options, _today(), bodies.seen_from(part, watch))
     sheets = contents.sheets(files["sheets"])
     unwanted = [files.pop("sheets")] if sheets is None else []
     unwanted += [files.pop("picture")] if plan.divided and number else []
@@ -147,7 +144,11 @@ def _write_part(
         set_aside_file(path)
     watch.lap("files")
     near = tuple(too_near(part.mission, bodies.standing, plan.settings))
-    return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near, surface=surface)
+    return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near, surface=contents.surface)
+
+
+def _today() -> str:
+    return datetime.date.today().isoformat()
 
 
 def _revised(part: PartPlan, path: Path) -> PartPlan:
@@ -178,6 +179,14 @@ class ModelBodies:
     standing: Sequence[StandingBody]
     solids: ModelSolids | None
     """None for a floor that is no model."""
+
+    def seen_from(self, part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
+        """Area that the stops of a part see; None for a floor that is no model."""
+        from stopgo.planner.checking.seen_surface import seen_surface
+
+        found = None if self.solids is None else seen_surface(part.route, self.solids)
+        watch.lap("surface")
+        return found
 
 
 @dataclass(frozen=True, eq=False)

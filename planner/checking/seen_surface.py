@@ -28,7 +28,7 @@ COLUMN_M = 0.05
 MOST_COLUMNS = 20_000_000
 LEVELS = 64
 """Heights of a column: the bits of its pattern."""
-SAMPLE_M = 0.025
+SAMPLE_M = 0.03
 """Distance of the points by which a surface is marked."""
 MOST_SAMPLES = 2_000_000
 """Points marked at a time."""
@@ -38,6 +38,8 @@ AT_TARGET_M = 0.08
 """The last of a ray, which lies in the target's own surface."""
 CELL_M = 0.1
 """Height of the cells in which a target's area is counted."""
+ON_FACE_M = 0.02
+"""A face this near to a unit is the unit's own."""
 SOLID_M = 0.04
 """Columns within this of the plan's solids are theirs."""
 MOST_PAIRS = 200_000
@@ -46,9 +48,9 @@ MOST_PAIRS = 200_000
 def seen_surface(route: Route, solids: ModelSolids) -> SeenSurface:
     """Return the area of the targets that the stops of a route see, by kind of element."""
     space, height = route.space, scanner_height(route.settings)
-    columns = _Columns(solids, space)
+    columns = _MarkedColumns(solids, space)
     targets, elements = space.targets, space.floor.elements
-    cells = _Cells.of(space, solids.ceiling)
+    cells = _Cells.of(space, solids)
     seen = np.zeros(cells.there.shape, dtype=bool)
     for stop, units in _sights(route):
         for part in np.array_split(units, max(1, -(-len(units) // MOST_PAIRS))):
@@ -93,14 +95,68 @@ class _Cells:
     tall: FloatArray
 
     @classmethod
-    def of(cls, space: NavigableSpace, ceiling: float) -> _Cells:
-        spans = np.array([_span(item, ceiling) for item in space.floor.elements]).reshape(-1, 2)
+    def of(cls, space: NavigableSpace, solids: ModelSolids) -> _Cells:
+        spans = np.array([_span(item, solids.ceiling) for item in space.floor.elements]).reshape(-1, 2)
         low, high = spans[space.targets.element[space.targets.unit_segment]].T
         rows = int(np.ceil((high - low).max(initial=CELL_M) / CELL_M - 1e-9))
         bottom = low[:, None] + np.arange(rows) * CELL_M
         top = np.minimum(bottom + CELL_M, high[:, None])
-        tall = np.maximum(top - bottom, 0.0)
-        return cls((bottom + top) / 2, tall > 1e-9, tall)
+        tall, z = np.maximum(top - bottom, 0.0), (bottom + top) / 2
+        return cls(z, (tall > 1e-9) & _on_faces(space, solids.triangles, z), tall)
+
+
+def _on_faces(space: NavigableSpace, triangles: FloatArray, z: FloatArray) -> BoolArray:
+    """True for heights (n, k) of the units at which the model has an upright face: no opening is there.
+
+    A unit without any upright face, as on a sloping wall, has all its heights.
+    """
+    upright = triangles[_is_upright(triangles)]
+    plan = shapely.linestrings(upright[:, [0, 1, 2], :2])
+    points = shapely.points(space.targets.unit_xy)
+    unit, face = shapely.STRtree(plan).query(points, predicate="dwithin", distance=ON_FACE_M)
+    found = np.zeros(z.shape, dtype=bool)
+    along = upright[face, :, :2] - space.targets.unit_xy[unit, None]
+    t = np.einsum("nkd,nd->nk", along, _direction(upright[face]))
+    low, high = _heights_at(t, upright[face, :, 2])
+    for k in range(z.shape[1]):
+        here = (z[unit, k] >= low - ON_FACE_M) & (z[unit, k] <= high + ON_FACE_M)
+        found[unit[here], k] = True
+    found[~np.isin(np.arange(len(z)), unit)] = True
+    return found
+
+
+def _is_upright(triangles: FloatArray) -> BoolArray:
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    found: BoolArray = (size > 1e-9) & (np.abs(normal[:, 2]) <= 0.05 * size)
+    return found
+
+
+def _direction(triangles: FloatArray) -> FloatArray:
+    """Direction in plan of upright triangles: along the longest of their sides (n, 2)."""
+    sides = np.roll(triangles, -1, axis=1)[..., :2] - triangles[..., :2]
+    lengths = np.hypot(sides[..., 0], sides[..., 1])
+    longest = np.argmax(lengths, axis=1)
+    rows = np.arange(len(triangles))
+    return sides[rows, longest] / np.maximum(lengths[rows, longest], 1e-9)[:, None]
+
+
+def _heights_at(t: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper height of upright triangles where `t`, given at their corners (n, 3), is 0."""
+    low, high = np.full(len(t), np.inf), np.full(len(t), -np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        span = t[:, b] - t[:, a]
+        level = np.abs(span) < 1e-9
+        share = np.clip(-t[:, a] / np.where(level, 1.0, span), 0.0, 1.0)
+        at = z[:, a] + share * (z[:, b] - z[:, a])
+        on = (
+            ~level
+            & (np.minimum(t[:, a], t[:, b]) <= ON_FACE_M)
+            & (np.maximum(t[:, a], t[:, b]) >= -ON_FACE_M)
+        )
+        low = np.where(on, np.minimum(low, at), low)
+        high = np.where(on, np.maximum(high, at), high)
+    return low, high
 
 
 def _span(item: Element, ceiling: float) -> tuple[float, float]:
@@ -109,7 +165,7 @@ def _span(item: Element, ceiling: float) -> tuple[float, float]:
     return max(low, 0.0), max(min(high, ceiling), low, 0.0)
 
 
-class _Columns:
+class _MarkedColumns:
     """Marked surfaces of the model: a pattern of bits by height for each column of the grid."""
 
     def __init__(self, solids: ModelSolids, space: NavigableSpace) -> None:

@@ -148,10 +148,9 @@ def prove_command(
     files = verification_files(mission.parent if out is None else result_folder(out), mission)
     for path in files.values():
         must_be_writable(path)
-    assumed: dict[str, Any] = {"noise_m": noise / 1000, "slant": slant}
-    assumed |= {"poses": not without_poses, "seed": seed, "solids": solids.value}
     given = {"step_deg": step, "height_m": height, "cone_deg": blind_cone, "ceiling_m": ceiling}
-    assumed |= {key: value for key, value in given.items() if value is not None}
+    given |= {"noise_m": noise / 1000, "slant": slant, "seed": seed, "poses": not without_poses}
+    assumed = {key: value for key, value in {**given, "solids": solids.value}.items() if value is not None}
     proof, on_floor = _simulated(mission, floor, coverage, assumed)
     with running("writing the proof"):
         written = _write_proof(proof, on_floor, files)
