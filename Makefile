@@ -7,6 +7,8 @@ else
 BIN := $(VENV)/bin
 endif
 STAMP := $(VENV)/.installed
+# The kernels that are compiled at installation: one that changed is compiled again.
+TYPES := $(wildcard planner/*/*_compiled.pxd planner/*/*/*_compiled.pxd)
 
 # Every test that starts a process would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -14,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: demo docs test lint types faults benchmarks wheels clean
 
 # pip would compile all packages one after another; what is imported is compiled then, by as many as import it.
-$(STAMP): pyproject.toml setup.py constraints.txt
+$(STAMP): pyproject.toml setup.py constraints.txt $(TYPES) $(TYPES:_compiled.pxd=.py)
 	$(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[test]'
 	touch $(STAMP)
@@ -40,10 +42,10 @@ test: lint
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
-	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission
+	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/bridge/mavlink/driving/test_driving_processes.py
 
 benchmarks: $(STAMP)
-	for name in paper models shares quality least_time proofs visibility tours growth logs bridge fleet mavlink; do $(BIN)/python -m benchmarks.$$name || exit 1; done
+	for name in paper models shares quality least_time proofs visibility tours growth logs bridge fleet mavlink campus; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # Builds what is published, and installs it with each extra in an environment of its own.
 wheels: $(STAMP)

@@ -1,14 +1,83 @@
-"""Where the folders of the tree go when stopgo is installed: below `stopgo`, the one name that it takes.
+"""Where the folders of the tree go when stopgo is installed, and the kernels that are compiled then.
 
-The links `stopgo/mission -> ../mission` and so on say the same to mypy and editors. The build does not follow
-them, so that it also works where a checkout has no links, as on Windows.
+The folders go below `stopgo`, the one name that it takes. The links `stopgo/mission -> ../mission` and so
+on say the same to mypy and editors. The build does not follow them, so that it also works where a checkout
+has no links, as on Windows.
+
+Each kernel is one Python file. Cython and a C compiler make a second module of it, `<name>_compiled`, with
+the types of `<name>_compiled.pxd`. Without either the kernels stay interpreted, with the same results. The
+environment variable STOPGO_PURE leaves them out, for a wheel that fits every machine, as robots need it.
 """
 
-from setuptools import find_packages, setup
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
 
 FOLDERS = ("mission", "planner", "bridge", "recordings")
+TYPES = sorted(Path("planner").rglob("*_compiled.pxd"))
+RULES = {
+    "language_level": 3,
+    "annotation_typing": False,  # `int` there is a Python number; the types are in the .pxd
+    "boundscheck": False,
+    "wraparound": False,
+    "cdivision": False,  # // and % round as in Python
+}
+
+
+def say(message: str) -> None:
+    """Print a line of the build; pip shows it with -v."""
+    sys.stderr.write(f"stopgo: {message}\n")
+
+
+def kernels() -> list[Any]:
+    """The extension modules; none, and a line, without Cython or where a pure wheel is wanted."""
+    if os.environ.get("STOPGO_PURE"):
+        return []
+    try:
+        from Cython.Build import cythonize
+    except ImportError:
+        say("Cython is not installed, so the planner's kernels are not compiled")
+        return []
+    found = [
+        Extension(
+            ".".join(types.with_suffix("").parts),
+            [types.with_name(types.name.replace("_compiled.pxd", ".py")).as_posix()],
+            depends=[types.as_posix()],
+            extra_compile_args=[] if sys.platform == "win32" else ["-g0"],
+        )
+        for types in TYPES
+    ]
+    made: list[Any] = cythonize(
+        found, compiler_directives=RULES, build_dir="build/kernels", force=True, quiet=True
+    )
+    for one in made:
+        one.name, one.optional = f"stopgo.{one.name}", True
+    return made
+
+
+class BuildKernels(build_ext):
+    """The compilation of the kernels, one on each processor; one that cannot be stays interpreted."""
+
+    def finalize_options(self) -> None:
+        super().finalize_options()
+        self.parallel = self.parallel or True
+
+    def run(self) -> None:
+        if self.extensions:
+            say(f"compiling {len(self.extensions)} kernels, once; this takes some ten seconds")
+        super().run()
+
 
 linked = [f"stopgo.{folder}{below}" for folder in FOLDERS for below in ("", ".*")]
 own = find_packages(include=["stopgo", "stopgo.*"], exclude=linked)
 mapped = [f"stopgo.{name}" for folder in FOLDERS for name in find_packages(include=[folder, f"{folder}.*"])]
-setup(packages=[*own, *mapped], package_dir={f"stopgo.{folder}": folder for folder in FOLDERS})
+setup(
+    packages=[*own, *mapped],
+    package_dir={f"stopgo.{folder}": folder for folder in FOLDERS},
+    ext_modules=kernels(),
+    cmdclass={"build_ext": BuildKernels},
+)

@@ -22,7 +22,7 @@ def main() -> None:
     rows = [row(name, *value) for name, value in FLOORS.items() if value[0].exists()]
     head = ["floor", "m²", "default, of these candidates", "of all places", "gap", "CPU s, from the floor"]
     told = "Stops / bound. The gap is what is left between both, as a share of the stops."
-    text = "\n\n".join((versions("numpy", "scipy", "shapely", "highspy", "numba"), table(head, rows), told))
+    text = "\n\n".join((versions("numpy", "scipy", "shapely", "highspy"), table(head, rows), told))
     put("all-places", text)
     print(text)
 

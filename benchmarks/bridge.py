@@ -31,7 +31,7 @@ from stopgo.bridge.station.station import Station, connect
 from stopgo.bridge.station.window import Window
 from stopgo.mission.console.ports import free_port
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.run.orders import Verb
+from stopgo.mission.run.run_commands import Verb
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
 from tests.faults.full_disk import fill

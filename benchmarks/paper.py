@@ -41,7 +41,6 @@ from stopgo.planner.selection.greedy import greedy as choose_greedily
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.bresenham import bresenham
 from stopgo.planner.visibility.exact_sight import exact
-from stopgo.planner.visibility.sight import sight
 from tests.planner.worlds import moved, turned
 
 FLOORS = Path(__file__).parents[2] / "shared" / "data" / "paper"
@@ -185,7 +184,6 @@ def measured(case: Case, strategy: str) -> Ours:
     space = timed("navigable", lambda: navigable(case.floor, settings))
     found = timed("candidates", lambda: candidates(space))
     seen = timed("exact", lambda: exact(found))
-    timed("exact, compiled", lambda: exact_compiled(found))
     raster = timed("bresenham", lambda: bresenham(found))
     timed("greedy alone", lambda: choose_greedily(cover_of(seen, demands_of(seen))))
     by_raster = select(_changed(raster, selector="greedy"))
@@ -225,15 +223,6 @@ def _its_route(greedy: Selection, timed: Callable[[str, Callable[[], Any]], Any]
     return route_found
 
 
-def exact_compiled(found: Candidates) -> Visibility:
-    """`exact` with its kernel compiled, which for floors as small as these it does not load."""
-    usual, sight.COMPILE_ABOVE = sight.COMPILE_ABOVE, -1
-    try:
-        return exact(found)
-    finally:
-        sight.COMPILE_ABOVE = usual
-
-
 def _its_way() -> dict[str, str]:
     """The paper's router and graph, or ours while they are not built."""
     return {
@@ -258,7 +247,7 @@ def _sections(ours: list[Ours]) -> Iterator[str]:
         "Paper | ours. The paper's times are of its machine (2019), ours medians of "
         f"{RUNS} warm runs on two shared cores; compare ours with ours. Structural cases with `--edge-clearance 0`, "
         "rooms with `--doors closed` and `--robot-radius 0.34` (a column of the reconstruction stands "
-        "0.685 m from two doors). " + versions("numpy", "scipy", "shapely", "numba", "highspy")
+        "0.685 m from two doors). " + versions("numpy", "scipy", "shapely", "highspy")
     )
     for title, content, why in (
         ("Table 2: units", units_table(ours), UNITS_WHY),
@@ -323,19 +312,18 @@ def visibility_table(ours: list[Ours]) -> str:
                 f"{one.reported.visible} of {one.case.wanted}",
                 *(f"{int(seen.visible.sum())} of {wanted}" for seen in (one.bresenham, one.exact)),
                 one.reported.visibility_s,
-                *(one.seconds[key] for key in ("bresenham", "exact", "exact, compiled")),
-                one.seconds["bresenham"] / one.seconds["exact, compiled"],
+                *(one.seconds[key] for key in ("bresenham", "exact")),
+                one.seconds["bresenham"] / one.seconds["exact"],
             ]
         )
     names = ["paper", "ours, bresenham", "ours, exact"]
-    times = ["paper s", "bresenham s", "exact s", "exact, compiled s", "bresenham / exact, compiled"]
+    times = ["paper s", "bresenham s", "exact s", "bresenham / exact"]
     return table(["case", "strategy", *names, *times], rows)
 
 
 VISIBILITY_WHY = (
-    "The raster hides a wall seen at a flat angle behind its own cells; exact does not. Bresenham here is "
-    "compiled; exact is not on floors this small, since loading the kernel takes longer than it saves. In "
-    "rooms the paper sees fewer of more units: ours leave out hidden joint faces, and with a robot of "
+    "The raster hides a wall seen at a flat angle behind its own cells; exact does not. Both are "
+    "compiled. In rooms the paper sees fewer of more units: ours leave out hidden joint faces, and with a robot of "
     "0.35 m, which two offices of case 1 are closed to, exact sees 4309 from the grid."
 )
 
@@ -406,10 +394,10 @@ def range_table() -> str:
     for strategy, paper_s in (("grid", 89.59), ("triangulation", 21.18)):
         settings = replace(STRUCTURAL, candidates=strategy, range=10.0)
         found = candidates(navigable(CASES[0].floor, settings))
-        methods = (bresenham, exact, exact_compiled)
+        methods = (bresenham, exact)
         times = [median_seconds(partial(method, found), runs=RUNS) for method in methods]
-        rows.append([strategy, paper_s, *times, times[0] / times[2]])
-    names = ["bresenham s", "exact s", "exact, compiled s", "bresenham / exact, compiled"]
+        rows.append([strategy, paper_s, *times, times[0] / times[1]])
+    names = ["bresenham s", "exact s", "bresenham / exact"]
     return table(["strategy", "paper s", *names], rows)
 
 

@@ -168,7 +168,7 @@ def tours_table() -> str:
         f"Random points in a square of {SIDE:.0f} m; {', '.join(f'{k} of {n}' for n, k in SEEDS.items())}. "
         "Best found: the shortest of all methods and of ours with five times the perturbations. Proved: "
         "instances proved optimal, else the bound over the length. Warm, medians of one run per instance; "
-        f"{versions('numpy', 'scipy', 'numba', 'highspy', 'fast-tsp', 'pyvrp', 'ortools')}.\n\n"
+        f"{versions('numpy', 'scipy', 'highspy', 'fast-tsp', 'pyvrp', 'ortools')}.\n\n"
         f"{table(head, rows)}"
     )
 
@@ -202,7 +202,7 @@ def _long_search(lengths: FloatArray) -> int:
     if len(lengths) < 50:
         return length_of(cost, search_and_proof(lengths).order)
     perturbations = trials(cost, LONG_SEARCH * 100 * len(lengths), seed=2)
-    return length_of(cost, search(cost, perturbations, interpreted=False))
+    return length_of(cost, search(cost, perturbations))
 
 
 def _proved(instances: list[FloatArray]) -> str:

@@ -18,10 +18,10 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.geometry import compiling
 from stopgo.planner.geometry.shapes import local_origin, to_grid, to_shape
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.exact_sight import open_space
-from stopgo.planner.visibility.sight import sight as sight_module
 from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
@@ -42,8 +42,13 @@ def scene_and_points(floor: FloorPlan, settings: Settings) -> tuple[Scene, np.nd
 
 def timed(scene: Scene, points: np.ndarray, *, reach: float | None, compiled: bool) -> float:
     """Median seconds of the whole matrix at one of the two speeds."""
-    sight_module.COMPILE_ABOVE = -1 if compiled else 10**18
-    return median_seconds(lambda: sight(scene, points, reach=reach))
+    usual = compiling.compiled_module
+    if not compiled:
+        compiling.compiled_module = lambda name: None  # type: ignore[assignment]
+    try:
+        return median_seconds(lambda: sight(scene, points, reach=reach))
+    finally:
+        compiling.compiled_module = usual
 
 
 def peer_seconds(found, *, reach: float) -> float:
@@ -104,7 +109,7 @@ def main() -> None:
             "## Visibility",
             "Whole matrix of candidates × units, medians of five runs on one thread, in ms. `shapely` asks "
             "prepared geometry for each pair in range, from a sample of 20 000 pairs. "
-            + versions("numpy", "numba", "shapely"),
+            + versions("numpy", "cython", "shapely"),
             table(
                 [
                     "case",

@@ -15,7 +15,7 @@ from ezdxf.addons.drawing.config import BackgroundPolicy, Configuration
 from ezdxf.document import Drawing
 
 from stopgo.mission.document import Mission
-from stopgo.mission.files.coverage_json import write_coverage
+from stopgo.mission.files.coverage_json import coverage_json
 from stopgo.mission.files.exports import exported
 from stopgo.mission.files.exports.format import FloorDrawing, Supplements
 from stopgo.mission.files.exports.stretches import read_stretches
@@ -39,7 +39,7 @@ def draw(folder: Path) -> None:
 
 def _layers(mission: Mission, route: Route, folder: Path) -> Drawing:
     coverage = folder / "coverage.json"
-    write_coverage(route, mission, coverage)
+    coverage.write_bytes(coverage_json(route, mission))
     stretches = read_stretches(coverage, mission)
     coverage.unlink()
     unit = metres_in(ezdxf.readfile(OFFICE), source=OFFICE)

@@ -49,6 +49,12 @@ AnswerIsNo = NegativeResult
 """Former name of `NegativeResult`, until 0.1; removed with 0.3."""
 
 
+class Undecided(StopgoError):
+    """A question was asked, and the evidence allows neither yes nor no."""
+
+    exit_code = 3
+
+
 class OutcomeUnknown(StopgoError):
     """A command was sent and no answer came: it may or may not have taken effect."""
 

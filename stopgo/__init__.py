@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from contextlib import AbstractContextManager
 
+    from stopgo.batches import PlannedBatch
     from stopgo.bridge.station.follow import Followed
     from stopgo.bridge.station.station import Station
     from stopgo.mission.document import Mission
@@ -102,6 +103,33 @@ def plan(
     if isinstance(floor, str | Path):
         floor = read(Path(floor), options_of(used))
     return planned(floor, used, observe=observe, all_parts=all_parts)
+
+
+def batch(
+    file: str | Path,
+    out: str | Path,
+    *,
+    store: str | Path | None = None,
+    workers: int = 2,
+    scheduler: str | None = None,
+) -> PlannedBatch:
+    """Begin to plan all entries of a batch's file in the background; returns a future for each entry.
+
+    Parameters
+    ----------
+    store
+        Folder of finished plans, which several machines may share; else `.store` in `out`.
+    workers
+        Plans at the same time on this machine, unless `scheduler` is the address of a dask scheduler.
+
+    Raises
+    ------
+    InputError
+        With one line for each fault of the file; nothing is planned then.
+    """
+    from stopgo.batches import start_batch
+
+    return start_batch(file, out, store=store, workers=workers, scheduler=scheduler)
 
 
 def read_mission(path: str | Path) -> Mission:
@@ -201,7 +229,7 @@ def replay(
     ------
     InputError
         When it cannot be read, has no transform to the mission frame, or is of another mission.
-    NegativeResult
+    Undecided
         When its standstills fit the stops by no placing, or by several.
     """
     from stopgo.mission.frames.transform import Transform
@@ -257,6 +285,7 @@ def _incomplete() -> str:
 
 
 __all__ = [
+    "batch",
     "check",
     "connect",
     "export",

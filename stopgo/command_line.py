@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "plan_command": ("plan",),
     "floor_commands": ("convert", "floors"),
+    "batch_command": ("batch",),
     "prove_command": ("prove",),
     "demo_command": ("demo",),
     "bridge_commands": (
@@ -48,7 +49,7 @@ COMPLETING = "_STOPGO_COMPLETE"
 
 EXTRAS = {
     "shapely": "plan", "scipy": "plan", "networkx": "plan", "ezdxf": "plan", "highspy": "plan",
-    "numba": "plan", "pyproj": "plan", "ifcopenshell": "bim",
+    "pyproj": "plan", "ifcopenshell": "bim",
     "rerun": "record", "rosbags": "record", "pyulog": "record",
     "laspy": "clouds", "pye57": "clouds", "reportlab": "plan", "PIL": "plan",
     "embreex": "prove", "small_gicp": "prove", "kiss_matcher": "prove", "pyvrp": "fleet",

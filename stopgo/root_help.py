@@ -10,6 +10,7 @@ from stopgo.mission.errors import InputError
 COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
     "Plan": {
         "plan": "Plan the scan stops and the route",
+        "batch": "Plan many floors, dates and variants",
         "floors": "Report the floors in a file",
         "convert": "Write a floor as a layered DXF",
         "show": "Print a mission as a table",
@@ -54,8 +55,7 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
 """Every command once, with a phrase that fits into 60 columns."""
 
 _HEAD = """\
-Usage: stopgo COMMAND ...    or  stopgo COMMAND --help
-Plan the stops of a laser scanner; drive a robot to them."""
+Usage: stopgo COMMAND ...    or  stopgo COMMAND --help"""
 _FOOT = "Also: --version --install-completion --show-completion"
 
 

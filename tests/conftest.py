@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from hypothesis import settings
@@ -49,6 +50,18 @@ def pytest_configure() -> None:
     if "PYTEST_XDIST_WORKER" not in os.environ:  # workers have their parent's
         os.environ["XDG_STATE_HOME"] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
     forget_the_shell()
+    if not HAS_ROBOTS:
+        _skip_what_opens_a_journal()
+
+
+def _skip_what_opens_a_journal() -> None:
+    """Skip every test that comes to open a robot's journal in its own process."""
+    from stopgo.bridge.robot import journal_file
+
+    def skipped(directory: Path) -> ModuleType:
+        pytest.skip("robots run on Linux and macOS only")
+
+    journal_file._file_locks = skipped
 
 
 @pytest.hookimpl(wrapper=True)

@@ -32,6 +32,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
     subprocess.run(
         [*pip, "--no-deps", "--no-build-isolation", "--target", str(site), str(tree)],
+        env={**os.environ, "STOPGO_PURE": "yes"},
         check=True,
         capture_output=True,
     )
@@ -58,7 +59,7 @@ def run(code: str, site: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-P", "-c", code],
         cwd=site.parent,
-        env={**os.environ, "PYTHONPATH": str(site), "NUMBA_DISABLE_JIT": "1"},
+        env={**os.environ, "PYTHONPATH": str(site)},
         capture_output=True,
         text=True,
         check=False,

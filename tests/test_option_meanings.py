@@ -30,6 +30,7 @@ MEANINGS = {
     "--parameters": "plan.toml",
     "--robot": "name of the robot",
     "--seed": "seed of the random numbers",
+    "--since": "only what was finished after a day",
     "--speed-up": "factor by which simulated time runs faster",
     "--start": "start pose of the robot",
     "--state": "folder for what must outlast a restart",

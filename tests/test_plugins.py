@@ -190,7 +190,7 @@ def test_what_a_plug_in_sees_may_be_lists(module: Write) -> None:
 def test_a_bound_of_a_plug_in_is_told_as_its_own(module: Write) -> None:
     module("honest", NUMPY + "def f(cover, settings): return np.arange(cover.rows), cover.rows")
     made = plan(FLOOR, Settings(selector="honest:f", refine=False))
-    assert made.selection.method == "honest:f, by its own word fewest"
+    assert made.selection.method == "honest:f, fewest as reported"
 
 
 def entry(monkeypatch: pytest.MonkeyPatch, group: str, name: str, value: str) -> None:
@@ -327,6 +327,9 @@ def test_a_base_that_fails_is_stopped_and_drives_no_more() -> None:
     assert guarded.goto([(0, 0)], heading=None, limits=limits, interrupt=Event()) == "blocked"
     guarded.stop()
     assert stops == ["stop", "stop"]
+    base.stop = fail
+    with pytest.raises(InputError, match="my:robot: ValueError: motor 2 is hot"):
+        guarded.stop()
 
 
 @pytest.mark.parametrize("name", ["scan_outcome", "what_became"])

@@ -174,12 +174,14 @@ AnyOrigin = Annotated[
 Roster = Annotated[
     Path | None,
     typer.Option(
-        "--roster", metavar="FILE.toml", help="File with expected robots: robots = [...]; else all ever seen."
+        "--roster",
+        metavar="FILE.toml",
+        help="File with expected robots: robots = [...]; else all that ever answered.",
     ),
 ]
 Forget = Annotated[
     list[str] | None,
-    typer.Option("--forget", metavar="NAME", help="Expect a robot no more that was seen; repeatable."),
+    typer.Option("--forget", metavar="NAME", help="Remove a robot from the expected ones; repeatable."),
 ]
 
 # Missions

@@ -34,7 +34,7 @@ from stopgo.mission.errors import InputError
 if TYPE_CHECKING:
     from stopgo.bridge.station.session_socket import SessionOptions
     from stopgo.bridge.station.station import Station
-    from stopgo.mission.run.orders import Verb
+    from stopgo.mission.run.run_commands import Verb
 
 VEHICLES = ("--vehicle", "--signing-key", "--state")
 """Options that only concern a vehicle."""
@@ -210,7 +210,7 @@ def reached(connection: Connection, *, at_once: bool = False) -> AbstractContext
 
 
 def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager[Station]:
-    from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
+    from stopgo.bridge.mavlink.auto.vehicle_commands import Consent
     from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
     from stopgo.bridge.mavlink.vehicle_link.wire import read_link
 

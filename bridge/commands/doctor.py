@@ -39,7 +39,7 @@ from stopgo.bridge.commands.connection import (
     refuse_options,
     with_presets,
 )
-from stopgo.bridge.commands.order_commands import state_line
+from stopgo.bridge.commands.run_control_commands import state_line
 from stopgo.bridge.console import print_json, print_line
 from stopgo.bridge.link.capabilities import told_of_capabilities
 from stopgo.bridge.link.link import endpoints_in

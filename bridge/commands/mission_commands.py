@@ -63,7 +63,8 @@ def push(
 
     Example: stopgo push out/mission.json --mavlink udpout:127.0.0.1:14550 --set-origin
     """
-    from stopgo.bridge.commands.vehicle_missions import ItemOptions, PushConsent, VehicleLink, push_mission
+    from stopgo.bridge.commands.vehicle_missions import PushConsent, VehicleLink, push_mission
+    from stopgo.mission.files.exports.format import written_as
     from stopgo.mission.files.mission_json import read
 
     if connection.mavlink is None:
@@ -71,10 +72,11 @@ def push(
         return push_over_zenoh(read(mission), pushing(connection, patience), take_over=take_over, json_=json_)
     refuse_options(connection.given, "--mavlink", "--take-over", "--as")
     link = VehicleLink.of(connection, autopilot, patience)
+    words = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
     with refusals_printed(as_json=json_):
         push_mission(
             read(mission), link, state=connection.mavlink.state, as_json=json_,
-            items=ItemOptions(trigger or "auto", scan_wait or "delay", settle or "delay"),
+            items=written_as(words),
             consent=PushConsent(set_origin, any_origin, while_running),
         )  # fmt: skip
 

@@ -11,13 +11,12 @@ from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.accuracy import LEAVES_LEGS
 from stopgo.mission.mavlink.autopilots.kind import Autopilot, ParameterRule, why_no_rover
 from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.following.vehicle_health import has_position
 from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.telemetry import charge_of, is_arming_refusal
 
 PREARM_BIT = 0x10000000
 """MAV_SYS_STATUS_PREARM_CHECK."""
-LEVEL, RELATIVE, ABSOLUTE, CONSTANT = 1, 8, 16, 128
-"""Flags of an estimator's report: attitude, relative position, absolute position, constant position mode."""
 COMPLAIN_S = 2.0
 """Wait for messages of the prearm check."""
 LEAST_CHARGE = 0.2
@@ -101,14 +100,6 @@ def _arming(peer: Peer) -> Iterator[Check]:
         return
     ready = bool(status.onboard_control_sensors_health & PREARM_BIT)
     yield Check("arming", ready, "ready to arm" if ready else "not ready to arm; it reports no reason")
-
-
-def has_position(flags: int) -> bool:
-    """Return True if an estimator with these flags has a position.
-
-    PX4 sets the flag of constant position mode at every standstill, also with an absolute position.
-    """
-    return bool(flags & LEVEL) and bool(flags & ABSOLUTE or (flags & RELATIVE and not flags & CONSTANT))
 
 
 def _estimator(peer: Peer) -> Check:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Any
 
 from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
 from stopgo.bridge.mavlink.auto.logbook import forget, logbook, remember
@@ -33,23 +33,21 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.exports import qgc_plan, qgc_waypoints
+from stopgo.mission.files.exports.format import Supplements, written_as
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.accuracy import accuracy_warning
-from stopgo.mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
+from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.fields import PLACED
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.read_back import home_item
-from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.mavlink.translation_options import ScanWait, Settle, Trigger
 
 if TYPE_CHECKING:
     from stopgo.bridge.commands.connection import Connection
 
 ITEMS = ("items", 1)
 """Unit of the progress bars."""
-T = TypeVar("T", bound=str)
 
 
 @dataclass(frozen=True)
@@ -76,15 +74,6 @@ class VehicleLink:
 
 
 @dataclass(frozen=True)
-class ItemOptions:
-    """Translation of a mission to items; `translate` explains each value."""
-
-    trigger: str = "auto"
-    scan_wait: str = "delay"
-    settle: str = "delay"
-
-
-@dataclass(frozen=True)
 class PushConsent:
     """Actions that a push takes only if the user asks for them."""
 
@@ -97,17 +86,17 @@ def push_mission(
     mission: Mission,
     link: VehicleLink,
     *,
-    items: ItemOptions,
+    items: Supplements,
     consent: PushConsent,
     state: Path | None,
     as_json: bool,
 ) -> None:
     """Upload a mission to an autopilot, verify it there, and store in the logbook that it was sent."""
-    made = None if link.autopilot is None else _translated(mission, link.autopilot, items)
+    made = None if link.autopilot is None else qgc_plan.items_of(mission, items)
     with ExitStack() as opened:
         with if_stopped(say, lambda: NOTHING_SENT):
             url, peer = opened.enter_context(_peer(link))
-        sent = made or _translated(mission, peer.autopilot.name, items)
+        sent = made or qgc_plan.items_of(mission, replace(items, autopilot=peer.autopilot.name))
         if not consent.while_running:
             with logbook(url, peer.who.system, state) as book:
                 check_run_over(peer, url, book, "a push")
@@ -159,28 +148,10 @@ def clear_mission(link: VehicleLink, *, state: Path | None, while_running: bool,
         print_line(f"{peer} holds no mission (it had {had} items)")
 
 
-def _translated(mission: Mission, autopilot: str, items: ItemOptions) -> ItemList:
-    return translate(
-        mission,
-        autopilot,
-        trigger=_choice("--trigger", items.trigger, get_args(Trigger)),
-        scan_wait=_choice("--scan-wait", items.scan_wait, get_args(ScanWait)),
-        settle=_choice("--settle-item", items.settle, get_args(Settle)),
-    )
-
-
-def _choice(option: str, text: str, known: tuple[T, ...]) -> T:
-    for one in known:
-        if one == text:
-            return one
-    raise InputError(f"{option} {text}: one of {', '.join(known)}")
-
-
 @contextmanager
 def _peer(link: VehicleLink) -> Iterator[tuple[Url, Peer]]:
     """Connect to the vehicle."""
-    if link.autopilot is not None:
-        _choice("--autopilot", link.autopilot, tuple(AUTOPILOTS))
+    written_as({"autopilot": link.autopilot})
     url, key = read_link(link.url, link.signing_key, insecure=link.insecure)
     with reached(url, vehicle=link.vehicle, signing_key=key, timeout_s=link.timeout_s) as peer:
         peer.autopilot = autopilot_named(link.autopilot) if link.autopilot else peer.autopilot

@@ -12,7 +12,7 @@ import typer
 
 from stopgo.bridge.commands.bridge_options import FinishedRun, Json, PlanRecordingFile, RunRecordingFile, View
 from stopgo.bridge.commands.connection import Connection, reached, with_connection
-from stopgo.bridge.commands.order_commands import status_json
+from stopgo.bridge.commands.run_control_commands import status_json
 from stopgo.bridge.console import print_json, print_line, print_text, say
 
 if TYPE_CHECKING:

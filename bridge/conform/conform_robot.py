@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from stopgo.bridge.conform.command_requirements import IDLE, ORDERS
 from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
 from stopgo.bridge.conform.requirements import (
     ConformVerdict,
@@ -20,7 +21,6 @@ from stopgo.bridge.conform.requirements import (
     tried,
 )
 from stopgo.bridge.conform.robot_bench import OVER, Forger, OtherStation, RobotBench
-from stopgo.bridge.conform.robot_orders import IDLE, ORDERS
 from stopgo.bridge.conform.robot_pushes import PUSHES
 from stopgo.bridge.conform.robot_questions import QUESTIONS
 from stopgo.bridge.conform.robot_restarts import RESTARTS

@@ -13,7 +13,7 @@ from stopgo.bridge.conform.requirements import Nonconforming, NotTried, must, sh
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import Info, KeyExpressions, LogPage, Malformed, Rejected, Reply, decode
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, StateReport, event_of
-from stopgo.mission.run.orders import Answer
+from stopgo.mission.run.run_commands import Answer
 
 TRY_S: Final = 1.0
 """Timeout of one try."""

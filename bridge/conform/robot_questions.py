@@ -32,7 +32,7 @@ from stopgo.bridge.link.protocol import (
 )
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.run_commands import RunCommand
 
 STATE_BYTES = 16 * 1024
 """Largest size of a state, with fifty stops done and fifty skipped."""
@@ -88,7 +88,8 @@ def states_are_bounded(bench: RobotBench) -> None:
     must(size <= STATE_BYTES, f"a state has {size} bytes")
     must(listed <= STOPS_LISTED, f"a state lists {listed} stops; at most {STOPS_LISTED} are")
     must(state.done_count >= len(state.done), "done_count is less than what `done` lists")
-    must(0 <= state.battery <= 1, f"battery is {state.battery}; 0 to 1 is meant")
+    charge = state.battery
+    must(charge is None or 0 <= charge <= 1, f"battery is {charge}; 0 to 1, or null, is meant")
 
 
 def log_has_no_gaps(bench: RobotBench) -> None:
@@ -245,7 +246,7 @@ def _unsent(bench: RobotBench) -> Mission:
     return trial_mission(f"{bench.missions.mission_id}-unsent", 1, Pose(x=0.0, y=0.0, heading=0.0))
 
 
-def _stop_order(bench: RobotBench) -> Order:
+def _stop_order(bench: RobotBench) -> RunCommand:
     return bench.commands.order("pause", issued_ns=0)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from stopgo.bridge.conform.command_requirements import ready
 from stopgo.bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
 from stopgo.bridge.conform.robot_bench import RobotBench
-from stopgo.bridge.conform.robot_orders import ready
 from stopgo.bridge.link.protocol import Info, encode
 
 BOOT_S = 60.0

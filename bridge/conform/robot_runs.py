@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import msgspec
 
+from stopgo.bridge.conform.command_requirements import as_another, ready, refuses_what_means_nothing
 from stopgo.bridge.conform.requirements import NotTried, Requirement, must
 from stopgo.bridge.conform.robot_bench import OVER, RobotBench
-from stopgo.bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
 from stopgo.bridge.conform.robot_queries import describe, must_reject, read, read_event
 from stopgo.bridge.conform.robot_questions import keeps_a_record, states_are_bounded
 from stopgo.bridge.link.capabilities import RECORD
@@ -22,7 +22,7 @@ from stopgo.mission.run.events import (
     Started,
     StateReport,
 )
-from stopgo.mission.run.orders import LONGEST_VALID_S, Answer, Verb
+from stopgo.mission.run.run_commands import LONGEST_VALID_S, Answer, Verb
 
 RUN_S = 180.0
 """Longest time of a run of the trial mission."""

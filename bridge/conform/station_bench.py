@@ -23,7 +23,7 @@ from stopgo.bridge.conform.trial_mission import trial_mission
 from stopgo.bridge.link.link import Answering, Request
 from stopgo.bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, count_of, decode, encode
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.run.orders import Answer, Order, Verb
+from stopgo.mission.run.run_commands import Answer, RunCommand, Verb
 
 StationAction = Callable[[str, Mission | None], int | None]
 """Makes the station act (`push` with a mission, `start`, `watch`); returns its exit code, if it has one."""
@@ -85,8 +85,8 @@ class StationBench:
     def tails(self) -> list[str]:
         return [asked.tail for asked in list(self.link.asked)]
 
-    def orders(self, verb: Verb) -> list[Order]:
-        return [_read(request, Order, verb) for request in self.asked(f"cmd/{verb}")]
+    def orders(self, verb: Verb) -> list[RunCommand]:
+        return [_read(request, RunCommand, verb) for request in self.asked(f"cmd/{verb}")]
 
     def announced(self) -> list[Manifest]:
         return self._steps("begin", Manifest)
@@ -171,7 +171,7 @@ class StationBench:
 
     def gives(self, verb: Verb) -> Answer:
         """Execute a command that does not come from the station under test."""
-        order = Order(
+        order = RunCommand(
             cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, valid_for_s=5.0, take_over=True,
             issued_ns=self.robot.wall.now_ns(),
         )  # fmt: skip

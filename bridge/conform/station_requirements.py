@@ -14,7 +14,7 @@ from stopgo.bridge.conform.requirements import Requirement, must
 from stopgo.bridge.conform.station_bench import DONE, NO, UNKNOWN, StationBench, changed_answer, must_exit
 from stopgo.bridge.link.link import Answering, Request, Unanswered
 from stopgo.bridge.link.protocol import Booted, ChunkHeld, Rejected, encode
-from stopgo.mission.run.orders import LONGEST_VALID_S
+from stopgo.mission.run.run_commands import LONGEST_VALID_S
 
 LATE_S = 2.0
 """Delay of a late answer: longer than the timeout of one try, shorter than that of the request."""

@@ -35,17 +35,23 @@ class Flow:
     """Tokens shown to those who serve."""
 
 
-def access_control(keys: KeyExpressions) -> dict[str, Any]:
-    """Return zenoh's `access_control` at one robot: default deny; its own tunnel's end may connect too."""
+def access_control(keys: KeyExpressions, *, admits: bool = False) -> dict[str, Any]:
+    """Return zenoh's `access_control` at one robot: default deny; its own tunnel's end may connect too.
+
+    If the robot admits connections itself, its own end is known by the Unix socket, else by its certificate.
+    """
     every = [
         *_served(_everything(keys), "ingress", "egress"),
         *_served(_looking_for_twins(keys, "look out for"), "egress", "ingress"),
     ]
     # An end of the tunnel in a process of its own.
     own = _served(_own_tunnel(keys), "egress", "ingress")
+    known_by = (
+        {"link_protocols": ["unixsock-stream"]} if admits else {"cert_common_names": [f"robot:{keys.robot}"]}
+    )
     return _control(
         [*every, *own],
-        subjects=[{"id": "holder"}, {"id": "own", "cert_common_names": [f"robot:{keys.robot}"]}],
+        subjects=[{"id": "holder"}, {"id": "own"} | known_by],
         policies=[
             {"rules": _ids(every), "subjects": ["holder"]},
             {"rules": _ids(own), "subjects": ["own"]},

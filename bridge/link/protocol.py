@@ -25,7 +25,7 @@ from stopgo.mission.run.events import (
     event_of,
 )
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import Answer, Count, ShortText
+from stopgo.mission.run.run_commands import Answer, Count, ShortText
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024

@@ -21,6 +21,7 @@ from typing import Any
 
 import zenoh
 
+from stopgo.bridge.link.admission import Admission, can_admit, inner_endpoints, listening_socket
 from stopgo.bridge.link.keys import HeldKeys, now_utc
 from stopgo.bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, endpoints_in
 from stopgo.bridge.link.seals import NO_SEALS, KeySeals, Seals
@@ -73,6 +74,8 @@ class Guard:
     """Boot of a robot, for its signatures."""
     refused: Callable[[str, str], None] = lambda key, why: None
     """Called with the key and the reason of questions that are not accepted."""
+    turned_away: Callable[[str], None] = lambda why: None
+    """Called with the reason of connections that are not admitted."""
     state: Path | None = None
     """Folder of a robot in which the newest revoked list is stored."""
 
@@ -94,6 +97,25 @@ def listening(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
     check_endpoint(endpoint, guard, option="--listen")
     with _opened({"mode": "router", "listen/endpoints": [endpoint]}, endpoint, guard) as link:
         yield link
+
+
+@contextmanager
+def admitting(endpoint: str, guard: Guard) -> Iterator[ZenohLink]:
+    """Open a robot's link that listens on `endpoint`; with keys, only holders get through to zenoh.
+
+    An endpoint that is not `tls/`, or that has settings of zenoh (`#`), is zenoh's own listener.
+    """
+    check_endpoint(endpoint, guard, option="--listen")
+    if guard.keys is None or not can_admit(endpoint):
+        with listening(endpoint, guard) as link:
+            yield link
+        return
+    with listening_socket(endpoint) as listener, inner_endpoints(guard.state) as inner:
+        settings = {"mode": "router", "listen/endpoints": inner.endpoints}
+        with _opened(settings, endpoint, guard) as link:
+            link.admission = Admission(listener, guard.keys, inner, guard.turned_away, guard.state)
+            with link.admission.running():
+                yield link
 
 
 @contextmanager
@@ -192,6 +214,8 @@ class ZenohLink:
         self._publishers: list[zenoh.Publisher] = []
         self._lock = threading.Lock()
         self._silent = False
+        self.admission: Admission | None = None
+        """What accepts the connections, if zenoh's own listener does not."""
 
     @property
     def distrusted(self) -> str:

@@ -48,7 +48,7 @@ from stopgo.mission import __version__
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import StateReport
 from stopgo.mission.run.lease import Lease, renewed
-from stopgo.mission.run.orders import FREE_VERBS, Order
+from stopgo.mission.run.run_commands import FREE_VERBS, RunCommand
 
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05
@@ -58,7 +58,7 @@ LEAST_POSE_PAUSE_S = 0.02
 """At most fifty poses a second are published, however fast the simulated clock runs."""
 
 
-Signed = TypeVar("Signed", Order, Commit)
+Signed = TypeVar("Signed", RunCommand, Commit)
 
 
 def check_ordering(request: Request, commander: str | None = None) -> None:
@@ -198,7 +198,13 @@ class Agent:
         try:
             work()
         except Exception as error:  # noqa: BLE001 (the end of a thread)
+            self.fail(error)
+
+    def fail(self, error: Exception) -> None:
+        """Stand still because of an error that ended a thread; `wait` raises it."""
+        try:
             self._runner.stand_still(error)
+        finally:
             self._error = error
             self._failed.set()
             self._on_failure(error)
@@ -255,7 +261,7 @@ class Agent:
             return encode(untrusted(error))
         reply = carry_out(request, order)
         self._note_contact(request, sender=order.commander)  # a stop waits for nothing, and leases change
-        what = order.verb if isinstance(order, Order) else f"push of {order.manifest.mission_id[:12]}"
+        what = order.verb if isinstance(order, RunCommand) else f"push of {order.manifest.mission_id[:12]}"
         self._refusals.note_reply(what, order.commander, reply)
         return encode(reply)
 
@@ -306,9 +312,9 @@ class Agent:
         return self._command(request)
 
     def _command(self, request: Request) -> bytes:
-        return self._ordered(request, Order, self._obey)
+        return self._ordered(request, RunCommand, self._obey)
 
-    def _obey(self, request: Request, order: Order) -> Reply:
+    def _obey(self, request: Request, order: RunCommand) -> Reply:
         if not request.key.endswith(f"/cmd/{order.verb}"):
             return Malformed(message=f"command {order.verb} on {request.key}")
         return self._runner.execute(order)

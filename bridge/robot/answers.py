@@ -6,16 +6,18 @@ import hashlib
 import uuid
 from typing import Any
 
+import msgspec
+
 from stopgo.bridge.link.protocol import encode
 from stopgo.bridge.robot.journal import ANSWERS_KEPT, Journal
 from stopgo.mission.document import Mission
 from stopgo.mission.run.decision import Situation
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import Answer, Order, Refused
+from stopgo.mission.run.run_commands import Answer, Refused, RunCommand
 from stopgo.mission.run.states import Run
 
 
-def answered(journal: Journal, order: Order, run: Run) -> Answer | None:
+def answered(journal: Journal, order: RunCommand, run: Run) -> Answer | None:
     """Return the earlier answer to this same command; another command under its id is refused."""
     before = journal.answer(order.cmd_id)
     if before is None:
@@ -27,7 +29,7 @@ def answered(journal: Journal, order: Order, run: Run) -> Answer | None:
     return answer_to(order, reused, run)
 
 
-def answer_to(order: Order, refused: Refused | None, run: Run, note: str = "") -> Answer:
+def answer_to(order: RunCommand, refused: Refused | None, run: Run, note: str = "") -> Answer:
     """Return the answer to a command, with the state of the run after it; `note` is told if it was done."""
     return Answer(
         cmd_id=order.cmd_id, verb=order.verb, outcome="refused" if refused else "ok",
@@ -36,7 +38,16 @@ def answer_to(order: Order, refused: Refused | None, run: Run, note: str = "") -
     )  # fmt: skip
 
 
-def remember_answer(journal: Journal, order: Order, answer: Answer, *, keep: int = ANSWERS_KEPT) -> None:
+def not_stopped(answer: Answer, fault: Exception) -> Answer:
+    """Return the answer to a stop that the base did not take; the run is paused or aborted all the same."""
+    message = (
+        f"the base did not take the command to stand ({fault or type(fault).__name__}): use the emergency"
+        f" stop; the run is {answer.state}, and the robot's program ends"
+    )
+    return msgspec.structs.replace(answer, outcome="refused", reason="not_stopped", message=message)
+
+
+def remember_answer(journal: Journal, order: RunCommand, answer: Answer, *, keep: int = ANSWERS_KEPT) -> None:
     """Store an answer with the hash of its command, and delete all but the newest."""
     with journal.transaction():
         journal.store_answer(_sha256(order), answer)
@@ -55,5 +66,5 @@ def situation_of(journal: Journal | None, mission: Mission | None, **observed: A
     return Situation(mission=mission, has_run=has_run, lease=lease, new_run_id=new_run_id, **observed)
 
 
-def _sha256(order: Order) -> str:
+def _sha256(order: RunCommand) -> str:
     return hashlib.sha256(encode(order)).hexdigest()

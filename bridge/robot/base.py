@@ -30,6 +30,12 @@ class BaseHealth(msgspec.Struct, frozen=True, kw_only=True):
     emergency_stop: bool | None = None
     safety_field: bool | None = None
     """True if an object is in the field of its safety scanners."""
+    battery_ok: bool | None = None
+    """False while a failsafe of the battery lasts."""
+    position_ok: bool | None = None
+    """False while the estimator has no position."""
+    fence_ok: bool | None = None
+    """False while the geofence is breached."""
 
 
 class Base(Protocol):
@@ -40,8 +46,8 @@ class Base(Protocol):
     def speed(self) -> float:
         """Metres per second, now."""
 
-    def battery(self) -> float:
-        """0 to 1."""
+    def battery(self) -> float | None:
+        """0 to 1; `None` if it is not known."""
 
     def health(self) -> BaseHealth:
         """Return the health besides the battery."""

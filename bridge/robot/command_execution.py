@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import msgspec
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
+from stopgo.bridge.robot.answers import answer_to, answered, not_stopped, remember_answer, situation_of
 from stopgo.bridge.robot.base import Base
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.run_store import RunStore
@@ -23,7 +23,7 @@ from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission
 from stopgo.mission.run.decision import Decision, Situation, decide
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Refused
+from stopgo.mission.run.run_commands import FREE_VERBS, Answer, Refused, RunCommand
 from stopgo.mission.run.states import Run
 
 STOPS_KEPT = 1000
@@ -50,10 +50,10 @@ class CommandExecutor:
         self._base = base
         self._clock = clock
         self._command_clock = command_clock
-        self._stops: OrderedDict[str, tuple[Order, Answer]] = OrderedDict()
+        self._stops: OrderedDict[str, tuple[RunCommand, Answer]] = OrderedDict()
         """Answered stops of this boot: one that comes again must not stop a resumed robot."""
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, however often it comes, and store the answer."""
         if order.verb in FREE_VERBS:
             return self._stop(order)
@@ -64,20 +64,22 @@ class CommandExecutor:
 
     # Stops
 
-    def _stop(self, order: Order) -> Answer:
+    def _stop(self, order: RunCommand) -> Answer:
         """Command the base to stand, then decide a pause or an abort, and store it."""
         known = self._stops.get(order.cmd_id)
         if known is not None and known[0] == order:
             return known[1]
         store = self._store
-        with self._control.standing(), store.lock:
-            answer = self._before(order) or self._carry_out_stop(order, decide(order, self._stop_situation()))
+        with self._control.standing() as fault, store.lock:
+            answer = self._before(order) or self._carry_out_stop(
+                order, decide(order, self._stop_situation()), fault
+            )
         self._stops.setdefault(order.cmd_id, (order, answer))
         if len(self._stops) > STOPS_KEPT:
             self._stops.popitem(last=False)
         return answer
 
-    def _before(self, order: Order) -> Answer | None:
+    def _before(self, order: RunCommand) -> Answer | None:
         """Return the earlier answer to a stop; `None` if there is none, or it cannot be read."""
         try:
             return self._store.pending.answered(order) or answered(
@@ -90,9 +92,13 @@ class CommandExecutor:
         store = self._store
         return self._situation(store.run, store.current.mission, None)
 
-    def _carry_out_stop(self, order: Order, decision: Decision | Refused) -> Answer:
+    def _carry_out_stop(
+        self, order: RunCommand, decision: Decision | Refused, fault: Exception | None
+    ) -> Answer:
         """Carry out a stop whatever the disk says; what cannot be stored is stored later."""
         answer = self._answer(order, decision)
+        if fault is not None:
+            answer = not_stopped(answer, fault)
         try:
             run = self._store_decision(order, decision, answer)
         except sqlite3.DatabaseError as error:
@@ -102,7 +108,7 @@ class CommandExecutor:
         return answer
 
     def _carry_out_unstored(
-        self, order: Order, decision: Decision | Refused, answer: Answer, error: sqlite3.DatabaseError
+        self, order: RunCommand, decision: Decision | Refused, answer: Answer, error: sqlite3.DatabaseError
     ) -> Answer:
         if isinstance(decision, Refused):
             return answer
@@ -114,7 +120,7 @@ class CommandExecutor:
 
     # All other commands
 
-    def _decide_and_store(self, order: Order) -> Answer:
+    def _decide_and_store(self, order: RunCommand) -> Answer:
         """Decide without the lock, for a stop must not wait for it; again if the run changed meanwhile."""
         store = self._store
         while True:
@@ -126,7 +132,7 @@ class CommandExecutor:
                 if (tentative.run, tentative.lease) == (store.run, store.lease):
                     return self._carry_out(order, tentative.decision)
 
-    def _decide_unlocked(self, order: Order) -> TentativeDecision:
+    def _decide_unlocked(self, order: RunCommand) -> TentativeDecision:
         """Decide by the run and the lease of this moment."""
         store = self._store
         with store.lock:
@@ -141,7 +147,7 @@ class CommandExecutor:
             endurance_s=base.endurance_s(), not_ready=base.not_ready(), boot_id=self._store.boot_id,
         )  # fmt: skip
 
-    def _carry_out(self, order: Order, decision: Decision | Refused) -> Answer:
+    def _carry_out(self, order: RunCommand, decision: Decision | Refused) -> Answer:
         """Store the decision and its answer, then make it the current run."""
         answer = self._answer(order, decision)
         run = self._store_decision(order, decision, answer)
@@ -149,7 +155,7 @@ class CommandExecutor:
             self._store.adopt(run, interrupts=True)
         return answer
 
-    def _store_decision(self, order: Order, decision: Decision | Refused, answer: Answer) -> Run:
+    def _store_decision(self, order: RunCommand, decision: Decision | Refused, answer: Answer) -> Run:
         store = self._store
         run = store.run
         with store.journal.transaction():
@@ -159,7 +165,7 @@ class CommandExecutor:
             remember_answer(store.journal, order, answer)
         return run
 
-    def _answer(self, order: Order, decision: Decision | Refused) -> Answer:
+    def _answer(self, order: RunCommand, decision: Decision | Refused) -> Answer:
         if isinstance(decision, Refused):
             return answer_to(order, decision, self._store.run)
         return answer_to(order, None, decision.change.run, decision.note)

@@ -45,7 +45,7 @@ from collections.abc import Callable
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.protocol import Commit, Rejected
-from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.base import Base, BaseHealth, Scanner
 from stopgo.bridge.robot.command_execution import CommandExecutor
 from stopgo.bridge.robot.current_mission import CurrentMission
 from stopgo.bridge.robot.journal import Journal
@@ -58,8 +58,8 @@ from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.mission.document import Mission
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import Answer, Order
 from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run
 
 REPORT_WITHIN_S = 0.1
@@ -105,7 +105,9 @@ class Controller:
             store, control=control, base=base, clock=clock, command_clock=command_clock
         )
         self._missions = MissionAcceptance(store, base=base, command_clock=command_clock, revisions=revisions)
-        control.stop_base()
+        fault = control.try_to_stop()
+        if fault is not None and not base.not_ready():
+            raise fault
         store.restore(scanner, command_ns=command_clock.now_ns())
 
     @property
@@ -126,7 +128,7 @@ class Controller:
 
     # Commands and missions, from the link's threads
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, however often it comes, and store the answer."""
         with self._control.standing_on_error():
             return self._commands.execute(order)
@@ -224,5 +226,8 @@ class Controller:
         self._driver.standstill.take(pose, speed)
         return Position(pose, speed, ns)
 
-    def battery(self) -> float:
+    def battery(self) -> float | None:
         return self._base.battery()
+
+    def health(self) -> BaseHealth:
+        return self._base.health()

@@ -31,7 +31,7 @@ from stopgo.bridge.robot.mission_reading import read_mission
 from stopgo.bridge.robot.pages import address_of, part_page
 from stopgo.mission.document import Mission, digest_of
 from stopgo.mission.document.problems import problems_of
-from stopgo.mission.run.orders import Reason
+from stopgo.mission.run.run_commands import Reason
 
 MAX_REASONS = 20
 """Most reasons in the rejection of one mission."""

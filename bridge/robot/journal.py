@@ -40,7 +40,7 @@ from stopgo.bridge.robot.journal_rows import JournalRows
 from stopgo.bridge.robot.stored_missions import StoredMissions
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import AnyEvent, event_of
-from stopgo.mission.run.orders import Answer
+from stopgo.mission.run.run_commands import Answer
 from stopgo.mission.run.states import Change, events_of
 
 ANSWERS_KEPT = 10_000

@@ -34,7 +34,7 @@ class OnMap:
     def speed(self) -> float:
         return self._base.speed()
 
-    def battery(self) -> float:
+    def battery(self) -> float | None:
         return self._base.battery()
 
     def health(self) -> BaseHealth:

@@ -12,8 +12,8 @@ from stopgo.mission.run import revision
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.decision import handed_over
 from stopgo.mission.run.lease import claimed
-from stopgo.mission.run.orders import Refused
 from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.run_commands import Refused
 from stopgo.mission.run.states import Change, Run
 
 

@@ -6,8 +6,8 @@ from stopgo.bridge.robot.base import Base
 from stopgo.mission.document import Mission
 from stopgo.mission.run import revision
 from stopgo.mission.run.battery import battery_shortfall
-from stopgo.mission.run.orders import Refused
 from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.run_commands import Refused
 from stopgo.mission.run.states import Run
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from stopgo.bridge.robot.answers import remember_answer
 from stopgo.bridge.robot.journal import Journal
 from stopgo.mission.run.events import AnyEvent
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 
 
 class PendingWrites:
@@ -15,19 +15,19 @@ class PendingWrites:
 
     def __init__(self) -> None:
         self._events: list[AnyEvent] = []
-        self._answers: dict[str, tuple[Order, Answer]] = {}
+        self._answers: dict[str, tuple[RunCommand, Answer]] = {}
 
     def __bool__(self) -> bool:
         return bool(self._events or self._answers)
 
     def add(
-        self, events: Iterable[AnyEvent], order: Order | None = None, answer: Answer | None = None
+        self, events: Iterable[AnyEvent], order: RunCommand | None = None, answer: Answer | None = None
     ) -> None:
         self._events += events
         if order is not None and answer is not None:
             self._answers[order.cmd_id] = (order, answer)
 
-    def answered(self, order: Order) -> Answer | None:
+    def answered(self, order: RunCommand) -> Answer | None:
         """Return the answer to this same command; `None` if there is none."""
         before = self._answers.get(order.cmd_id)
         return before[1] if before is not None and before[0] == order else None

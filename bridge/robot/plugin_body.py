@@ -97,8 +97,9 @@ class GuardedBase:
     def speed(self) -> float:
         return self._tried(self._base.speed, 0.0, _is_number)
 
-    def battery(self) -> float:
-        return self._tried(self._base.battery, 0.0, lambda level: _is_number(level) and 0 <= level <= 1)
+    def battery(self) -> float | None:
+        empty: float | None = 0.0
+        return self._tried(self._base.battery, empty, _is_charge)
 
     def health(self) -> BaseHealth:
         """Return the base's health; an empty one if it has no such method."""
@@ -131,8 +132,14 @@ class GuardedBase:
         return outcome
 
     def stop(self) -> None:
-        """Stop the base, also after it has failed."""
-        self._tried(self._base.stop, None, lambda _: True)
+        """Stop the base, also after it has failed; raises `InputError` if it does not take the command."""
+
+        def is_taken() -> bool:
+            self._base.stop()
+            return True
+
+        if not self._tried(is_taken, False, bool):
+            raise InputError(self.fault)
 
     def unfit(self, mission: Mission) -> str:
         return self.fault or self._tried(lambda: self._base.unfit(mission), "", _is_text) or self.fault
@@ -184,11 +191,17 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
+def _is_charge(level: object) -> bool:
+    return level is None or (isinstance(level, int | float) and _is_number(level) and 0 <= level <= 1)
+
+
 def _is_health(value: object) -> bool:
     if not isinstance(value, BaseHealth):
         return False
     good = value.localisation
-    flags = (value.emergency_stop, value.safety_field)
+    flags = (
+        value.emergency_stop, value.safety_field, value.battery_ok, value.position_ok, value.fence_ok,
+    )  # fmt: skip
     return (good is None or (_is_number(good) and 0 <= good <= 1)) and set(flags) <= {
         None,
         True,

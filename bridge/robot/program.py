@@ -12,9 +12,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stopgo.bridge.link import keys as key_files
 from stopgo.bridge.link.access import access_control
+from stopgo.bridge.link.admission import can_admit
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import KeyExpressions, place_of
@@ -30,6 +32,9 @@ from stopgo.bridge.robot.simulator import NO_FAULTS, Faults
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.revision import RevisionPolicy
+
+if TYPE_CHECKING:
+    from stopgo.bridge.link.zenoh_link import ZenohLink
 
 TOKEN_WAIT_S = 1.5
 """Wait of a robot that joins a router for the tokens that the router knows."""
@@ -70,7 +75,7 @@ class RobotOptions:
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     """Run the robot agent until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
-    from stopgo.bridge.link.zenoh_link import Guard, joining, listening
+    from stopgo.bridge.link.zenoh_link import Guard, admitting, joining
 
     signal.signal(signal.SIGTERM, _leave)
     sys.setswitchinterval(SWITCH_S)
@@ -78,11 +83,13 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     held = None if options.keys is None else robots_keys(options.keys, options.name, options.state)
     boot_id = new_boot_id()
     refusals = RefusalLog(options.say, key_files.now_utc)
+    admits = options.connect is None and can_admit(options.listen)
     guard = Guard(
-        held, options.insecure, None if held is None else access_control(keys), boot_id,
-        refused=lambda key, why: refusals.note(place_of(key)[2], "somebody", why), state=options.state,
+        held, options.insecure, None if held is None else access_control(keys, admits=admits), boot_id,
+        refused=lambda key, why: refusals.note(place_of(key)[2], "somebody", why),
+        turned_away=lambda why: refusals.note("connection", "somebody", why), state=options.state,
     )  # fmt: skip
-    opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
+    opened = joining(options.connect, guard) if options.connect else admitting(options.listen, guard)
     with opened as link:
         if options.connect:
             check_name_is_free(link, keys, options.connect)
@@ -90,9 +97,11 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
 
 
 def _serve(
-    link: Link, keys: KeyExpressions, options: RobotOptions, boot_id: str, ready: Callable[[], None]
+    link: ZenohLink, keys: KeyExpressions, options: RobotOptions, boot_id: str, ready: Callable[[], None]
 ) -> None:
     with robot_on(link, keys, options, boot_id) as agent:
+        if link.admission is not None:
+            link.admission.failed = agent.fail
         ready()
         agent.wait()
 

@@ -120,7 +120,7 @@ class RunRecorder:
         if self._run is not None and report.run_id == self._run.run_id:
             self._run.state(report)
 
-    def look(self, *, battery: float, robot_ns: int) -> Health | None:
+    def look(self, *, battery: float | None, robot_ns: int) -> Health | None:
         """Add the base's health, and return it if it has changed."""
         base = self.health()
         with self._lock:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from datetime import datetime
 
 from stopgo.bridge.link.protocol import Rejected, Reply
-from stopgo.mission.run.orders import Answer
+from stopgo.mission.run.run_commands import Answer
 
 AGAIN_S = 60.0
 """Interval at which a repeated refusal is printed again, with its count: a log must not fill a disk."""

@@ -71,7 +71,7 @@ class RunDriver:
         advance, battery, silent_s = self._store.advance, self._base.battery(), self.silent_s
         if self.link_is_lost(mission):
             advance(run, lambda now: runs.link_lost(now, mission, silent_s))
-        elif battery < mission.policy.battery_min:
+        elif battery is not None and battery < mission.policy.battery_min:
             reason = f"battery at {battery:.0%}, below {mission.policy.battery_min:.0%}"
             advance(run, lambda now: runs.sent_home(now, mission, then="PAUSED", reason=reason))
         else:

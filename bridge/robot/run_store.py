@@ -26,7 +26,7 @@ from stopgo.mission.run import revision
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import AnyEvent
 from stopgo.mission.run.lease import Lease, lasting_ns
-from stopgo.mission.run.orders import Answer, Order, Refused
+from stopgo.mission.run.run_commands import Answer, Refused, RunCommand
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 from stopgo.mission.run.states import Change, Run
 
@@ -172,7 +172,7 @@ class RunStore:
                 self._set_current(held.run, interrupts=True)
         return Refused("storage", reason)
 
-    def adopt_unstored(self, change: Change, order: Order, answer: Answer) -> None:
+    def adopt_unstored(self, change: Change, order: RunCommand, answer: Answer) -> None:
         """Make a run the current one that the journal could not take; it is stored later."""
         self.pending.add(self._events_of(change), order, answer)
         self._set_current(change.run, interrupts=True)

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from stopgo.bridge.robot.base import BaseHealth
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run, stop_of
 
 
@@ -38,10 +39,13 @@ class Runner(Protocol):
     def position(self) -> Position | None:
         """Return where the robot is; `None` if there is nothing newer than the last call returned."""
 
-    def battery(self) -> float:
-        """0 to 1."""
+    def battery(self) -> float | None:
+        """0 to 1; `None` if it is not known."""
 
-    def execute(self, order: Order) -> Answer:
+    def health(self) -> BaseHealth:
+        """Return the health besides the battery's charge."""
+
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, however often it comes."""
 
     def on_link_silence(self, silent_s: float) -> None:
@@ -60,7 +64,7 @@ def state_report(runner: Runner, *, robot: str, seq: int, ns: int, newest: int) 
     So a state never names an event that it does not include yet.
     """
     run, mission = runner.snapshot()
-    stop = stop_of(run, mission)
+    stop, health = stop_of(run, mission), runner.health()
     return StateReport(
         robot=robot, boot_id=runner.boot_id, seq=seq, robot_ns=ns, state=run.state, run_id=run.run_id,
         mission_id=run.mission_id, revision=run.revision, stop=stop.id if stop else None,
@@ -68,4 +72,5 @@ def state_report(runner: Runner, *, robot: str, seq: int, ns: int, newest: int) 
         skipped=run.skipped[-STOPS_LISTED:], done_count=len(run.done), skipped_count=len(run.skipped),
         outside=run.outside[-STOPS_LISTED:], outside_count=len(run.outside),
         battery=runner.battery(), last_event=newest, next_revision=run.next_revision,
+        battery_ok=health.battery_ok, position_ok=health.position_ok, fence_ok=health.fence_ok,
     )  # fmt: skip

@@ -49,18 +49,29 @@ class WorkControl:
         """Bring the base to a standstill."""
         self._base.stop()
 
+    def try_to_stop(self) -> Exception | None:
+        """Bring the base to a standstill; return the error of a base that does not take the command."""
+        try:
+            self.stop_base()
+        except Exception as error:  # noqa: BLE001 (whatever a base raises; the program then ends by it)
+            return error
+        return None
+
     @contextmanager
-    def standing(self) -> Iterator[None]:
+    def standing(self) -> Iterator[Exception | None]:
         """Command the base to stand before the block begins; no drive begins before the block ends.
 
-        After an error in the block the robot stands until its program ends.
+        Yields the error of a base that did not take the command. Then the robot's program ends after the
+        block, for a base without a program stops by itself. After an error in the block it ends, too.
         """
         mark = object()
         self._kept_standing[mark] = None
         self.interrupt.set()
+        fault = self.try_to_stop()
         with self.standing_on_error():
-            self.stop_base()
-            yield
+            yield fault
+        if fault is not None:
+            self.stand_for_good(fault)
         del self._kept_standing[mark]
         self.wake.set()
 
@@ -78,7 +89,7 @@ class WorkControl:
         self.failure = self.failure or error
         self.interrupt.set()
         self.wake.set()
-        self.stop_base()
+        self.try_to_stop()
 
     def clear_for_work(self) -> bool:
         """Clear the interrupts for new work; false if the robot must stand."""

@@ -37,7 +37,7 @@ def past_reports(
     end = events[-1]
     if not isinstance(end, Finished | Aborted):
         raise NegativeResult(f"run {run_id} of {robot}: not finished; follow it without --run")
-    pending, battery = list(events), 0.0
+    pending, battery = list(events), None
     entries = read_run(station.link, station.keys, run_id, patience_s=station.patience_s) if recorded else ()
     for item in entries:
         if isinstance(item, LoggedReport):
@@ -57,7 +57,7 @@ def _runs(station: Station) -> str:
 
 
 def _final_state(
-    events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float, outside: tuple[str, ...]
+    events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float | None, outside: tuple[str, ...]
 ) -> StateReport:
     done = tuple(event.stop for event in events if isinstance(event, Scanned | Unconfirmed))
     skipped = tuple(event.stop for event in events if isinstance(event, Skipped))

@@ -54,7 +54,7 @@ def remember(path: Path, seen: Sightings) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{path.parent}: cannot store the robots that were seen ({error.strerror});"
+            f"{path.parent}: cannot store the known robots ({error.strerror});"
             " set XDG_STATE_HOME to a writable folder"
         ) from None
     write_atomic(path, msgspec.json.encode({**read_sightings(path), **seen}, order="sorted"))
@@ -71,7 +71,7 @@ def forget(path: Path, names: Iterable[str]) -> None:
     known = dict(read_sightings(path))
     for name in names:
         if name not in known:
-            raise InputError(f"--forget {name}: never seen from here; known: {', '.join(known) or 'none'}")
+            raise InputError(f"--forget {name}: unknown here; known: {', '.join(known) or 'none'}")
         del known[name]
     write_atomic(path, msgspec.json.encode(known, order="sorted"))
 

@@ -47,7 +47,7 @@ from stopgo.mission.document import Mission, sealed
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.mission_json import parse
 from stopgo.mission.run.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
-from stopgo.mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
+from stopgo.mission.run.run_commands import FREE_VERBS, LONGEST_VALID_S, Answer, RunCommand, Verb
 from stopgo.mission.run.tolerance import stops_outside
 
 TRY_S = 1.0
@@ -215,7 +215,7 @@ class Station:
         action = "a viewer cannot pause them: inform a station"
         if self.held is None or self.held.holder.role == "station":
             for info in infos:
-                pause = Order(
+                pause = RunCommand(
                     cmd_id=uuid.uuid4().hex, verb="pause", commander=self.commander, boot_id=info.boot_id,
                     issued_ns=info.clock_ns, valid_for_s=LONGEST_VALID_S,
                 )  # fmt: skip
@@ -338,7 +338,7 @@ class Station:
         return parse(b"".join(parts), f"mission {mission_id} on {self.keys.robot}")
 
     def command(self, verb: Verb, **details: Any) -> Answer:
-        """Send a command, which takes effect once, and return the answer; `details` are fields of `Order`.
+        """Send a command, which takes effect once, and return the answer; `details` are its fields.
 
         Raises
         ------
@@ -369,7 +369,7 @@ class Station:
             holder = self.held.holder
             raise NegativeResult(f"{what}: {holder.name} is a {holder.role}; only stations may send commands")
 
-    def give(self, order: Order, *, within_s: float | None = None) -> Answer:
+    def give(self, order: RunCommand, *, within_s: float | None = None) -> Answer:
         """Send a command that was made before; sent twice, it still takes effect once."""
         within_s = self.timeout_s if within_s is None else within_s
         reply = self._ask_repeatedly(self.keys.command(order.verb), encode(order), within_s)
@@ -386,7 +386,7 @@ class Station:
             raise NegativeResult(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
         return answer
 
-    def stop_order(self, verb: Verb, **details: Any) -> Order:
+    def stop_order(self, verb: Verb, **details: Any) -> RunCommand:
         """Make a pause or an abort: a few hundred bytes, without an earlier query of the robot."""
         given = {key: value for key, value in details.items() if value is not None}
         plain: dict[str, Any] = {
@@ -394,9 +394,9 @@ class Station:
             "issued_ns": 0,
             "valid_for_s": LONGEST_VALID_S,
         }
-        return Order(cmd_id=uuid.uuid4().hex, verb=verb, **(plain | given))
+        return RunCommand(cmd_id=uuid.uuid4().hex, verb=verb, **(plain | given))
 
-    def order(self, verb: Verb, **details: Any) -> Order:
+    def order(self, verb: Verb, **details: Any) -> RunCommand:
         """Make a command for the robot's present state: a late command meets another state and is refused."""
         info = self.info()
         state = info.state
@@ -412,7 +412,7 @@ class Station:
             "stop": state.stop if verb in ("skip", "retry") else None,
         }
         given = {key: value for key, value in details.items() if value is not None}
-        return Order(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(expected | given))
+        return RunCommand(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(expected | given))
 
     def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
         """Read all events of the journal above number `since`, of one run if given."""

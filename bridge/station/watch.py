@@ -37,6 +37,7 @@ from stopgo.mission.run.events import (
     StateReport,
     UnknownKind,
 )
+from stopgo.mission.run.health_text import health_text
 from stopgo.mission.run.tolerance import outside_tolerance_text, stops_outside_text
 
 UNNUMBERED = PoseReport | Silence | PosesMissing | ReportsMissing | LoggedReport
@@ -268,7 +269,7 @@ def table_lines(
         ("state", f"{state.state}  {stop}{_age_text(silent_s, gaps)}"),
         ("stops", f"{state.done_count} done{outside}, {state.skipped_count} skipped{of}"),
         ("position", f"{pose.pose.x:.2f}, {pose.pose.y:.2f} m at {pose.speed:.2f} m/s" if pose else "-"),
-        ("battery", f"{state.battery:.0%}"),
+        ("health", health_text(state)),
         ("time", f"{clock(elapsed)} run, {'-' if left is None else clock(left)} left as planned"),
         ("link", f"no data for {silent_s:.0f} s, retrying" if silent_s else "; ".join(told) or "alive"),
     ]

@@ -86,7 +86,7 @@ class SightedPath:
         """Part of the path that figures of the path are of; empty if all was seen."""
         if not self.gaps:
             return ""
-        return f"while seen ({percent(self.fraction)} of the path), unseen {duration(self.unseen_s)}"
+        return f"while recorded ({percent(self.fraction)} of the path), unseen {duration(self.unseen_s)}"
 
 
 def _metres(point: Point) -> str:

@@ -13,7 +13,6 @@ import numpy as np
 from stopgo.mission.document import Mission
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
-from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.given_file import bytes_of
 from stopgo.mission.floor import Element
 from stopgo.mission.geometry import FloatArray, IntArray
@@ -161,11 +160,6 @@ def coverage_json(
         for index in targets
     ]
     return _written(head, elements)
-
-
-def write_coverage(route: Route, mission: Mission, path: Path | str, figures: Figures | None = None) -> None:
-    """Write coverage.json whole or not at all."""
-    write_atomic(path, coverage_json(route, mission, figures))
 
 
 @dataclass(frozen=True, eq=False)

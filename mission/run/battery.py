@@ -6,12 +6,14 @@ from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
 
 
-def battery_shortfall(mission: Mission, *, battery: float, endurance_s: float | None, first: int = 0) -> str:
+def battery_shortfall(
+    mission: Mission, *, battery: float | None, endurance_s: float | None, first: int = 0
+) -> str:
     """Return why the battery does not last from stop `first` to the end of the mission; empty if it does.
 
-    No answer is possible for a robot whose `endurance_s` (seconds on a full battery) is `None`.
+    No answer is possible for a robot whose charge or `endurance_s` (seconds on a full battery) is `None`.
     """
-    if endurance_s is None:
+    if endurance_s is None or battery is None:
         return ""
     least = mission.policy.battery_min
     needed_s, lasts_s = time_left(mission, first), max(0.0, battery - least) * endurance_s

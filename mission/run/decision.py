@@ -12,7 +12,7 @@ from stopgo.mission.run import route_position
 from stopgo.mission.run.battery import battery_shortfall
 from stopgo.mission.run.events import Pose, TakenOver
 from stopgo.mission.run.lease import Lease, claimed
-from stopgo.mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
+from stopgo.mission.run.run_commands import DRIVING, FREE_VERBS, LONGEST_VALID_S, Refused, RunCommand
 from stopgo.mission.run.states import (
     Change,
     DetailedState,
@@ -44,7 +44,7 @@ class Situation:
     """On the clock that commands are dated by."""
     new_run_id: str
     lease: Lease | None
-    battery: float
+    battery: float | None
     endurance_s: float | None
     not_ready: str = ""
     """Reason why the robot's base cannot drive at present."""
@@ -62,7 +62,7 @@ class Decision:
     """Difference between what a stop named and what it stopped; empty if there is none."""
 
 
-def decide(order: Order, situation: Situation) -> Decision | Refused:
+def decide(order: RunCommand, situation: Situation) -> Decision | Refused:
     """Return the change that a command leads to; late, foreign and impossible commands are refused.
 
     A pause or an abort is refused by the table of states alone, whatever run, mission or state it names.
@@ -82,7 +82,7 @@ def decide(order: Order, situation: Situation) -> Decision | Refused:
     return Decision(Change(change.run, (*handed_over(situation.lease, lease), *change.events)), lease, note)
 
 
-def _claim(order: Order, situation: Situation) -> Lease | Refused:
+def _claim(order: RunCommand, situation: Situation) -> Lease | Refused:
     return claimed(
         situation.lease, order.commander,
         fence=order.fence, take_over=order.take_over, now_ns=situation.command_ns,
@@ -96,7 +96,7 @@ def handed_over(before: Lease | None, after: Lease | None) -> tuple[UnstampedEve
     return (partial(TakenOver, commander=after.commander, before=before.commander),)
 
 
-def _too_late(order: Order, situation: Situation) -> Refused | None:
+def _too_late(order: RunCommand, situation: Situation) -> Refused | None:
     """Refuse a command that is too old; `pause` and `abort` never are, and need no earlier query."""
     if order.verb in FREE_VERBS:
         return None
@@ -112,7 +112,7 @@ def _too_late(order: Order, situation: Situation) -> Refused | None:
     return None
 
 
-def _misdirected(order: Order, situation: Situation) -> Refused | None:
+def _misdirected(order: RunCommand, situation: Situation) -> Refused | None:
     run = situation.run
     if order.expect_state is not None and run.state not in order.expect_state:
         return Refused("wrong_state", f"the robot is {run.state}, not {' or '.join(order.expect_state)}")
@@ -125,7 +125,7 @@ def _misdirected(order: Order, situation: Situation) -> Refused | None:
     return None
 
 
-def _verb(order: Order, situation: Situation) -> Change | Refused:
+def _verb(order: RunCommand, situation: Situation) -> Change | Refused:
     needed = STATES[order.verb]
     if situation.mission is None:
         return Refused("no_mission", "the robot holds no mission; push one first")
@@ -137,7 +137,7 @@ def _verb(order: Order, situation: Situation) -> Change | Refused:
     return VERBS[order.verb](order, situation.mission, situation)
 
 
-def _start(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+def _start(order: RunCommand, mission: Mission, situation: Situation) -> Change | Refused:
     if situation.has_run and not order.again:
         return Refused(
             "finished_before", f"mission {mission.name} has been run before; start --again repeats it"
@@ -157,7 +157,7 @@ def _start(order: Order, mission: Mission, situation: Situation) -> Change | Ref
     )  # fmt: skip
 
 
-def _starting_leg(order: Order, mission: Mission, pose: Pose) -> int | Refused:
+def _starting_leg(order: RunCommand, mission: Mission, pose: Pose) -> int | Refused:
     start = mission.start
     away, limit = math.hypot(pose.x - start.x, pose.y - start.y), _limit(mission, 0)
     if not order.from_here:
@@ -180,11 +180,11 @@ def _limit(mission: Mission, stop: int) -> float:
     return max(mission.robot.radius, mission.stops[min(stop, len(mission.stops) - 1)].tolerance_m)
 
 
-def _pause(order: Order, mission: Mission, situation: Situation) -> Change:
+def _pause(order: RunCommand, mission: Mission, situation: Situation) -> Change:
     return paused(situation.run, f"pause by {order.commander}")
 
 
-def _resume(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+def _resume(order: RunCommand, mission: Mission, situation: Situation) -> Change | Refused:
     off = off_route(situation.run, mission, situation.pose)
     return off or resumed(situation.run, order.commander)
 
@@ -206,7 +206,7 @@ def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
     )
 
 
-def _skip(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+def _skip(order: RunCommand, mission: Mission, situation: Situation) -> Change | Refused:
     run = situation.run
     stop = stop_of(run, mission)
     if stop is None or (order.stop is not None and order.stop != stop.id):
@@ -216,18 +216,18 @@ def _skip(order: Order, mission: Mission, situation: Situation) -> Change | Refu
     return skipped(going, mission, f"skip by {order.commander}")
 
 
-def _retry(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+def _retry(order: RunCommand, mission: Mission, situation: Situation) -> Change | Refused:
     stop = stop_of(situation.run, mission)
     if order.stop is not None and (stop is None or order.stop != stop.id):
         return Refused("not_at_stop", f"current stop is {stop.id if stop else 'none'}, not {order.stop}")
     return _resume(order, mission, situation)
 
 
-def _abort(order: Order, mission: Mission, situation: Situation) -> Change:
+def _abort(order: RunCommand, mission: Mission, situation: Situation) -> Change:
     return ended(changed(situation.run, reason=f"abort by {order.commander}"), "ABORTED")
 
 
-def _home(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+def _home(order: RunCommand, mission: Mission, situation: Situation) -> Change | Refused:
     off = off_route(situation.run, mission, situation.pose)
     if off:
         return off
@@ -235,7 +235,7 @@ def _home(order: Order, mission: Mission, situation: Situation) -> Change | Refu
     return sent_home(changed(situation.run, state="RUNNING"), mission, then="ABORTED", reason=reason)
 
 
-Deciding = Callable[[Order, Mission, Situation], Change | Refused]
+Deciding = Callable[[RunCommand, Mission, Situation], Change | Refused]
 
 VERBS: dict[str, Deciding] = {
     "start": _start, "pause": _pause, "resume": _resume, "skip": _skip,

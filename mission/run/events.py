@@ -231,8 +231,8 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     done: tuple[str, ...]
     """The newest of them, at most STOPS_LISTED, so that a state is small whatever the mission."""
     skipped: tuple[str, ...]
-    battery: float
-    """0 to 1."""
+    battery: float | None
+    """0 to 1; `None` if it is not known."""
     last_event: int
     """Number of the newest event in the journal, 0 if none."""
     next_revision: int | None = None
@@ -242,6 +242,12 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     outside: tuple[str, ...] = ()
     """Newest of the done stops that were scanned outside tolerance."""
     outside_count: int = 0
+    battery_ok: bool | None = None
+    """False while a failsafe of the battery lasts; `None` if it is not known, as the next two."""
+    position_ok: bool | None = None
+    """False while the autopilot's estimator has no position."""
+    fence_ok: bool | None = None
+    """False while the geofence is breached."""
 
 
 class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -262,7 +268,7 @@ class Health(msgspec.Struct, frozen=True, kw_only=True):
 
     robot_ns: Nanoseconds
     run_id: str | None
-    battery: float
+    battery: float | None
     """0 to 1."""
     localisation: float | None = None
     """Quality of the localisation, 0 to 1."""

@@ -10,7 +10,7 @@ from typing import Final
 
 import msgspec
 
-from stopgo.mission.run.orders import Refused
+from stopgo.mission.run.run_commands import Refused
 
 LEASE_S: Final = 60.0
 """Time that a commander keeps the robot after the last command."""

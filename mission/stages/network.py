@@ -119,7 +119,7 @@ MOST_LISTED = 12
 def pair_in_words(pair: Overlap) -> str:
     """Return one pair with its figures."""
     return (
-        f"{pair.a}-{pair.b}: {pair.common_m:.1f} m seen by both, {percent(pair.share)} of a scan, "
+        f"{pair.a}-{pair.b}: {pair.common_m:.1f} m visible from both, {percent(pair.share)} of a scan, "
         f"held as by {pair.hold_m:.2f} m of wall"
     )
 

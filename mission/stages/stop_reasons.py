@@ -79,13 +79,13 @@ class StopReason:
         return (self._seen(), self._offered(), self._lost())
 
     def _seen(self) -> str:
-        new = f"choice {self.step}, when {self.new:.1f} {self.unit} of that were still to be seen"
+        new = f"choice {self.step}, when {self.new:.1f} {self.unit} of that were not covered yet"
         reached = f"coverage came to {percent(self.coverage)}"
         return f"{self.stop} sees {self.units} units, {self.sees:.1f} {self.unit}; {new} and {reached}."
 
     def _offered(self) -> str:
         if not self.runners:
-            return f"No other candidate there would have seen {NEARLY:.0%} as much that was new."
+            return f"No other candidate there would cover {NEARLY:.0%} as much that was new."
         listed = ", ".join(
             f"candidate {item.candidate} at ({item.x:.2f}, {item.y:.2f}) {item.new:.1f} {self.unit}"
             for item in self.runners

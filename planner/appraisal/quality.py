@@ -90,6 +90,6 @@ def fewer_views(selection: Selection) -> Iterator[Finding]:
         unit = "units" if ledger.rule == "paper" else "m"
         yield Finding(
             FEWER_VIEWS,
-            f"{ledger.amount(fewer):.1f} {unit} count as seen from fewer than {required} stops, as no more "
-            "candidates see them; lower --grid for more candidates",
+            f"{ledger.amount(fewer):.1f} {unit} count as covered from fewer than {required} stops, as no "
+            "more candidates see them; lower --grid for more candidates",
         )

@@ -59,7 +59,7 @@ def _none_planned(floors: Sequence[FloorChoice]) -> str:
     if not any(item.option for item in floors):
         return "contains no storeys; remove --all-storeys"
     reasons = "; ".join(f"{item.name}: {item.reason}" for item in floors)
-    return f"has no storey that is planned unasked ({reasons}); name one, such as {floors[0].option}"
+    return f"has no storey that is planned without --storey ({reasons}); name one, such as {floors[0].option}"
 
 
 def folder_names(storeys: Sequence[str]) -> list[str]:

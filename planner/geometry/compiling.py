@@ -1,41 +1,43 @@
-"""Kernels at two speeds from one source: as written for small work, compiled by numba for large."""
+"""Kernels at two speeds from one source: as written, or compiled when stopgo was installed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from pickle import UnpicklingError
+from importlib import import_module
 from typing import Any
+
+from stopgo.mission.console.notice import notice
+
+LAST = "_compiled"
+"""Ending of the module that the build makes of a kernel's module."""
+
+
+def compiled(kernel: Callable[..., Any], *, large: bool) -> Callable[..., Any] | None:
+    """Return the kernel as machine code, with the same results; None where none was built.
+
+    Without it a line is printed before `large` work, once. Compiled kernels take contiguous arrays of
+    64-bit integers where interpreted ones also take lists. A kernel's integers must fit 64 bits, beyond
+    which machine code and Python differ; each kernel's file states why they do.
+    """
+    module = compiled_module(kernel.__module__)
+    if module is None and large:
+        _say_that_plans_take_longer()
+    return getattr(module, kernel.__name__, None)
 
 
 @cache
-def compiled(kernel: Callable[..., Any], *helpers: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the kernel as machine code, cached on disk; the kernel itself if numba is not available.
-
-    `helpers` are the functions it calls. They must be in the kernel's own file: only that file's date shows
-    that the cache is out of date. A kernel's integers must fit 64 bits, beyond which machine code and Python
-    differ; each kernel's file states why they do.
-    """
+def compiled_module(name: str) -> Any:
+    """The module that the build made of the kernel's module `name`; None where it made none."""
     try:
-        from numba import njit
-        from numba.extending import register_jitable
-    except ImportError:
-        return kernel
-    for helper in helpers:
-        register_jitable(helper)
-    try:
-        return recompiled_if_unreadable(njit(kernel, cache=True), njit(kernel))
-    except RuntimeError:  # a read-only install and a user without a home: no folder for the cache
-        return njit(kernel)
+        return import_module(name + LAST)
+    except ImportError:  # built without a compiler, or for another Python or processor
+        return None
 
 
-def recompiled_if_unreadable(cached: Callable[..., Any], uncached: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the kernel cached on disk; if the disk is full or the cache damaged, compile it again."""
-
-    def call(*arguments: Any) -> Any:
-        try:
-            return cached(*arguments)
-        except (OSError, EOFError, UnpicklingError):  # before the first line ran: kernels open no files
-            return uncached(*arguments)
-
-    return call
+@cache
+def _say_that_plans_take_longer() -> None:
+    notice(
+        "the planner's kernels are not compiled, so large floors take longer; "
+        "with a C compiler (such as gcc) installed, install stopgo again from its source"
+    )

@@ -12,7 +12,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.routing.subsets import best_of_all
-from stopgo.planner.routing.tour_kernel import HELPERS, iterated_search
+from stopgo.planner.routing.tour_kernel import iterated_search
 
 NANOMETRES = 1e9
 """Per metre."""
@@ -20,12 +20,12 @@ LARGEST = 4e18
 """Largest total of a tour's edges in nanometres, so that sums stay within 64 bits."""
 COMPARE_ALL_UP_TO = 9
 """Points up to which comparing all tours is quicker than a search."""
-COMPILE_ABOVE = 30
-"""Points above which the compiled kernel is faster, its loading time included."""
 ROUNDS = 100
 """Perturbations per point that are tried; a count, so that plans do not depend on speed."""
-INTERPRETED_ROUNDS = 20
-"""The same for the interpreted kernel: short tours are mostly found in the first search."""
+SHORT = 30
+"""Points of a short tour, which is mostly found in the first search."""
+ROUNDS_OF_SHORT = 20
+"""Perturbations per point of a short tour."""
 NEAREST = 10
 """Nearest points to which new edges are tried from each point."""
 LONGEST_STRETCH = 50
@@ -43,9 +43,8 @@ def shortest_tour(lengths: FloatArray, *, seed: int) -> IntArray:
     cost = nanometres(lengths)
     if n <= COMPARE_ALL_UP_TO:
         return canonical(best_of_all(cost))
-    rounds = INTERPRETED_ROUNDS if n <= COMPILE_ABOVE else ROUNDS
-    perturbations = trials(cost, rounds * n, seed=seed)
-    return canonical(search(cost, perturbations, interpreted=n <= COMPILE_ABOVE))
+    rounds = ROUNDS_OF_SHORT if n <= SHORT else ROUNDS
+    return canonical(search(cost, trials(cost, rounds * n, seed=seed)))
 
 
 def nanometres(lengths: FloatArray) -> IntArray:
@@ -90,19 +89,20 @@ def nearest(cost: IntArray, many: int) -> tuple[IntArray, IntArray]:
     return near, np.take_along_axis(away, near, axis=1)
 
 
-def search(cost: IntArray, perturbations: IntArray, *, interpreted: bool) -> IntArray:
+def search(cost: IntArray, perturbations: IntArray, *, interpreted: bool = False) -> IntArray:
     """The shortest tour of a local search with `perturbations`, from the nearest neighbours' tour on."""
     n = len(cost)
     order = _nearest_neighbours(cost)
     near, _ = nearest(cost, min(NEAREST, n - 1))
     scratch = [np.zeros(size, dtype=np.int64) for size in (n, n, n, 2 * JOURNAL, 3)]
-    given = (cost.ravel(), near.ravel(), order, np.argsort(order), perturbations, *scratch)
+    given = (cost.ravel(), near.ravel(), order, np.argsort(order), perturbations.ravel(), *scratch)
     arrays = [np.ascontiguousarray(array) for array in given]
-    if interpreted:
+    kernel = None if interpreted else compiled(iterated_search, large=n > SHORT)
+    if kernel is None:
         lists = [array.tolist() for array in arrays]
         iterated_search(*lists)
         return np.array(lists[BEST], dtype=np.int64)
-    compiled(iterated_search, *HELPERS)(*arrays)
+    kernel(*arrays)
     return arrays[BEST]
 
 

@@ -10,8 +10,8 @@ Data, for n points
   the nearest first.
 - `order`: the tour, a point at each index. `position`: the inverse, the index of each point in `order`.
 - `best`: a copy of the shortest tour so far.
-- `trials`: one row per double bridge: index in the tour, points in the first stretch, points in the second,
-  allowed loss.
+- `trials`: four numbers per double bridge, flat: index in the tour, points in the first stretch, points in
+  the second, allowed loss.
 - `queue`: a ring buffer of the points to examine. `waiting`: 1 for each point in the queue, else 0.
 - `journal`: for each reversal of the current trial, its two indices at `2 * k` and `2 * k + 1`.
 - `state`: the three counters of queue and journal (`QUEUE_HEAD`, `QUEUE_LENGTH`, `REVERSALS`).
@@ -67,7 +67,7 @@ def iterated_search(
     Parameters
     ----------
     trials
-        Rows of index, points in the first stretch, points in the second, and the allowed loss.
+        For each: index, points in the first stretch, points in the second, and the allowed loss.
     best
         Receives the shortest tour found.
     queue, waiting, journal
@@ -83,11 +83,11 @@ def iterated_search(
         total += improve(cost, near, order, position, queue, waiting, journal, state)
     most = total
     copy_tour(order, best)
-    for k in range(len(trials)):
+    for k in range(len(trials) // 4):
         state[REVERSALS] = 0
-        gain = double_bridge(cost, order, position, trials[k], queue, waiting, journal, state)
+        gain = double_bridge(4 * k, cost, order, position, trials, queue, waiting, journal, state)
         gain += improve(cost, near, order, position, queue, waiting, journal, state)
-        if gain < -trials[k][3]:
+        if gain < -trials[4 * k + 3]:
             undo(order, position, journal, state)
             continue
         total += gain
@@ -145,7 +145,7 @@ def two_opt(
     """Exchange an edge at `a` for one to a nearer point, if that is shorter; return the gain, else 0."""
     n = len(order)
     reach = len(near) // n
-    for step in (1, -1):
+    for step in range(1, -2, -2):
         b = order[(position[a] + step) % n]
         ab = cost[a * n + b]
         for k in range(a * reach, a * reach + reach):
@@ -158,8 +158,10 @@ def two_opt(
             if gain > 0:
                 first, last = (b, c) if step > 0 else (c, b)
                 reverse(position[first], position[last], order, position, journal, state)
-                for point in (a, b, c, d):
-                    enqueue(point, queue, waiting, state)
+                enqueue(a, queue, waiting, state)
+                enqueue(b, queue, waiting, state)
+                enqueue(c, queue, waiting, state)
+                enqueue(d, queue, waiting, state)
                 return gain
     return 0
 
@@ -177,7 +179,7 @@ def or_opt(
 ) -> int:
     """Move a stretch a..z next to a point near `a`, either way round, if shorter; return the gain, else 0."""
     n = len(order)
-    for step in (1, -1):
+    for step in range(1, -2, -2):
         before = order[(position[a] - step) % n]
         z = a
         for size in range(1, LONGEST_SEGMENT + 1):
@@ -186,8 +188,12 @@ def or_opt(
             c, d, gain = best_gap(a, z, size, step, saved, cost, near, order, position)
             if gain > 0:
                 move(a, z, c, d, step, order, position, journal, state)
-                for point in (before, after, a, z, c, d):
-                    enqueue(point, queue, waiting, state)
+                enqueue(before, queue, waiting, state)
+                enqueue(after, queue, waiting, state)
+                enqueue(a, queue, waiting, state)
+                enqueue(z, queue, waiting, state)
+                enqueue(c, queue, waiting, state)
+                enqueue(d, queue, waiting, state)
                 return gain
             z = after
     return 0
@@ -206,7 +212,7 @@ def best_gap(
             break
         if ((position[c] - position[a]) * step) % n < size:
             continue
-        for side in (1, -1):
+        for side in range(1, -2, -2):
             d = order[(position[c] + side) % n]
             gain = spare + cost[c * n + d] - cost[z * n + d]
             if gain > 0 and ((position[d] - position[a]) * step) % n >= size:
@@ -228,25 +234,38 @@ def move(
         begin, end = right, order[(position[first] - 1) % n]
         reverse(position[begin], position[last], order, position, journal, state)
     turn_between(begin, end, order, position, journal, state)
-    if c not in (order[(position[a] + 1) % n], order[(position[a] - 1) % n]):
+    if order[(position[a] + 1) % n] != c and order[(position[a] - 1) % n] != c:
         turn_between(a, z, order, position, journal, state)
 
 
 def double_bridge(
-    cost: Any, order: Any, position: Any, cut: Any, queue: Any, waiting: Any, journal: Any, state: Any
+    cut: int,
+    cost: Any,
+    order: Any,
+    position: Any,
+    trials: Any,
+    queue: Any,
+    waiting: Any,
+    journal: Any,
+    state: Any,
 ) -> int:
-    """Exchange the two stretches after an index of the tour; return the gain, mostly negative."""
+    """Exchange the two stretches of the trial at `cut`; return the gain, mostly negative."""
     n = len(order)
-    p, a = order[cut[0] - 1], order[cut[0]]
-    b, c = order[(cut[0] + cut[1] - 1) % n], order[(cut[0] + cut[1]) % n]
-    d, q = order[(cut[0] + cut[1] + cut[2] - 1) % n], order[(cut[0] + cut[1] + cut[2]) % n]
+    at, mid, far = trials[cut], trials[cut] + trials[cut + 1], trials[cut] + trials[cut + 1] + trials[cut + 2]
+    p, a = order[(at - 1) % n], order[at]
+    b, c = order[(mid - 1) % n], order[mid % n]
+    d, q = order[(far - 1) % n], order[far % n]
     reverse(position[a], position[d], order, position, journal, state)
     turn_between(c, d, order, position, journal, state)
     turn_between(a, b, order, position, journal, state)
-    for point in (p, a, b, c, d, q):
-        enqueue(point, queue, waiting, state)
+    enqueue(p, queue, waiting, state)
+    enqueue(a, queue, waiting, state)
+    enqueue(b, queue, waiting, state)
+    enqueue(c, queue, waiting, state)
+    enqueue(d, queue, waiting, state)
+    enqueue(q, queue, waiting, state)
     removed = cost[p * n + a] + cost[b * n + c] + cost[d * n + q]
-    return int(removed - cost[p * n + c] - cost[d * n + a] - cost[b * n + q])
+    return removed - cost[p * n + c] - cost[d * n + a] - cost[b * n + q]
 
 
 def turn_between(p: int, q: int, order: Any, position: Any, journal: Any, state: Any) -> None:
@@ -285,20 +304,3 @@ def swap_ends(i: int, j: int, order: Any, position: Any) -> None:
         position[q], position[p] = i, j
         i = i + 1 if i + 1 < n else 0
         j = j - 1 if j > 0 else n - 1
-
-
-HELPERS = (
-    copy_tour,
-    swap_ends,
-    undo,
-    reverse,
-    turn_between,
-    double_bridge,
-    move,
-    best_gap,
-    or_opt,
-    two_opt,
-    enqueue,
-    improve,
-)
-"""Everything `iterated_search` calls, innermost first."""

@@ -214,7 +214,7 @@ def _selection(
             f"{name}: coverage reaches {reached:.3f}, not {settings.coverage:g}; "
             "lower --coverage or offer more candidates"
         )
-    proved = ", proved fewest" if method.ours else ", by its own word fewest"
+    proved = ", proved fewest" if method.ours else ", fewest as reported"
     return Selection(
         visibility=visibility,
         chosen=frozen(chosen, np.int64),

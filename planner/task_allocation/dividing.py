@@ -225,6 +225,6 @@ def _selected(whole: Selection, tour: Tour) -> tuple[Selection, IntArray]:
     steps = coverage_steps(cover_of(visibility, demands_of(visibility)), chosen)
     part = replace(
         whole, chosen=frozen(chosen, np.int64), coverage_steps=frozen(steps), required=0.0, bound=0,
-        method=f"{whole.method}, shared out",
+        method=f"{whole.method}, allocated",
     )  # fmt: skip
     return part, frozen([stops.index(stop) for stop in tour], np.int64)

@@ -15,11 +15,12 @@ from stopgo.mission.geometry import BoolArray, IntArray
 from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.shapes import SLACK, local_origin
+from stopgo.planner.visibility.bresenham_kernel import clear_lines
 from stopgo.planner.visibility.raster import Raster, raster_of
 from stopgo.planner.visibility.unit_ranges import visibility_of
 
-COMPILE_ABOVE = 10_000_000
-"""Cells to walk, if all units were at the end of the range, above which the compiled kernel is faster."""
+LARGE = 10_000_000
+"""Cells to walk, to units at the end of the range, from which on the interpreted kernel takes seconds."""
 
 
 def bresenham(candidates: Candidates, *, aligned: bool = True) -> Visibility:
@@ -53,43 +54,18 @@ def _seen_by_each(candidates: Candidates, raster: Raster) -> Iterator[IntArray]:
 
 
 def _walk(raster: Raster, *, steps: float) -> Callable[[IntArray, IntArray, BoolArray], BoolArray]:
-    """`clear_lines` over this raster, compiled where there are many cells to be walked."""
+    """`clear_lines` over this raster."""
     width, cells = raster.occupied.shape[1], raster.occupied.ravel().view(np.uint8)
-    fast = steps > COMPILE_ABOVE
-    kernel = compiled(clear_lines, clear_line) if fast else clear_lines
-    given: Any = cells if fast else cells.tobytes()
+    kernel = compiled(clear_lines, large=steps > LARGE)
+    mark: Callable[..., None] = kernel or clear_lines
+    given: Any = cells.tobytes() if kernel is None else cells
 
     def walk(start: IntArray, ends: IntArray, own: BoolArray) -> BoolArray:
         clear = np.zeros(len(ends), dtype=np.uint8)
-        x, y, own_cell = (column if fast else column.tolist() for column in (*ends.T, own))
-        kernel(given, width, int(start[0]), int(start[1]), x, y, own_cell, clear)
+        columns: list[Any] = [np.ascontiguousarray(column) for column in (*ends.T, own.view(np.uint8))]
+        if kernel is None:
+            columns = [column.tolist() for column in columns]
+        mark(given, width, int(start[0]), int(start[1]), *columns, clear)
         return clear.astype(bool)
 
     return walk
-
-
-def clear_lines(
-    occupied: Any, width: int, x: int, y: int, end_x: Any, end_y: Any, own: Any, clear: Any
-) -> None:
-    """Mark in `clear` each end whose line from (x, y) is free; `own` where its cell does not block."""
-    for k in range(len(end_x)):
-        if clear_line(occupied, width, x, y, end_x[k], end_y[k], own[k]):
-            clear[k] = 1
-
-
-def clear_line(occupied: Any, width: int, x: int, y: int, end_x: int, end_y: int, own: bool) -> bool:
-    """Bresenham's line over cells, row by row in `occupied`, until it ends or is blocked."""
-    dx, dy = abs(end_x - x), -abs(end_y - y)
-    step_x, step_y = 1 if end_x > x else -1, 1 if end_y > y else -1
-    error = dx + dy
-    while x != end_x or y != end_y:
-        if occupied[y * width + x]:
-            return False
-        twice = 2 * error
-        if twice >= dy:
-            error += dy
-            x += step_x
-        if twice <= dx:
-            error += dx
-            y += step_y
-    return own or not occupied[y * width + x]

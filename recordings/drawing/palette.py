@@ -32,9 +32,9 @@ class Meaning:
     colour: Colour
 
 
-SEEN = Meaning(10, "target: seen by a stop", SKY)
-UNSEEN = Meaning(11, "target: seen by no stop yet", (178, 180, 186, 255))
-HIDDEN = Meaning(12, "target: seen by no candidate", (88, 92, 100, 255))
+SEEN = Meaning(10, "target: covered by a stop", SKY)
+UNSEEN = Meaning(11, "target: covered by no stop yet", (178, 180, 186, 255))
+HIDDEN = Meaning(12, "target: visible from no candidate", (88, 92, 100, 255))
 NEW = Meaning(13, "target: new in this step", YELLOW)
 TARGET = Meaning(14, "target", ORANGE)
 ARRIVED = Meaning(40, "arrived", (255, 255, 255, 255))

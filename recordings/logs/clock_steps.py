@@ -47,7 +47,8 @@ def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
     back = np.flatnonzero(step < -STEP_NS)
     if len(back) > MOST_STEPS:
         return MendedTimes(ns, kept, tuple(lines[: bool(wrong)]))
-    steps = sorted([*back.tolist(), *_forward_steps(step, places, usual).tolist()])
+    forward = _forward_steps(step, places, usual).tolist()
+    steps = sorted({*back.tolist(), *forward, *_undone(step, back, usual)})
     lines += [
         f"the clock steps {'back' if step[k] < 0 else 'forward'} by {abs(step[k]) / 1e9:.1f} s "
         f"after pose {k + 1} of {len(times)}; times continue in the order of writing"
@@ -58,6 +59,15 @@ def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
     mended = ns.copy()
     mended[kept] = times
     return MendedTimes(mended, kept, tuple(lines[0 if wrong else 1 :]))
+
+
+def _undone(step: IntArray, back: IntArray, usual: int) -> list[int]:
+    """Return the steps forward that undo a step back before them: the clock was set right again."""
+    found = []
+    for k in back.tolist():
+        again = np.flatnonzero(np.abs(step + step[k]) <= max(STEP_NS, 10 * usual))
+        found += [m for m in again.tolist() if m > k and m not in found][:1]
+    return found
 
 
 def _alone(ns: IntArray, far_ns: int) -> BoolArray:

@@ -28,7 +28,6 @@ Raw = tuple[int, int, bytes]
 BAG_MAGIC = b"#ROSBAG V2.0\n"
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 SQLITE_MAGIC = b"SQLite format 3\0"
-ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
 class BagConnection(NamedTuple):

@@ -69,10 +69,10 @@ class RunsTogether:
         count = f"Together, the {len(self.runs)} runs scanned"
         left = f"Not scanned by any run: {named(self.left)}." if self.left else "No stop is left."
         if self.acquired is None:
-            return (f"{count} an unknown coverage; the plan's recording would tell it.", left)
+            return (f"{count} an unknown coverage; the plan's recording contains it.", left)
         whole = self.acquired.shares.whole
         least = "at least " if self.acquired.answer == "unknown" else ""
-        asked = "" if whole.required is None else f"; {percent(whole.required)} was asked"
+        asked = "" if whole.required is None else f"; {percent(whole.required)} was required"
         short = [share for share in self.acquired.shares.short if share is not whole]
         rooms = (f"Below the requirement: {named([share.name for share in short])}." for _ in short[:1])
         return (f"{count} {least}{percent(whole.coverage)} of what is visible{asked}.", *rooms, left)

@@ -73,7 +73,7 @@ def _plan_tiles(subject: ReportSubject) -> str:
     share = None if subject.sight is None else subject.sight.planned.whole
     visible = "" if share is None else f"{percent(share.visible_share)} of all is visible"
     tiles = [
-        tile("stops", str(len(mission.stops)), _bound(subject)),
+        tile("stops", str(len(mission.stops)), subject.results.bound_text),
         tile("coverage", percent(None if share is None else share.coverage), visible),
         tile("route", f"{route_length(mission):.1f} m", "back to the start" if mission.return_ else "open"),
         tile("run time", duration(times.total_s), _least_time(subject, times.scan_s)),
@@ -81,15 +81,9 @@ def _plan_tiles(subject: ReportSubject) -> str:
     return tag("div", *tiles, class_="tiles")
 
 
-def _bound(subject: ReportSubject) -> str:
-    bound, over = (subject.results.get(name) for name in ("stops_bound", "stops_bound_over"))
-    among = f"of {over} " if over else ""  # without it, the bound is over the plan's candidates
-    return "" if bound is None else f"{among}at least {bound} are needed"
-
-
 def _least_time(subject: ReportSubject, scan_s: float) -> str:
     """Return a note: scanning time, and for a plan of least time its lower bound."""
-    bound, before = subject.results.get("least_time_bound_s"), subject.results.get("two_step_s")
+    bound, before = subject.results.least_time_bound_s, subject.results.two_step_s
     if bound is None or before is None:
         return f"of which scanning {duration(scan_s)}"
     return (
@@ -319,7 +313,7 @@ _ROWS = (
     ("run time", lambda run: _clock(run.driven_s)),
     ("greatest position error at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
     ("greatest cross-track error", _path_error),
-    ("path seen", lambda run: percent(run.sighted.fraction) if len(run.log.poses) else ""),
+    ("path recorded", lambda run: percent(run.sighted.fraction) if len(run.log.poses) else ""),
     ("stationary", lambda run: duration(run.seconds_in("PAUSED", "HELD"))),
 )
 """Rows of the table of runs."""

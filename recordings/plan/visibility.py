@@ -37,7 +37,7 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     )
     _plot_sight(canvas, visibility, index)
     visible = int(visibility.visible.sum())
-    text = f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any"
+    text = f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units visible from any"
     canvas.say(text, step=CANDIDATES)
 
 
@@ -46,7 +46,7 @@ def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) ->
     seen = visibility.units_seen * (100.0 / visible)
     sight = entities.CANDIDATE_COVERAGE
     canvas.columns(sight, index, rr.Scalars.columns(scalars=seen))
-    canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="seen by the candidate", widths=1))
+    canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="visible from the candidate", widths=1))
 
 
 def _rows_of_lines(

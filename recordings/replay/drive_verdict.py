@@ -111,10 +111,10 @@ def _coverage_sentences(sight: AsDriven) -> Iterator[str]:
 
 def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str]:
     if measured.placing_text:
-        yield f"What was measured cannot be told: {measured.placing_text}."
+        yield f"What was measured is undecided: {measured.placing_text}."
         return
     if not measured.misplaced_m:
-        yield "What was measured cannot be told: the clouds have too few points at the heights of walls."
+        yield "What was measured is undecided: the clouds have too few points at the heights of walls."
         return
     whole = measured.shares.whole
     for share in (whole, *(share for share in measured.shares.short if share is not whole)):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import NegativeResult
+from stopgo.mission.errors import Undecided
 from stopgo.mission.frames.rigid_fit import least_squares
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.geometry import FloatArray
@@ -52,27 +52,27 @@ def fitted(standstills: Sequence[Standstill], mission: Mission) -> Fit:
 
     Raises
     ------
-    NegativeResult
+    Undecided
         When too few standstills lie on stops, or another placing fits nearly as well.
     """
     stops = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
     positions = np.array([standstill.xy for standstill in standstills]).reshape(-1, 2)
     if min(len(stops), len(positions)) < LEAST_PAIRS:
-        raise NegativeResult(
+        raise Undecided(
             f"--align stops: {len(positions)} standstills and {len(stops)} stops are too few to match "
             f"({LEAST_PAIRS} of each are needed); give --map X,Y,HEADING or --align first"
         )
     tried = [_refined(guess, standstills, mission) for guess in _promising(positions, stops, mission)]
     found = sorted((item for item in tried if item is not None), key=lambda item: -item[0])
     if not found or found[0][1].pairs < LEAST_PAIRS:
-        raise NegativeResult(
+        raise Undecided(
             f"--align stops: no transform brings {LEAST_PAIRS} of the {len(positions)} standstills onto "
             "stops in the mission's order; check that the log is of this mission, or give --map X,Y,HEADING"
         )
     score, best = found[0]
     for other_score, other in found[1:]:
         if other_score > RIVAL * score and _apart(best, other, positions) > APART_M:
-            raise NegativeResult(
+            raise Undecided(
                 f"--align stops: ambiguous: {best.pairs} standstills fit the stops by one placing, "
                 f"{other.pairs} by another; give --map X,Y,HEADING or --align first"
             )
@@ -109,7 +109,8 @@ def _guesses(positions: FloatArray, stops: FloatArray) -> Iterator[Fit]:
             if length < NEAREST_M:
                 continue
             for k in range(len(positions)):
-                driven = positions[k + 1 : k + 1 + ahead] - positions[k]
+                others = [positions[max(0, k - ahead) : k], positions[k + 1 : k + 1 + ahead]]
+                driven = np.concatenate(others) - positions[k]
                 fits = np.abs(np.hypot(*driven.T) - length) <= SLACK_M + STRETCH * length
                 for step in driven[fits]:
                     turn = float(np.arctan2(planned[1], planned[0]) - np.arctan2(step[1], step[0]))

@@ -14,6 +14,7 @@ from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.mavlink.local_frame import is_other_site
+from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.run.run_log import Alignment, Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 from stopgo.recordings.logs.own import AT_EVENTS, SITE
@@ -28,6 +29,8 @@ FIRST_NS = 3 * 10**8
 """Time after a log's begin within which a first standstill gives a first pose without noise."""
 
 
+DIRECTION_M = 0.5
+"""Length of the path that gives the first direction of driving."""
 BY_EARTH = "georeference"
 EMPTY_TRACK = Track.of((), (), ())
 
@@ -43,6 +46,8 @@ class Placing:
     poses: str | None = None
     """Source of the poses."""
     robot: str | None = None
+    level_m: float | None = None
+    """Height of the mission's floor in the log's frame; None: its zero, or the mission's altitude."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +62,8 @@ class PlacedLog:
     """True if headings were measured; else they are the direction of driving."""
     truth: Track | None = None
     """True poses of the robot from a simulator."""
+    level_m: float | None = None
+    """Height of the mission's floor in the log's frame, as the user gave it."""
 
     @property
     def by_earth(self) -> bool:
@@ -76,7 +83,7 @@ def placed(log: FieldLog, mission: Mission, placing: Placing) -> PlacedLog:
     ------
     InputError
         When the log has no pose, several robots, or no transform to the mission frame.
-    NegativeResult
+    Undecided
         When its standstills fit the stops by no placing, or by several.
     """
     source = chosen(log, placing)
@@ -85,7 +92,7 @@ def placed(log: FieldLog, mission: Mission, placing: Placing) -> PlacedLog:
     offset = round(placing.time_offset_s * 1e9)
     moved = _moved(track, transform, offset)
     alignment = replace(transform, time_offset_ns=offset)
-    return PlacedLog(moved, alignment, source, turns, _truth(log, source, mission, offset))
+    return PlacedLog(moved, alignment, source, turns, _truth(log, source, mission, offset), placing.level_m)
 
 
 def chosen(log: FieldLog, placing: Placing) -> Poses:
@@ -175,9 +182,20 @@ def _first(track: Track, turns: bool, mission: Mission) -> Alignment:
     position, rotation_angle = tuple(track.xy[0].tolist()), float(track.heading[0])
     if standstills and standstills[0].begin_ns - int(track.ns[0]) <= FIRST_NS:
         position, rotation_angle = standstills[0].xy, standstills[0].heading
-    heading = math.remainder(mission.start.heading - rotation_angle, math.tau)
+    wanted = mission.start.heading
+    if not turns:  # the driving direction of the first leg is known in both
+        position, rotation_angle = tuple(track.xy[0].tolist()), _first_direction(track.xy)
+        wanted = _first_direction(np.array([point for leg in legs_of(mission) for point in leg]))
+    heading = math.remainder(wanted - rotation_angle, math.tau)
     transform = Transform.bringing(position, (mission.start.x, mission.start.y), heading)
     return Alignment.by(transform, "first pose at the mission's start", pairs=1)
+
+
+def _first_direction(xy: FloatArray) -> float:
+    """Return the direction from the first point to the first one at least DIRECTION_M away."""
+    away = np.flatnonzero(np.hypot(*(xy - xy[0]).T) >= DIRECTION_M)
+    to = xy[away[0] if len(away) else -1] - xy[0]
+    return math.atan2(to[1], to[0])
 
 
 def _of_fit(fit: Fit) -> Alignment:

@@ -75,10 +75,33 @@ def matched(
             break
         drift = _drift(readings, positions, stops)
     away = np.hypot(*(positions[:, None] - stops[None]).transpose(2, 0, 1))
+    readings = _with_late_visits(readings, away, standstills, mission)
     return tuple(
         Match(standstill, how, stop, float(row[row.argmin() if stop is None else stop]), int(row.argmin()))
         for standstill, (how, stop), row in zip(standstills, readings, away, strict=True)
     )
+
+
+def _with_late_visits(
+    readings: list[tuple[VisitKind, int | None]],
+    away: FloatArray,
+    standstills: Sequence[Standstill],
+    mission: Mission,
+) -> list[tuple[VisitKind, int | None]]:
+    """Return the readings in which extra standstills on stops that were not visited are their visits.
+
+    A run may take its stops in any order; `away` are the distances (standstills, stops).
+    """
+    found = list(readings)
+    visited = {stop for _, stop in found}
+    for k, (how, _) in enumerate(found):
+        near = int(away[k].argmin())
+        stop = mission.stops[near]
+        there = away[k, near] <= max(AGAIN_REACH_M, stop.tolerance_m) and long_enough(standstills[k], stop)
+        if how == "extra" and there and near not in visited:
+            found[k] = ("visit", near)
+            visited.add(near)
+    return found
 
 
 def _skips(

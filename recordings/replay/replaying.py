@@ -40,7 +40,7 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
     ------
     InputError
         When the log has no pose, cannot be placed, or is not of this mission.
-    NegativeResult
+    Undecided
         When `--align stops` finds no placing, or several.
     """
     placed_log = placed(log, mission, placing)

@@ -24,8 +24,14 @@ LEAST_S = 2.0
 """Shortest standstill."""
 JOIN_S, JOIN_M = 0.7, 0.3
 """Two standstills this near in time and position are one: the robot's position was corrected between them."""
+DENSE_S = 1.0
+"""Largest step between poses whose differences are noise."""
 EDGE_M, EDGE_RAD = 0.015, 0.03
 """Distance, besides noise, at which a robot has left its standstill, or not yet reached it."""
+JUMPED_NS, JUMP_EDGE_NS = 6 * 10**9, 10**9
+"""Longest time for which poses jump away, and time around it in which the steps are searched."""
+JUMP_M, JUMP_SPEEDS = 0.1, 3.0
+"""Length of a jump, and its speed as a multiple of the mission's."""
 BLIND_S, BLIND_M = 3.0, 0.15
 """Gap without poses, and distance across it, from which on the robot has moved meanwhile."""
 LARGEST_BINS = 5_000_000
@@ -76,6 +82,7 @@ def find_standstills(track: Track, *, speed: float = 0.5, turns: bool = True) ->
     stationary = _stationary(bins, speed=speed) & ~bins.blind
     found = [_refined_span(track, bins, *span) for span in _spans(stationary)]
     merged = _merged([span for span in found if span is not None], bins)
+    merged = _joined_over_jumps(merged, track, bins, speed=speed)
     standstills = (_standstill(track, bins, *span) for span in merged)
     return tuple(standstill for standstill in standstills if standstill.seconds >= LEAST_S)
 
@@ -123,7 +130,7 @@ class _Bins:
         filled = _without_spikes(
             np.stack([np.interp(every, occupied, column) for column in means.T], axis=-1)
         )
-        noise = _noise(means)
+        noise = _noise(means, occupied)
         blind = _blind(occupied, means[:, :2], step / 1e9, BLIND_M + SIGMAS * float(noise[:2].max()))
         return cls(int(track.ns[0]), step, filled[:, :2], filled[:, 2], noise, blind, turns)
 
@@ -152,11 +159,15 @@ def _blind(occupied: IntArray, xy: FloatArray, step_s: float, reach: float) -> B
     return blind
 
 
-def _noise(values: FloatArray) -> FloatArray:
-    """Return the standard deviation of each column (n, 3), from the median of second differences."""
-    if len(values) < 5:
+def _noise(values: FloatArray, occupied: IntArray) -> FloatArray:
+    """Return the standard deviation of each column (n, 3), from the median of second differences.
+
+    Of poses farther apart than DENSE_S, a difference is the robot's manoeuvre, and tells nothing of noise.
+    """
+    dense = occupied[2:] - occupied[:-2] <= 2 * DENSE_S / BIN_S
+    if dense.sum() < 3:
         return np.zeros(3)
-    second = np.abs(values[2:] - 2 * values[1:-1] + values[:-2])
+    second = np.abs(values[2:] - 2 * values[1:-1] + values[:-2])[dense]
     return np.asarray(1.4826 * np.median(second, axis=0) / np.sqrt(6.0))
 
 
@@ -235,6 +246,39 @@ def _merged(spans: list[tuple[int, int]], bins: _Bins) -> list[tuple[int, int]]:
                 continue
         merged.append((begin, end))
     return merged
+
+
+def _joined_over_jumps(
+    spans: list[tuple[int, int]], track: Track, bins: _Bins, *, speed: float
+) -> list[tuple[int, int]]:
+    """Join standstills at one position between which the poses jump away and back, as no robot moves."""
+    joined: list[tuple[int, int]] = []
+    for begin, end in spans:
+        for k in range(len(joined) - 1, -1, -1):
+            since, until = joined[k]
+            if begin - until > JUMPED_NS:
+                break
+            near = math.dist(_middle(bins, begin, end), _middle(bins, since, until)) <= float(bins.reach[0])
+            if near and _jumps_between(track, until, begin, speed=speed):
+                joined[k:] = [(since, max(end, until))]
+                break
+        else:
+            joined.append((begin, end))
+            continue
+        if joined[-1][1] < end:
+            joined.append((begin, end))
+    return joined
+
+
+def _jumps_between(track: Track, begin_ns: int, end_ns: int, *, speed: float) -> bool:
+    """True if the poses between two times begin and end with a step much faster than the robot drives."""
+    around = track.between(begin_ns - JUMP_EDGE_NS, end_ns + JUMP_EDGE_NS)
+    if len(around) < 3:
+        return False
+    step = np.hypot(*np.diff(around.xy, axis=0).T)
+    moving = np.flatnonzero(step > JUMP_M)
+    fast = step > np.maximum(JUMP_M, JUMP_SPEEDS * speed * np.diff(around.ns) / 1e9)
+    return len(moving) >= 2 and bool(fast[moving[0]] and fast[moving[-1]])
 
 
 def _middle(bins: _Bins, begin_ns: int, end_ns: int) -> FloatArray:

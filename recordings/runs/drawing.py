@@ -33,6 +33,7 @@ from stopgo.mission.run.events import (
     StateReport,
     Unconfirmed,
 )
+from stopgo.mission.run.health_text import health_text
 from stopgo.mission.run.run_log import Track
 from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
 from stopgo.mission.stages.sight import Sight
@@ -78,6 +79,7 @@ class RunDrawing:
         self._acquired = AcquiredDrawing(sights[-1]) if sights else None
         self._thinner, self._trail, self._cross_track = Thinner(), Trail(), DelayedDeviation(mission)
         self._stops: dict[str, bool | None] = {}
+        self._vehicle_health: tuple[bool | None, ...] = (None, None, None)
         self._style()
         self._describe()
 
@@ -123,8 +125,19 @@ class RunDrawing:
         stop_state = "" if report.stop_state is None else report.stop_state
         self._at(self.names.flat(entities.STOP_STATE), rr.StateChange(state=stop_state), report.robot_ns)
         self._at(self.names.flat(entities.STOP), rr.StateChange(state=report.stop or ""), report.robot_ns)
-        battery = rr.Scalars(report.battery * 100)
-        self._at(self.names.metric(entities.METRIC_BATTERY), battery, report.robot_ns)
+        if report.battery is not None:
+            battery = rr.Scalars(report.battery * 100)
+            self._at(self.names.metric(entities.METRIC_BATTERY), battery, report.robot_ns)
+        self._note_vehicle_health(report)
+
+    def _note_vehicle_health(self, report: StateReport) -> None:
+        """Log the health of an autopilot's vehicle whenever it changes."""
+        health = (report.battery_ok, report.position_ok, report.fence_ok)
+        if health == self._vehicle_health:
+            return
+        self._vehicle_health = health
+        level = "WARN" if False in health else "INFO"
+        self._at(self.names.log, rr.TextLog(health_text(report), level=level), report.robot_ns)
 
     def missing(self, gap: PosesMissing) -> None:
         """Log how long the robot's position was unknown; its path ends before, and begins again after."""
@@ -202,6 +215,8 @@ class RunDrawing:
             "mission_name": self.mission.name,
             "revision": self.mission.revision,
             "digest": self.mission.digest,
+            "floor": self.mission.origin.floor,
+            "floor_digest": self.mission.origin.floor_digest,
             "planned_stops": len(self.mission.stops),
             "local_origin": list(self.canvas.origin),
         }

@@ -13,8 +13,8 @@ from stopgo.bridge.commands.conform_commands import conform_commands
 from stopgo.bridge.commands.doctor import doctor
 from stopgo.bridge.commands.key_commands import key_commands
 from stopgo.bridge.commands.mission_commands import clear, fetch_mission, push
-from stopgo.bridge.commands.order_commands import add_orders
 from stopgo.bridge.commands.robot_commands import robot
+from stopgo.bridge.commands.run_control_commands import add_run_control
 from stopgo.bridge.commands.session_command import session
 from stopgo.bridge.commands.simulate_commands import simulate_commands
 from stopgo.bridge.commands.tunnel_commands import tunnel_commands
@@ -34,7 +34,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command("fetch-mission")(fetch_mission)
     app.command()(clear)
     app.command()(doctor)
-    add_orders(app)
+    add_run_control(app)
     app.command()(session)
     app.command()(watch_command(recording))
     app.add_typer(simulate_commands(), name="simulate")

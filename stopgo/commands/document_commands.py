@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stopgo.bridge.commands.bridge_options import ItemTrigger, ScanWaiting, Settling
 from stopgo.commands.align_command import align
 from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
@@ -186,31 +187,6 @@ AutopilotOption = Annotated[
 
 
 FormatOption = Annotated[str | None, typer.Option(metavar="FORMAT", help=FORMAT_NAMES)]
-TriggerOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="auto|script|camera|none",
-        rich_help_panel="MAVLink vehicle",
-        help="Item that makes the vehicle scan.",
-    ),
-]
-ScanWaitOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="delay|script_time",
-        rich_help_panel="MAVLink vehicle",
-        help="Wait the planned time, or until a script reports.",
-    ),
-]
-SettleOption = Annotated[
-    str | None,
-    typer.Option(
-        "--settle-item",
-        metavar="delay|hold",
-        rich_help_panel="MAVLink vehicle",
-        help="Settle in a delay item, or as the hold of a waypoint.",
-    ),
-]
 MapOption = Annotated[
     str | None,
     typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: rotate by HEADING, then shift."),
@@ -226,9 +202,9 @@ def export(
         Path | None, typer.Option("--coverage-file", help="coverage.json, to draw covered targets.")
     ] = None,
     autopilot: AutopilotOption = None,
-    trigger: TriggerOption = None,
-    scan_wait: ScanWaitOption = None,
-    settle: SettleOption = None,
+    trigger: ItemTrigger = None,
+    scan_wait: ScanWaiting = None,
+    settle: Settling = None,
     origin: OriginOption = None,
     map_: MapOption = None,
     as_json: AsJson = False,

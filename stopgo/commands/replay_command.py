@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,6 +54,14 @@ ReplayAlign = Annotated[
         metavar="first|stops",
         rich_help_panel="Position of the log",
         help="first: the log begins at the start; stops: fit standstills to stops.",
+    ),
+]
+ReplayHeight = Annotated[
+    float | None,
+    typer.Option(
+        rich_help_panel="Position of the log",
+        metavar="METRES",
+        help="Height of the mission's floor in the log's frame.",
     ),
 ]
 ReplayTimeOffset = Annotated[
@@ -122,6 +130,7 @@ def replay(
     map_: ReplayMap = None,
     align: ReplayAlign = None,
     time_offset: ReplayTimeOffset = 0.0,
+    floor_height: ReplayHeight = None,
     poses: ReplayPoses = None,
     robot_name: ReplayRobot = None,
     stamps: ReplayStamps = "header",
@@ -148,7 +157,7 @@ def replay(
     files = _ReplayFiles(logs, mission or [], floor, clouds, out, csv, top_up, html, plan)
     files.check()
     driven = _missions(mission or [], read)
-    placing = _placing(map_, align, time_offset, poses, robot_name)
+    placing = replace(_placing(map_, align, time_offset, poses, robot_name), level_m=_height(floor_height))
     plans = None if plan is None else _plans(plan, driven[0])
     replays = files.compare_and_write(_replays(read, driven, placing, plans), plans, driven)
     _print_replays(replays, as_json=json_)
@@ -224,7 +233,7 @@ class _ReplayFiles:
         if self.out is not None:
             from stopgo.recordings.replay.drawing import write_recording
 
-            write_recording(replays, self.out)
+            write_recording(replays, self.out, None if plans is None else plans.recordings[0].recording)
         if self.csv is not None:
             write_atomic(self.csv, as_csv(replays[0]))
         if self.html is not None:
@@ -303,6 +312,12 @@ def _placing(
         raise InputError(f"--align {align}: must be first or stops")
     to_map = None if map_ is None else map_transform(map_)
     return Placing(to_map, known[align], time_offset, poses, robot)
+
+
+def _height(level: float | None) -> float | None:
+    if level is not None and not (math.isfinite(level) and abs(level) < 1e5):
+        raise InputError(f"--floor-height {level}: must be a height in metres")
+    return level
 
 
 def _plans(path: Path, mission: Mission) -> Review:

@@ -39,8 +39,8 @@ from stopgo.mission.document import (
     sealed,
 )
 from stopgo.mission.run.events import StateReport
-from stopgo.mission.run.orders import Answer, Order, Verb
 from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.run_commands import Answer, RunCommand, Verb
 from stopgo.mission.run.states import Run
 
 EXACT = Wear(noise_m=0.0, noise_rad=0.0, battery_per_s=0.0)
@@ -135,9 +135,9 @@ class Field:
     def order(self, verb: Verb, **details: Any) -> Answer:
         return self.controller.execute(self.command(verb, **details))
 
-    def command(self, verb: Verb, **details: Any) -> Order:
+    def command(self, verb: Verb, **details: Any) -> RunCommand:
         given = {"cmd_id": f"c{next(self.ids)}", "commander": "test", "valid_for_s": 5.0} | details
-        return Order(verb=verb, **({"issued_ns": self.clock.now_ns()} | given))
+        return RunCommand(verb=verb, **({"issued_ns": self.clock.now_ns()} | given))
 
     def work(self, *, most: int = 500) -> int:
         """Let the robot work until there is nothing to do; how many pieces of work that were."""

@@ -32,7 +32,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
 from stopgo.mission.run.lease import lasting_ns
-from stopgo.mission.run.orders import Answer, Verb
+from stopgo.mission.run.run_commands import Answer, Verb
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor

@@ -18,7 +18,7 @@ from stopgo.bridge.link.link import Request
 from stopgo.bridge.link.protocol import encode
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import Event, Finished, Scanned, Started
-from stopgo.mission.run.orders import Answer, Order, Verb
+from stopgo.mission.run.run_commands import Answer, RunCommand, Verb
 from stopgo.mission.run.states import Run
 from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
@@ -89,7 +89,7 @@ class Trial:
             self.insist(lambda request=request: self.field.inbox.receive(request))  # type: ignore[misc]
 
     def order(self, verb: Verb) -> Answer:
-        command: Order = self.field.command(verb)
+        command: RunCommand = self.field.command(verb)
         return self.insist(lambda: self.field.controller.execute(command))
 
     def finish(self) -> None:

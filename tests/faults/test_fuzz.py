@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stopgo.bridge.link.protocol import Malformed, Reply, encode
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.run_commands import RunCommand
 from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
@@ -125,7 +125,7 @@ def test_no_payload_on_any_key_brings_the_robot_down() -> None:
 def test_a_command_on_the_key_of_another_verb_is_malformed() -> None:
     field = Field()
     station = field.station()
-    command = Order(cmd_id="c", verb="abort", commander="x", issued_ns=0, valid_for_s=1.0)
+    command = RunCommand(cmd_id="c", verb="abort", commander="x", issued_ns=0, valid_for_s=1.0)
     reply = station.link.ask(field.keys.command("pause"), encode(command), timeout_s=1)
     assert reply is not None
     assert isinstance(msgspec.json.decode(reply, type=Reply), Malformed)

@@ -31,7 +31,7 @@ from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.run_commands import FREE_VERBS, RunCommand, Verb
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
 from tests.ports import free_port
@@ -129,7 +129,7 @@ def reached(
         )
 
 
-def give(station: Station, order: Order, outcome: Outcome) -> bool:
+def give(station: Station, order: RunCommand, outcome: Outcome) -> bool:
     """Give the order twice, each time until it is answered; whether it was carried out."""
     outcome.orders += 1
     carried_out = []
@@ -143,14 +143,8 @@ def give(station: Station, order: Order, outcome: Outcome) -> bool:
     return carried_out[0]
 
 
-def drive(station: Station, chance: random.Random, outcome: Outcome) -> int:
-    """Start, pause and resume until the run is finished; how many pauses were carried out."""
-    begin(station, outcome)
-    return see_through(station, chance, outcome, pauses=0.15)
-
-
 def begin(station: Station, outcome: Outcome) -> None:
-    """Order the start; anew if the robot was started anew in between, which refuses the old order."""
+    """RunCommand the start; anew if the robot was started anew in between, which refuses the old order."""
     while not give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome):
         assert stubbornly(station.status, outcome).state == "READY"
 
@@ -170,10 +164,27 @@ def see_through(station: Station, chance: random.Random, outcome: Outcome, *, pa
         time.sleep(0.05)
 
 
-def faults_of(chance: random.Random) -> list[str]:
+@dataclass(frozen=True)
+class Severity:
+    """How many kills a trial has, and how soon after a boot they come."""
+
+    crashes: tuple[int, int] = (0, 3)
+    """Least and greatest number of boots that die at a journal entry."""
+    entries: int = ENTRIES
+    """Entry of a boot at which it dies at the latest."""
+    timers: tuple[int, int] = (0, 2)
+    """Least and greatest number of kills at random times."""
+    pauses: float = 0.15
+
+
+USUAL = Severity()
+HARSH = Severity(crashes=(4, 8), entries=12, timers=(1, 3), pauses=0.4)
+
+
+def faults_of(chance: random.Random, severity: Severity) -> list[str]:
     """Crashes at journal entries for the first boots."""
-    kinds = [chance.choice(["crash", "crashed"]) for _ in range(chance.randint(0, 3))]
-    return [f"{kind}@{chance.randint(1, ENTRIES)}" for kind in kinds]
+    kinds = [chance.choice(["crash", "crashed"]) for _ in range(chance.randint(*severity.crashes))]
+    return [f"{kind}@{chance.randint(1, severity.entries)}" for kind in kinds]
 
 
 @dataclass(frozen=True)
@@ -196,18 +207,21 @@ def guarded(folder: Path) -> Site:
     return Site("tls", ("--keys", str(robot.folder)), station.folder)
 
 
-def trial(seed: int, folder: Path, site: Site = OPEN) -> Outcome:
+def trial(seed: int, folder: Path, site: Site = OPEN, severity: Severity = USUAL) -> Outcome:
+    """Start, pause and resume until the run is finished, with kills at any time; check what is left of it."""
     chance, outcome = random.Random(seed), Outcome()
     endpoint = f"{site.protocol}/127.0.0.1:{free_port()}"
-    with Supervisor(folder, faults_of(chance), endpoint, extra=site.robot) as supervisor:
+    with Supervisor(folder, faults_of(chance, severity), endpoint, extra=site.robot) as supervisor:
         timers = [
-            threading.Timer(chance.uniform(0.1, 3.0), supervisor.kill) for _ in range(chance.randint(0, 2))
+            threading.Timer(chance.uniform(0.1, 3.0), supervisor.kill)
+            for _ in range(chance.randint(*severity.timers))
         ]
         for timer in timers:
             timer.start()
         with reached(endpoint, outcome, keys=site.station) as station:
             stubbornly(lambda: station.push(mission()), outcome)
-            paused = drive(station, chance, outcome)
+            begin(station, outcome)
+            paused = see_through(station, chance, outcome, pauses=severity.pauses)
         for timer in timers:
             timer.cancel()
         outcome.kills = supervisor.kills
@@ -285,6 +299,19 @@ def test_kills_of_a_robot_with_keys_lose_nothing_and_repeat_nothing(tmp_path: Pa
 def test_kills_while_a_revision_waits_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
     seeds = range(size(short=2, full=100))
     count([trial_of_a_revision(seed, tmp_path / str(seed)) for seed in seeds])
+
+
+@pytest.mark.parametrize("at_s", [1.0, 30.0])
+@pytest.mark.parametrize("verb", FREE_VERBS)
+def test_a_kill_between_any_two_steps_of_a_stop_leaves_a_robot_that_stands(
+    tmp_path: Path, verb: Verb, at_s: float
+) -> None:
+    """While it drives, and while it scans."""
+    every = str(size(short=60, full=1))
+    command = [sys.executable, "-m", "tests.faults.killed_stop", str(tmp_path), verb, str(at_s), every]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert int(result.stdout.split()[1]) >= size(short=5, full=300)
 
 
 @pytest.mark.parametrize("seed", range(size(short=2, full=40)))

@@ -24,7 +24,7 @@ from stopgo.bridge.station import station as stations
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.decision import STATES
 from stopgo.mission.run.events import Scanned, Started, StateReport
-from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Verb
+from stopgo.mission.run.run_commands import FREE_VERBS, Answer, RunCommand, Verb
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
@@ -133,7 +133,7 @@ def impostor(field: GuardedField, name: str) -> None:
     def answered(request: Request) -> bytes:
         verb = request.key.rpartition("/")[2]
         if "/cmd/" in request.key:
-            order = msgspec.json.decode(request.payload, type=Order)
+            order = msgspec.json.decode(request.payload, type=RunCommand)
             lie = Answer(
                 cmd_id=order.cmd_id, verb=verb, outcome="ok", reason=None, message="", run_id="x",
                 state="RUNNING",

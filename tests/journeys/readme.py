@@ -9,9 +9,12 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from pathlib import Path
 
+import pytest
+
+from tests.called import stopgo
 from tests.ports import free_port
 
 ROOT = Path(__file__).parents[2]
@@ -42,24 +45,17 @@ def workplace() -> Iterator[Path]:
 
 
 def arguments(command: str, endpoint: str) -> list[str]:
-    """The command with this interpreter's stopgo, and another endpoint than the README's."""
+    """The command's arguments, with another endpoint than the README's."""
     words = [endpoint if word == ENDPOINT else word for word in shlex.split(command)]
     assert words[0] == "stopgo", command
-    return [sys.executable, "-m", "stopgo", *words[1:]]
+    return words[1:]
 
 
 def run(command: str, folder: Path, endpoint: str = ENDPOINT) -> subprocess.CompletedProcess[str]:
-    """Run one command in the folder to its end."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "110"}
-    return subprocess.run(
-        arguments(command, endpoint),
-        check=False,
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    """Run one command in the folder to its end, in this process: no library is loaded again."""
+    with chdir(folder), pytest.MonkeyPatch.context() as patched:
+        patched.setenv("COLUMNS", "110")
+        return stopgo(*arguments(command, endpoint))
 
 
 @contextmanager
@@ -67,8 +63,9 @@ def robot(command: str, folder: Path, endpoint: str) -> Iterator[subprocess.Pope
     """The README's robot, from its first word until the block ends."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
-        arguments(command, endpoint), cwd=folder, env=environment, stderr=subprocess.PIPE, text=True
-    )
+        [sys.executable, "-m", "stopgo", *arguments(command, endpoint)],
+        cwd=folder, env=environment, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
     assert process.stderr is not None
     try:
         for line in process.stderr:

@@ -1,4 +1,4 @@
-"""The planner's small floors are looked over by the compiled kernel, which one process loads but once."""
+"""The planner's tests run compiled kernels; in the long form the interpreted ones."""
 
 from __future__ import annotations
 
@@ -6,21 +6,14 @@ from collections.abc import Iterator
 
 import pytest
 
-import stopgo.planner.visibility.sight.sight
-from tests.alone import first_alone
 from tests.faults.sizes import FULL
-from tests.planner.worlds import hall, planned
+from tests.planner.kernels import interpret
 
 
 @pytest.fixture(scope="package", autouse=True)
-def _compiled() -> Iterator[None]:
-    """One worker compiles it for all.
-
-    In the long form small floors are left to the interpreted one; that both agree has tests of its own.
-    """
+def _speed() -> Iterator[None]:
+    """That both speeds agree has tests of its own."""
     with pytest.MonkeyPatch.context() as patch:
-        if not FULL:
-            patch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", -1)
-            with first_alone("kernel"):
-                planned(hall())
+        if FULL:
+            interpret(patch)
         yield

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import shapely
 
-import stopgo.planner.visibility.sight.sight
 from stopgo.planner.geometry.shapes import GRID
+from tests.planner.kernels import interpret
 from tests.planner.visibility.sight.test_sight import World
 
 RANGES = (2.5, 5.0, 10.0, 30.0, 60.0, 100.0)
@@ -30,9 +30,9 @@ def told(seed: int, *, reach: float, places: int, monkeypatch: pytest.MonkeyPatc
     """Let both kernels tell what is seen on one floor, and hold them against exact sight lines."""
     world = long_walls(seed, reach=reach, places=places)
     truth = world.by_force(reach)
-    wrong = []
-    for above in (-1, math.inf):
-        monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", above)
+    wrong = [int((world.by_kernel(reach) != truth).sum())]
+    with monkeypatch.context() as patch:
+        interpret(patch)
         wrong.append(int((world.by_kernel(reach) != truth).sum()))
     return Observed(_looked_at(world, reach), *wrong)
 

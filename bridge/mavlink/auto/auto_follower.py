@@ -64,7 +64,7 @@ from stopgo.mission.mavlink.following.steps import (
     tried_again,
 )
 from stopgo.mission.mavlink.following.vehicle_status import CLOCKS
-from stopgo.mission.mavlink.telemetry import Message, has_restarted
+from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Arrived
 from stopgo.mission.run.states import Change, Run
@@ -95,6 +95,8 @@ class AutoFollower:
         self._due = threading.Event()
         """Set when `act` has something to do."""
         self._compare_due = threading.Event()
+        self._in_doubt = False
+        """True if the vehicle may have been restarted, or its reports are late; the next ones show which."""
         self.looking = False
         """False until all state of the vehicle that can be requested is known."""
         self._left: tuple[tuple[str, int, int], int] | None = None
@@ -145,16 +147,27 @@ class AutoFollower:
 
     def _check_clock(self) -> None:
         """Reset the run of a vehicle that was restarted: it stopped, and lost its mode, origin and item."""
-        began_ns, before_ms = self._observer.status.began_ns, self._book.boot_ms
-        self._book.boot_ms = self._observer.status.boot_ms
-        went_back = has_restarted(before_ms, self._book.boot_ms)
-        if self._looks_only or began_ns is None or not self._book.booted(began_ns, went_back=went_back):
+        clock = self._observer.status.clock
+        if clock is None:
+            return
+        boot_ms = self._observer.status.boot_ms
+        if self._looks_only:
+            self._book.boots.boot_ms = boot_ms
+            return
+        verdict = self._book.boots.take(clock.ns, boot_ms)
+        self._in_doubt = verdict == "in doubt"
+        if verdict != "restarted":
             return
         self._commands.ask_for_telemetry()
         self.run = self._book.move(_rebooted)
 
     def _busy(self) -> bool:
-        """True while the vehicle gets a command: its behaviour until then means nothing for the run."""
+        """True while the vehicle gets a command, or may have been restarted.
+
+        Its behaviour until that is known means nothing for the run.
+        """
+        if self._in_doubt:
+            return True
         ordered, pending = self._book.ordered, self._book.pending
         if pending is not None:
             self._due.set()

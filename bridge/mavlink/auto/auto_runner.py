@@ -8,15 +8,17 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from stopgo.bridge.console import say
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
 from stopgo.bridge.mavlink.auto.list_guard import UPLOAD_MESSAGES
 from stopgo.bridge.mavlink.auto.logbook import Logbook
-from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
+from stopgo.bridge.mavlink.auto.vehicle_commands import Consent, VehicleCommands
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue
+from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.runner import Position
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import RobotUnreachable
@@ -24,7 +26,7 @@ from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.following.observer import USED_MESSAGES, Observer
 from stopgo.mission.mavlink.following.steps import run_on_vehicle
 from stopgo.mission.mavlink.telemetry import Message, is_lost
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run
 
 TICK_S = 0.2
@@ -61,7 +63,7 @@ class AutoRunner:
         looks_only: bool = False,
         stands: bool = False,
     ) -> None:
-        """`stands` as for `VehicleOrders`."""
+        """`stands` as for `VehicleCommands`."""
         self.changed: Callable[[], None] = lambda: None
         self._peer = peer
         self._book = book
@@ -69,10 +71,13 @@ class AutoRunner:
         self._looks_only = looks_only
         self._observer = Observer(peer.autopilot)
         self._commands = ConfirmedCommands(peer, self._observer, book.clock)
-        self._orders = VehicleOrders(book, peer, self._observer, self._commands, wall, consent, stands=stands)
+        self._vehicle_commands = VehicleCommands(
+            book, peer, self._observer, self._commands, wall, consent, stands=stands
+        )
         self._follower = AutoFollower(book, peer, self._observer, self._commands, looks_only=looks_only)
         self.works: tuple[Callable[[], None], ...] = (self._look, self._act, self._follower.guard)
         self._reported_ns = 0
+        self._late = False
         self._closing = threading.Event()
         self._observer.take(peer.heartbeat, book.listed, book.clock.now_ns())
 
@@ -92,12 +97,16 @@ class AutoRunner:
         self._reported_ns = fix.ns
         return Position(fix.pose, fix.speed, fix.ns)
 
-    def battery(self) -> float:
-        return self._observer.status.battery
+    def battery(self) -> float | None:
+        return self._observer.status.health.charge
 
-    def execute(self, order: Order) -> Answer:
+    def health(self) -> BaseHealth:
+        now = self._observer.status.health
+        return BaseHealth(battery_ok=now.battery, position_ok=now.position, fence_ok=now.fence)
+
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command; raises `OutcomeUnknown` if the vehicle does not show its effect."""
-        answer = self._orders.execute(order)
+        answer = self._vehicle_commands.execute(order)
         self._follower.run = self._book.run
         self.changed()
         return answer
@@ -150,9 +159,17 @@ class AutoRunner:
                     self._commands.ask_for_telemetry()
                 self._take_next(waiting)
 
+    def _is_late(self) -> bool:
+        """True while the link delivers the vehicle's reports so late that they do not show its state."""
+        late_s = 0.0 if self._looks_only else self._book.boots.late_s
+        was_late, self._late = self._late, is_lost(late_s)
+        if self._late and not was_late:
+            say(f"{self._peer}: the link delivers its reports {late_s:.0f} s late; they count as no data")
+        return self._late
+
     def _take_next(self, waiting: MessageQueue) -> None:
         message = waiting.get(TICK_S)
-        self._board.cut = is_lost(self._peer.silent_s)  # then nothing answers for it
+        self._board.cut = is_lost(self._peer.silent_s) or self._is_late()  # then nothing answers for it
         if message is None:
             return
         if message.get_type() in UPLOAD_MESSAGES:

@@ -13,7 +13,7 @@ from stopgo.mission.mavlink.autopilots.kind import HOLD, Autopilot
 from stopgo.mission.mavlink.enums import CommandResult, MessageId
 from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.telemetry import Message, global_speed, local_speed, stands_still
-from stopgo.mission.run.orders import Refused
+from stopgo.mission.run.run_commands import Refused
 
 REPORTS_S = 1.0
 """Interval of the reports while the vehicle still drives."""

@@ -20,7 +20,7 @@ from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
 from stopgo.mission.mavlink.enums import CommandResult, MessageId
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.items import Command
-from stopgo.mission.run.orders import Refused
+from stopgo.mission.run.run_commands import Refused
 
 SHOWS_S = 5.0
 """Longest wait for the effect of a command; a vehicle sends a heartbeat every second."""
@@ -34,6 +34,10 @@ REPEATED_HZ = {
     MessageId.GLOBAL_POSITION_INT: 2.0,
     MessageId.ATTITUDE: 10.0,
     MessageId.SYS_STATUS: 1.0,
+    MessageId.BATTERY_STATUS: 0.5,
+    MessageId.EKF_STATUS_REPORT: 1.0,
+    MessageId.ESTIMATOR_STATUS: 1.0,
+    MessageId.FENCE_STATUS: 1.0,
     MessageId.GPS_GLOBAL_ORIGIN: 0.5,
 }
 """Wanted rate of each message, in Hz; so a lost one is followed by another."""

@@ -9,6 +9,7 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
 from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
+from stopgo.mission.mavlink.following.progress_watch import STALLED_S
 from stopgo.mission.mavlink.following.steps import SOMEBODY, Observation
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.states import Change, Run
@@ -34,8 +35,42 @@ class ExternalChanges:
             return None
         if self._guard.difference(listed, run):  # then no mode of the vehicle lets the run go on
             return self.changed_list(run, listed)
-        return self._begun_elsewhere(run, listed, observed) or progress.taken_over(
-            run, listed, observed, by=self._by(observed)
+        return (
+            self._begun_elsewhere(run, listed, observed)
+            or progress.taken_over(run, listed, observed, by=self._by(observed))
+            or self._set_back(run, listed, observed)
+            or self._stalled(run, listed, observed)
+        )
+
+    def _set_back(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+        """Hold the run of a vehicle whose item somebody has set back, to a leg that lies behind the run's."""
+        if run.state != "RUNNING" or not observed.drives or run.at >= len(listed.stops):
+            return None
+        position = self._observer.position
+        if observed.place >= listed.stops[min(run.leg, run.at)].first or not position.went_back:
+            return None
+        if not self._guard.is_ours(listed, position.since_ns):
+            self._guard.want()  # another list, perhaps: that is said first
+            return None
+        stop = listed.sent.placed[observed.place].stop
+        to = f" (to {stop}, which is behind)" if stop else ""
+        return runs.held(
+            run,
+            f"{self._by(observed)} has set the vehicle's current item back to"
+            f" {listed.sequence(observed.place)}{to}; retry drives on to {listed.stops[run.at].stop}",
+        )
+
+    def _stalled(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+        """Hold the run of a vehicle that stands, although its mode, its item and no command explain it."""
+        stalled_s = self._observer.progress.stalled_s(listed)
+        if run.state not in ("RUNNING", "HOMING") or not observed.drives or stalled_s < STALLED_S:
+            return None
+        stop = listed.sent.placed[observed.place].stop
+        return runs.held(
+            run,
+            f"the vehicle has stood in AUTO for {stalled_s:.0f} s at item {listed.sequence(observed.place)}"
+            f"{f' (to {stop})' if stop else ''}: it neither drives nor turns, and no wait explains it;"
+            " see what stops it, then retry",
         )
 
     def changed_list(self, run: Run, listed: ListedMission) -> Change | None:

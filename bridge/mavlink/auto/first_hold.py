@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from stopgo.bridge.mavlink.auto.logbook import Logbook, logbook, recorded_vehicles
-from stopgo.bridge.mavlink.auto.vehicle_orders import ORDERING_NS, ordered_by
+from stopgo.bridge.mavlink.auto.vehicle_commands import ORDERING_NS, ordered_by
 from stopgo.bridge.mavlink.vehicle_link.messages import command_long, request
 from stopgo.bridge.mavlink.vehicle_link.peer import AGAIN_S, is_of_autopilot
 from stopgo.bridge.mavlink.vehicle_link.url import Url
@@ -23,7 +23,7 @@ from stopgo.mission.mavlink.autopilots.kind import ROVERS, Mode
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.run.orders import Verb
+from stopgo.mission.run.run_commands import Verb
 
 
 class FirstHold:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -21,6 +20,7 @@ import msgspec
 
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
+from stopgo.bridge.mavlink.auto.vehicle_boots import VehicleBoots
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import shared_journal
@@ -29,13 +29,9 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.following.capture_reports import ScanFile
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
-from stopgo.mission.mavlink.telemetry import BACK_MS
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Aborted, Scanned
 from stopgo.mission.run.states import Change, Run
-
-REBOOT_NS = 5 * 10**9
-"""Shift of the begin of a vehicle's clock that means a restart."""
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True):
@@ -51,14 +47,6 @@ class PackedItems(msgspec.Struct, frozen=True):
     """An `ItemList` as msgpack, which knows NaN."""
 
     packed: bytes
-
-
-class Boot(msgspec.Struct, frozen=True, kw_only=True):
-    """The vehicle's last boot."""
-
-    boot_id: str
-    began_ns: int
-    """Its latest possible time, by the station's clock."""
 
 
 class Ordered(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,8 +87,7 @@ class Logbook:
         self.journal = journal
         self.robot = robot
         self.clock = clock
-        self.boot_ms = 0
-        """The vehicle's time since its start, as last reported."""
+        self.boots = VehicleBoots(journal)
         self.own_order: Ordered | None = None
         """The command that this process carries out; it counts before the journal has it."""
         self._listed: tuple[Sent, ListedMission] | None = None
@@ -139,23 +126,8 @@ class Logbook:
 
     @property
     def boot_id(self) -> str:
-        boot = self.journal.fact("boot", Boot)
-        return boot.boot_id if boot else "unknown"
-
-    def booted(self, began_ns: int, *, went_back: bool = False) -> bool:
-        """Note the begin of the vehicle's clock; true if the vehicle was restarted since the last look.
-
-        A clock that went back needs a smaller shift.
-        """
-        boot, slack_ns = self.journal.fact("boot", Boot), BACK_MS * 10**6 if went_back else REBOOT_NS
-        if boot is not None and boot.began_ns <= began_ns <= boot.began_ns + slack_ns:
-            return False
-        with self.journal.transaction():
-            boot = self.journal.fact("boot", Boot)
-            restarted = boot is None or began_ns > boot.began_ns + slack_ns
-            boot_id = uuid.uuid4().hex[:12] if boot is None or restarted else boot.boot_id
-            self.journal.store_fact("boot", Boot(boot_id=boot_id, began_ns=began_ns))
-        return restarted and boot is not None
+        """Id of the vehicle's last boot."""
+        return self.boots.boot_id
 
     def move(self, moved: Callable[[Run], tuple[Change, ...]], pending: PendingAfter | None = None) -> Run:
         """Store the changes of the run; `moved` computes them from the stored run.
@@ -178,7 +150,7 @@ class Logbook:
         now_ns, run, before = self.clock.now_ns(), change.run, self.run
         self.journal.store_change(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns)
         if run.run_id != before.run_id:
-            self.use(-1, self.boot_ms)
+            self.use(-1, self.boots.boot_ms)
         if run.state != before.state:
             self.journal.store_fact("changed", Moment(now_ns))
 

@@ -21,14 +21,14 @@ from stopgo.bridge.mavlink.auto.commanded_standstill import stand
 from stopgo.bridge.mavlink.auto.confirmed_commands import Denied
 from stopgo.bridge.mavlink.auto.first_hold import held_first, note_order
 from stopgo.bridge.mavlink.auto.logbook import logbook
-from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
+from stopgo.bridge.mavlink.auto.vehicle_commands import Consent
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import GROUND_STATION, Who, Wire, wire
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.station.station import Station, whoami
 from stopgo.mission.errors import NegativeResult
-from stopgo.mission.run.orders import Verb
+from stopgo.mission.run.run_commands import Verb
 
 COMPONENTS = range(25, 100)
 """Free for users (MAV_COMP_ID_USER1 to 75): by them a vehicle distinguishes processes of one station."""

@@ -12,10 +12,10 @@ from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who
 from stopgo.mission.document import Point
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.failsafes import RECENT_S, Failsafe, failsafe_of
+from stopgo.mission.mavlink.following.vehicle_health import HealthReports, VehicleHealth
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.telemetry import (
     Message,
-    charge_of,
     is_lost,
     local_speed,
     origin_of,
@@ -42,6 +42,9 @@ STREAMS = {
     "ATTITUDE": (MessageId.ATTITUDE, POSE_HZ),
     "BATTERY_STATUS": (MessageId.BATTERY_STATUS, 1),
     "SYS_STATUS": (MessageId.SYS_STATUS, 1),
+    "EKF_STATUS_REPORT": (MessageId.EKF_STATUS_REPORT, 1),
+    "ESTIMATOR_STATUS": (MessageId.ESTIMATOR_STATUS, 1),
+    "FENCE_STATUS": (MessageId.FENCE_STATUS, 1),
 }
 """Wanted messages by name: number of the message, times a second."""
 
@@ -55,6 +58,7 @@ class NewestMessages(MessageQueue):
         self._counts: Counter[str] = Counter()
         self._longest_s = 1.0 / POSE_HZ
         self._failsafe: tuple[float, Failsafe] | None = None
+        self.health = HealthReports()
 
     def put(self, message: Message) -> None:
         now_s = time.monotonic()
@@ -63,6 +67,7 @@ class NewestMessages(MessageQueue):
             gap_s = min(self.age_s(POSE[0]), LATEST_S)
             self._longest_s = max(gap_s, self._longest_s * FORGETS)
         self._newest[message.get_type()] = (now_s, message)
+        self.health.take(message.get_type(), message)
         failsafe = failsafe_of(message.text) if message.get_type() == "STATUSTEXT" else None
         if failsafe is not None:
             self._failsafe = (now_s, failsafe)
@@ -143,14 +148,9 @@ class AutopilotTelemetry:
             return False
         return stands_still(speed=local_speed(moved), yaw_rate=turned.yawspeed)
 
-    def battery(self) -> float | None:
-        """Charge from 0 to 1 as last reported, however old; `None` if there was no report."""
-        for name in ("BATTERY_STATUS", "SYS_STATUS"):
-            report = self._newest.newest(name)
-            charge = None if report is None else charge_of(report.battery_remaining)
-            if charge is not None:
-                return charge
-        return None
+    def health(self) -> VehicleHealth:
+        """Battery, position estimate, geofence and remote control, as last reported, however old."""
+        return self._newest.health.now
 
     def origin(self, since_s: float | None = None) -> VehicleOrigin | None:
         """Origin of its local frame; `None` if it has none, or did not report it since then (monotonic)."""

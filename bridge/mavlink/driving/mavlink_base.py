@@ -43,14 +43,13 @@ class MavlinkBase:
     def speed(self) -> float:
         return self._autopilot.telemetry.speed()
 
-    def battery(self) -> float:
-        """Charge as reported; full if the autopilot reports none, so its own failsafe is the only one."""
-        charge = self._autopilot.telemetry.battery()
-        return 1.0 if charge is None else charge
+    def battery(self) -> float | None:
+        """Charge as reported; `None` if the autopilot reports none: then its own failsafe is the only one."""
+        return self._autopilot.telemetry.health().charge
 
     def health(self) -> BaseHealth:
-        """Nothing: autopilots have no common messages for it."""
-        return BaseHealth()
+        now = self._autopilot.telemetry.health()
+        return BaseHealth(battery_ok=now.battery, position_ok=now.position, fence_ok=now.fence)
 
     def endurance_s(self) -> float | None:
         return None
@@ -76,7 +75,12 @@ class MavlinkBase:
         if self._autopilot.telemetry.origin() is None:
             return "the autopilot has no origin (GPS_GLOBAL_ORIGIN); set it to the mission's"
         wrong = "" if self._frame.mission is None else self.unfit(self._frame.mission)
-        return wrong or self._autopilot.control.other_control() or self._engagement.disarmed()
+        return (
+            wrong
+            or self._autopilot.control.other_control()
+            or self._autopilot.telemetry.health().lasting(self._blocked_by)
+            or self._engagement.disarmed()
+        )
 
     def blocked_by(self) -> str:
         return self._blocked_by

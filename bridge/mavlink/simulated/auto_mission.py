@@ -27,7 +27,7 @@ PLACES = recognised.PLACES | {STAYS}
 NAV = PLACES | WAITS | {HOMES}
 """Commands that take time; every other one is done at once or skipped."""
 AutoState = Literal["idle", "active", "complete"]
-AutoPhase = Literal["driving", "holding", "waiting", "script", "lost", "rebooting"]
+AutoPhase = Literal["driving", "holding", "waiting", "script", "lost", "rebooting", "stuck"]
 
 
 @dataclass(frozen=True)
@@ -114,6 +114,8 @@ class AutoMission:
         now_ns, self.due_ns = self.due_ns, None
         if self._phase == "rebooting":
             self._events.reboot()
+        elif self._phase == "stuck" and self._item is not None:
+            self._drive(self._item, now_ns)
         elif self._phase == "driving" and (again_ns := self._rover.arrival_ns(now_ns)) is not None:
             self.due_ns = again_ns
         elif self._phase == "driving" and (hold_s := self._hold_s()) > 0:
@@ -170,6 +172,9 @@ class AutoMission:
             self._phase, self.due_ns = "lost", None
             why = "no global origin" if self._rover.origin is None else "too far away"
             return self._events.text(f"Item {self.current}: {why}")
+        if stuck := self._mishaps.once("stuck", self.current):
+            self._phase, self.due_ns = "stuck", now_ns + _ns(stuck.amount) if stuck.amount else None
+            return self._rover.brake(now_ns)
         finish = self._mishaps.due("finish", self.current)
         to_spare, heading = (finish.amount or 1.0, None) if finish else (0.0, self._heading(item))
         ends_ns = self._rover.drive(

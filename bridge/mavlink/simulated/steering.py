@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 from stopgo.bridge.mavlink.simulated.estimator import Estimate
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
@@ -67,24 +66,6 @@ class Course:
 
 Want = tuple[float, float]
 """Speed ahead and turn rate."""
-
-
-class Law(Protocol):
-    """Control law of one kind of autopilot."""
-
-    def set_out(self, straight: RunningStraight, here: Estimate) -> None:
-        """Begin a straight."""
-
-    def follow(self, straight: RunningStraight, here: Estimate, speed: float, dt: float) -> Want:
-        """Follow a straight to its end; sets `reached`."""
-
-    def steer(self, course: Course, here: Estimate) -> Want: ...
-
-    def reset(self) -> None:
-        """Forget the loops' past: they begin again."""
-
-    def output(self, want: Want, here: Estimate, dt: float) -> tuple[float, float]:
-        """Throttle and steering, within ±1 or beyond."""
 
 
 class ArduPilotLaw:

@@ -13,6 +13,7 @@ from stopgo.bridge.mavlink.simulated.camera import Camera
 from stopgo.bridge.mavlink.simulated.estimator import Estimate
 from stopgo.bridge.mavlink.simulated.exact_drive import ExactDrive
 from stopgo.bridge.mavlink.simulated.guided_target import GuidedTarget
+from stopgo.bridge.mavlink.simulated.lasting_failsafes import LastingFailsafes
 from stopgo.bridge.mavlink.simulated.parameters import Parameters, parameter_handlers
 from stopgo.bridge.mavlink.simulated.real_drive import RealDrive
 from stopgo.bridge.mavlink.simulated.rover import STANDING, Rover
@@ -95,6 +96,7 @@ class Vehicle:
         self.armed = False
         self.failsafe = False
         """True while it holds because setpoints were missing, and no command has come since."""
+        self.failsafes = LastingFailsafes(setup.faults)
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setup.state)
@@ -273,6 +275,7 @@ class Vehicle:
         self.auto.pause(self.now_ns)
         self.auto.reset()
         self.camera.reset(is_apart=self.camera_is_apart)
+        self.failsafes.reset()
         self.transfers.reset()
         self.streams = Streams(self._wall, self._makers)
         self.time.boot()
@@ -301,6 +304,7 @@ class Vehicle:
             self.reboot()
             self.time.prolong_silence(round(restart.amount * 1e9))
         for failsafe in self._mishaps.by("failsafe", up_s):
+            self.failsafes.begin(int(failsafe.amount), self.time.wall_ns)
             self.text(self.autopilot.failsafe_texts[int(failsafe.amount)])
             self.set_mode("hold")
 

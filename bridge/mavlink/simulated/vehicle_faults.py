@@ -12,7 +12,7 @@ from stopgo.mission.errors import InputError
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
     "beside", "finish", "scanner", "unsigned", "unplaced", "camera", "jump", "gap", "restart",
-    "failsafe", "lostpicture",
+    "failsafe", "lostpicture", "stuck",
 ]  # fmt: skip
 
 
@@ -49,6 +49,7 @@ FAULTS: dict[VehicleFaultKind, str] = {
     "restart": "N seconds after it was switched on, it reboots, and takes AMOUNT seconds more for that",
     "failsafe": "N seconds after it was switched on, a failsafe holds it; AMOUNT is the cause: 0 battery,"
     " 1 remote control, 2 ground station, 3 geofence, 4 crash, 5 position estimate",
+    "stuck": "on the path to item N it stands, in AUTO, for AMOUNT s (0: until AUTO is commanded again)",
     "lostpicture": "the report of scan N is not sent, unless a station requests it",
     "unplaced": "its origin came too soon: it reports it, but no position on earth (N means nothing)",
     "camera": "its scanner reports scans as a component of its own, 100 (N means nothing)",

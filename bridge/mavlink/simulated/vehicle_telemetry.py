@@ -38,9 +38,11 @@ def heartbeat(vehicle: Vehicle) -> Message:
 
 def sys_status(vehicle: Vehicle) -> Message:
     sensors = dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO | dialect.MAV_SYS_STATUS_SENSOR_GPS
+    sensors |= vehicle.failsafes.enabled
+    bad = vehicle.failsafes.enabled & ~vehicle.failsafes.healthy(vehicle.time.wall_ns)
     left = round(100 * vehicle.battery)
     return dialect.MAVLink_sys_status_message(
-        sensors, sensors, sensors, 100, 24_000, 150, left, 0, 0, 0, 0, 0, 0
+        sensors, sensors, sensors & ~bad, 100, 24_000, 150, left, 0, 0, 0, 0, 0, 0
     )
 
 

@@ -60,7 +60,9 @@ def unmapped(mission: Mission) -> tuple[str, ...]:
 def _head(mission: Mission) -> list[str]:
     name = printable(mission.name)
     frame = frame_name(mission)
-    which = "the robot's map" if frame == "map" else f"the site '{printable(frame)}', not turned onto a map"
+    which = (
+        "the robot's map" if frame == "map" else f"the site '{printable(frame)}', not transformed to a map"
+    )
     return [
         f"# Scan stops of mission {name}, id {mission.id} revision {mission.revision}",
         f"# Frame: {which}; metres; orientation is w, x, y, z",

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.autopilots.kind import AUTO, Autopilot
 from stopgo.mission.mavlink.captures import Capture, Picture, capture_of
 from stopgo.mission.mavlink.following.capture_reports import CaptureReports, scan_pose
 from stopgo.mission.mavlink.following.list_position import ListPosition
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.progress_watch import ProgressWatch
 from stopgo.mission.mavlink.following.scan_watch import ScanWatch
 from stopgo.mission.mavlink.following.steps import Observation
 from stopgo.mission.mavlink.following.vehicle_poses import VehiclePoses
 from stopgo.mission.mavlink.following.vehicle_status import VehicleStatus
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.run.events import Arrived
+from stopgo.mission.run.events import Arrived, Pose
 from stopgo.mission.run.states import Run
 
 USED_MESSAGES = (
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
-    "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
-    "STATUSTEXT",
+    "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS",
+    "EKF_STATUS_REPORT", "ESTIMATOR_STATUS", "FENCE_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN",
+    "SYSTEM_TIME", "STATUSTEXT",
 )  # fmt: skip
 """Messages that are used."""
 WANTED = ("MISSION_CURRENT", "LOCAL_POSITION_NED", "ATTITUDE")
@@ -34,6 +36,7 @@ class Observer:
         self.position = ListPosition()
         self.poses = VehiclePoses()
         self.captures = CaptureReports()
+        self.progress = ProgressWatch()
         self._scan_watch = ScanWatch()
         self._came_ns: dict[str, int] = {}
         """Time of the last message of each name."""
@@ -46,6 +49,7 @@ class Observer:
         fix = self.poses.take(name, message, listed, now_ns)
         if fix is not None:
             self._scan_watch.take_pose(fix.pose, fix.speed)
+            self._note_progress(fix.pose, listed)
         if name == "MISSION_CURRENT":
             self._take_current(message, listed, now_ns)
         elif name == "MISSION_ITEM_REACHED":
@@ -61,6 +65,13 @@ class Observer:
         same = self.position.take_current(message, listed, boot_ms=boot_ms, now_ns=now_ns)
         if listed is not None:
             self._scan_watch.take_item(listed, self.position.place(listed), same=same)
+
+    def _note_progress(self, pose: Pose, listed: ListedMission | None) -> None:
+        """Note a pose at the vehicle's own time: a link may deliver it late."""
+        known = listed is not None and self.position.is_known
+        place = self.position.place(listed) if listed is not None and known else None
+        drives = self.status.mode == AUTO and self.status.armed
+        self.progress.take(pose, listed, place, self.status.boot_ms * 10**6, drives=drives)
 
     def fresh(self, within_s: float, now_ns: int) -> bool:
         """Return True if the most important messages come often enough."""

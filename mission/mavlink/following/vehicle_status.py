@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.enums import ModeFlag
 from stopgo.mission.mavlink.failsafes import RECENT_S, UNNAMED, Failsafe, failsafe_of
-from stopgo.mission.mavlink.telemetry import Message, charge_of, is_lost
+from stopgo.mission.mavlink.following.vehicle_health import HealthReports, VehicleHealth
+from stopgo.mission.mavlink.telemetry import Message, is_lost
 
 CLOCKS = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "ATTITUDE", "SYSTEM_TIME")
 """Messages with the vehicle's time since boot."""
@@ -33,17 +34,19 @@ class VehicleStatus:
         """Time when the vehicle was first in its present mode."""
         self._failsafe: tuple[Failsafe, int] | None = None
         """The failsafe that a text reported last, and when."""
-        self.battery = 1.0
-        """0 to 1, as last reported."""
+        self._health = HealthReports()
+
+    @property
+    def health(self) -> VehicleHealth:
+        """Battery, position estimate, geofence and remote control, as last reported."""
+        return self._health.now
 
     def take(self, name: str, message: Message, now_ns: int) -> None:
+        self._health.take(name, message)
         if name in CLOCKS:
             self._clock = TimestampedMessage(message, now_ns)
         elif name == "HEARTBEAT":
             self._take_heartbeat(message, now_ns)
-        elif name in ("SYS_STATUS", "BATTERY_STATUS"):
-            charge = charge_of(message.battery_remaining)
-            self.battery = self.battery if charge is None else charge
         elif name == "STATUSTEXT":
             failsafe = failsafe_of(message.text)
             self._failsafe = self._failsafe if failsafe is None else (failsafe, now_ns)
@@ -55,9 +58,9 @@ class VehicleStatus:
             self._mode_began_ns = now_ns
 
     @property
-    def began_ns(self) -> int | None:
-        """Time of the vehicle's boot, by the newest message that contains its time."""
-        return None if self._clock is None else self._clock.ns - self.boot_ms * 10**6
+    def clock(self) -> TimestampedMessage | None:
+        """The newest message that contains the vehicle's time."""
+        return self._clock
 
     @property
     def boot_ms(self) -> int:

@@ -44,24 +44,10 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Candidates
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.shapes import GRID, SLACK, local_origin, to_grid
-from stopgo.planner.selection.continuous_selection.cell_kernel import (
-    look_from_all_cells,
-    look_from_cell,
-    most_turn,
-    part_too_far,
-)
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 from stopgo.planner.visibility.exact_sight import open_space
-from stopgo.planner.visibility.sight.kernel import (
-    clip_reach,
-    clip_side,
-    first_not_negative,
-    last_not_negative,
-    not_negative,
-    turn,
-    within_reach,
-)
+from stopgo.planner.visibility.sight.kernel import look_from_all_cells
 from stopgo.planner.visibility.sight.sight import Scene, scene_of
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -71,18 +57,6 @@ SMALLEST_CELL = 8
 """Side in grid steps below which no cell is cut."""
 NOISE = 4 * GRID
 """Metres by which rounding may move a position."""
-HELPERS = (
-    turn,
-    not_negative,
-    within_reach,
-    first_not_negative,
-    last_not_negative,
-    clip_side,
-    clip_reach,
-    most_turn,
-    part_too_far,
-    look_from_cell,
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +216,7 @@ class CellVisibility:
             )
         ]
         reach = round(self._settings.range / GRID)
-        kernel = compiled(look_from_all_cells, *HELPERS)
+        kernel = compiled(look_from_all_cells, large=True) or look_from_all_cells
         pointer, runs = _run(kernel, arrays, reach, mesh.triangles, _all_units(scene))
         of = np.repeat(np.arange(rows), np.diff(pointer))
         start = self._targets.first_unit[:-1][runs[0]]

@@ -14,13 +14,11 @@ from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.shapes import GRID, to_grid
-from stopgo.planner.visibility.sight.kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
+from stopgo.planner.visibility.sight.kernel import FARTHEST, MOST_UNITS, look_all, not_negative
 from stopgo.planner.visibility.sight.mesh import Mesh, containing, ends_of, rim_of
 
-COMPILE_ABOVE = 2_000_000
-"""Viewpoints × mesh triangles above which the compiled kernel is faster, its loading time included."""
-UNLIMITED = 10
-"""Factor by which looking without a range takes longer."""
+LARGE = 10_000_000
+"""Viewpoints × mesh triangles from which on the interpreted kernel takes seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,9 +161,9 @@ def sight(
             *(scene.a[:, 0], scene.a[:, 1], scene.b[:, 0], scene.b[:, 1], scene.units),
         )
     ]
-    work = len(viewpoints) * mesh.triangles * (UNLIMITED if reach is None else 1)
-    if work > COMPILE_ABOVE:
-        return _run(compiled(look_all, *HELPERS), arrays, steps, mesh.triangles, interpreted=False)
+    kernel = compiled(look_all, large=len(viewpoints) * mesh.triangles > LARGE)
+    if kernel is not None:
+        return _run(kernel, arrays, steps, mesh.triangles, interpreted=False)
     return _run(look_all, [array.tolist() for array in arrays], steps, mesh.triangles, interpreted=True)
 
 

@@ -22,7 +22,10 @@ from tests.called import stopgo
 from tests.ports import free_port
 
 STOPGO = (sys.executable, "-m", "stopgo")
-KEYS = "robot boot_id state run_id mission_id revision stop done skipped outside battery age_s"
+KEYS = (
+    "robot boot_id state run_id mission_id revision stop done skipped outside"
+    " battery battery_ok position_ok fence_ok age_s"
+)
 
 
 class Vehicle:

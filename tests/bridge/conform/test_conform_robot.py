@@ -32,7 +32,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import StateReport, TakenOver
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import FREE_VERBS, Answer, Order
+from stopgo.mission.run.run_commands import FREE_VERBS, Answer, RunCommand
 from tests.bridge.conform.robot_under_test import RobotUnderTest, booted, failed, verdicts
 from tests.bridge.guarded import keys_of_site
 
@@ -106,13 +106,13 @@ RECORD_WHOLE = "every entry and pose once, and the same again"
 
 
 class ForgetsAnswers(Controller):
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         fresh = f"{order.cmd_id}-{self._clock.now_ns()}"
         return changed(super().execute(changed(order, cmd_id=fresh)), cmd_id=order.cmd_id)
 
 
 class AsksStopsForTheRun(Controller):
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         if order.verb in FREE_VERBS and order.run_id not in (None, self.run.run_id):
             return Answer(
                 cmd_id=order.cmd_id, verb=order.verb, outcome="refused", reason="wrong_run",
@@ -122,18 +122,18 @@ class AsksStopsForTheRun(Controller):
 
 
 class IgnoresFences(Controller):
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         return super().execute(changed(order, fence=None))
 
 
 class NeverTooLate(Controller):
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         now_ns = self._clock.now_ns()
         return super().execute(changed(order, issued_ns=now_ns, valid_for_s=5.0, boot_id=None))
 
 
 class StopsForTheCommanderOnly(Controller):
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         lease = self.lease
         if order.verb in FREE_VERBS and lease and lease.commander != order.commander:
             return Answer(
@@ -144,12 +144,12 @@ class StopsForTheCommanderOnly(Controller):
 
 
 class HeedsNobodysLease(Controller):
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         return super().execute(changed(order, commander=self.lease.commander if self.lease else "a"))
 
 
 class DrivesOnEveryStart(Controller):
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         plain = {"issued_ns": self._clock.now_ns(), "expect_state": None, "revision": None, "fence": None}
         return super().execute(changed(order, **plain) if order.verb == "start" else order)
 
@@ -158,8 +158,10 @@ class DrivesWhatItIsSent(Controller):
     def take(self, commit: Any, mission: Mission) -> Rejected | None:
         rejected = super().take(commit, mission)
         now_ns = self._clock.now_ns()
-        self.execute(Order(cmd_id=commit.nonce, verb="start", commander=commit.commander, issued_ns=now_ns,
-                        valid_for_s=5.0))  # fmt: skip
+        start = RunCommand(
+            cmd_id=commit.nonce, verb="start", commander=commit.commander, issued_ns=now_ns, valid_for_s=5.0
+        )
+        self.execute(start)
         return rejected
 
 

@@ -9,7 +9,7 @@ from stopgo.bridge.conform.requirements import ConformVerdict, tried
 from stopgo.bridge.conform.robot_slow_disk import SLOW_DISK
 from stopgo.bridge.robot.controller import Controller
 from stopgo.mission.errors import InputError
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from tests.bridge.conform.robot_under_test import RobotUnderTest, booted
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -25,7 +25,7 @@ def verdict(robot: RobotUnderTest, *, offers_slow_disk: bool = True) -> ConformV
 class StoresFirst(Controller):
     """Stores a byte before it stops the base."""
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         if order.verb == "pause":
             self._store.journal.store_nonce(order.cmd_id, "")
         return super().execute(order)

@@ -24,7 +24,7 @@ from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.files.mission_json import read
-from stopgo.mission.run.orders import Answer, Order, Verb
+from stopgo.mission.run.run_commands import Answer, RunCommand, Verb
 from tests.bridge.conform.station_under_test import StationUnderTest, verdicts
 from tests.bridge.guarded import keys_of_site
 from tests.bridge.world import corridor
@@ -58,7 +58,7 @@ class NewIdEachTime(Station):
 
 
 class CallsSilenceDone(Station):
-    def give(self, order: Order, **details: Any) -> Answer:
+    def give(self, order: RunCommand, **details: Any) -> Answer:
         try:
             return super().give(order, **details)
         except OutcomeUnknown:
@@ -75,12 +75,12 @@ class TriesRefusedOrdersAgain(Station):
 
 
 class TakesOverAlways(Station):
-    def order(self, verb: Verb, **details: Any) -> Order:
+    def order(self, verb: Verb, **details: Any) -> RunCommand:
         return super().order(verb, **{**details, "take_over": True})
 
 
 class AsksBeforeItStops(Station):
-    def stop_order(self, verb: Verb, **details: Any) -> Order:
+    def stop_order(self, verb: Verb, **details: Any) -> RunCommand:
         return self.order(verb, **details)
 
 

@@ -14,7 +14,7 @@ from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, digest_of
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import PoseReport, StateReport, UnknownKind, event_of
-from stopgo.mission.run.orders import Verb
+from stopgo.mission.run.run_commands import Verb
 from tests.bridge.golden.recorded_peer import (
     Change,
     RecordedRobot,

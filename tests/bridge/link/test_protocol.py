@@ -14,7 +14,7 @@ from stopgo.bridge.link import protocol
 from stopgo.bridge.link.protocol import Info, KeyExpressions, Tagged, decode, encode
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import AnyEvent, State, StopState, UnknownKind
-from stopgo.mission.run.orders import Answer, Order, Reason
+from stopgo.mission.run.run_commands import Answer, Reason, RunCommand
 from tests.bridge.world import Field
 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text(encoding="utf-8")
@@ -25,7 +25,7 @@ def test_every_reason_is_explained(reason: str) -> None:
     assert f"| `{reason}` |" in TEXT
 
 
-@pytest.mark.parametrize("message", [*Tagged.__subclasses__(), Order, Answer])
+@pytest.mark.parametrize("message", [*Tagged.__subclasses__(), RunCommand, Answer])
 def test_every_message_is_listed_with_its_fields(message: type[Struct]) -> None:
     row = re.search(rf"^\| `{message.__struct_config__.tag}` \|(.*)\|$", TEXT, re.MULTILINE)
     assert row is not None

@@ -12,12 +12,12 @@ import pytest
 
 from stopgo.bridge.link.protocol import Commit, KeyExpressions, Manifest, Reply, encode
 from stopgo.mission.run.events import AnyEvent, PoseReport, StateReport
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.run_commands import RunCommand
 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text(encoding="utf-8")
 (BLOCK,) = re.findall(r"^## An example\n.*?^```\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
 KINDS: dict[str, Any] = {
-    "->": Manifest | Commit | Order, "<-": Reply, "tel/state": StateReport, "tel/pose": PoseReport,
+    "->": Manifest | Commit | RunCommand, "<-": Reply, "tel/state": StateReport, "tel/pose": PoseReport,
     "tel/event": AnyEvent,
 }  # fmt: skip
 

@@ -13,17 +13,17 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from stopgo.bridge.link.protocol import Malformed, Reply, Tagged, decode, encode
-from stopgo.bridge.link.protocol_schema import protocol_schema
 from stopgo.bridge.link.seals import Seal
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 from tests.bridge.guarded import GuardedField, keys_of_site
+from tests.bridge.link.protocol_schema import protocol_schema
 from tests.bridge.world import corridor
 
 SHIPPED = files("stopgo.bridge.link").joinpath("protocol.schema.json").read_bytes()
 SCHEMA: dict[str, Any] = json.loads(SHIPPED)
-MESSAGES = [str(message.__struct_config__.tag) for message in (*Tagged.__subclasses__(), Order, Answer)]
+MESSAGES = [str(message.__struct_config__.tag) for message in (*Tagged.__subclasses__(), RunCommand, Answer)]
 
 CUT = b"{"
 POSE = PoseReport(
@@ -39,14 +39,14 @@ def valid(name: str, message: object) -> bool:
 
 def test_the_shipped_schema_is_the_generated_one() -> None:
     assert protocol_schema() == SHIPPED, (
-        "python -m stopgo.bridge.link.protocol_schema > bridge/link/protocol.schema.json"
+        "python -m tests.bridge.link.protocol_schema > bridge/link/protocol.schema.json"
     )
 
 
 def test_the_schema_is_a_schema_and_defines_every_message() -> None:
     Draft202012Validator.check_schema(SCHEMA)
     assert {*MESSAGES, *KINDS, "Event", "StateReport", "PoseReport", "Seal"} <= set(SCHEMA["$defs"])
-    assert not {"Order", "Tagged"} & set(SCHEMA["$defs"])
+    assert not {"RunCommand", "Tagged"} & set(SCHEMA["$defs"])
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_what_a_newer_peer_adds_is_valid_and_is_read(said: list[tuple[str, Any]]
         more = widened(body)
         assert more != body
         assert valid(name, more), name
-        readers = {"StateReport": StateReport, "PoseReport": PoseReport, "Seal": Seal, "Command": Order}
+        readers = {"StateReport": StateReport, "PoseReport": PoseReport, "Seal": Seal, "Command": RunCommand}
         if name == "Event":
             event_of(json.dumps(more).encode())
         elif name in readers:

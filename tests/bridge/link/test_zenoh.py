@@ -63,7 +63,8 @@ def test_the_commands_do_it_too(tmp_path: Path) -> None:
         status = json.loads(stopgo("status", *reach, "--json").stdout)
         assert list(status) == [
             *("robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop"),
-            *("done", "skipped", "outside", "battery", "age_s"),
+            *("done", "skipped", "outside", "battery"),
+            *("battery_ok", "position_ok", "fence_ok", "age_s"),
         ]
         assert (status["state"], status["done"]) == ("FINISHED", ["s1", "s2", "s3"])
         refused = stopgo("start", *reach)

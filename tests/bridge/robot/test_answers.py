@@ -7,10 +7,10 @@ import pytest
 
 from stopgo.bridge.robot.answers import answer_to, answered, remember_answer
 from stopgo.bridge.robot.journal_file import memory_journal
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.run_commands import RunCommand
 from stopgo.mission.run.states import Run
 
-START = Order(cmd_id="once", verb="start", commander="alice", issued_ns=1, valid_for_s=5.0)
+START = RunCommand(cmd_id="once", verb="start", commander="alice", issued_ns=1, valid_for_s=5.0)
 RUN = Run(state="RUNNING", run_id="r")
 
 

@@ -11,7 +11,7 @@ from stopgo.bridge.robot.answers import remember_answer
 from stopgo.bridge.robot.command_execution import STOPS_KEPT
 from stopgo.bridge.robot.pages import POSES_KEPT
 from stopgo.bridge.robot.station_contact import MOST_TOKENS
-from stopgo.mission.run.orders import Answer
+from stopgo.mission.run.run_commands import Answer
 from tests.bridge.world import Field, corridor
 
 ROUNDS = 400

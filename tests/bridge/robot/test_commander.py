@@ -17,7 +17,7 @@ from stopgo.bridge.link.protocol import encode
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import STOPS_LISTED, TakenOver
 from stopgo.mission.run.lease import LEASE_S, Lease, claimed
-from stopgo.mission.run.orders import Answer, Refused, Verb
+from stopgo.mission.run.run_commands import Answer, Refused, Verb
 from tests.bridge.world import Field, corridor
 
 ALICE = Lease(commander="alice", fence=3, until_ns=10_000_000_000)

@@ -15,7 +15,7 @@ from stopgo.bridge.robot.simulator import Fault, Faults, read_fault
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Pose, Scanned
-from stopgo.mission.run.orders import Verb
+from stopgo.mission.run.run_commands import Verb
 from stopgo.mission.run.scans import ScanFailed
 from tests.bridge.world import Field, corridor
 from tests.disk import small_disk

@@ -21,7 +21,7 @@ from stopgo.bridge.robot.stored_missions import MISSIONS_KEPT
 from stopgo.bridge.station.watch import event_line
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Started, UnknownKind, event_of
-from stopgo.mission.run.orders import Verb
+from stopgo.mission.run.run_commands import Verb
 from tests.bridge.world import Field, corridor
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from stopgo.bridge.commands.order_commands import state_line, status_json
+from stopgo.bridge.commands.run_control_commands import state_line, status_json
 from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.station.watch import EventLines, EventObjects, event_line, table_lines, watch_with
 from stopgo.mission.comparing.run_collector import RunCollector

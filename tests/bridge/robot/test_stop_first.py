@@ -21,7 +21,7 @@ from stopgo.bridge.robot.storage_watchdog import ANSWERS_WITHIN_S, LATE, LOOK_EV
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Verb
+from stopgo.mission.run.run_commands import FREE_VERBS, Answer, RunCommand, Verb
 from stopgo.mission.run.states import Run
 from tests.bridge.world import Field, corridor
 from tests.ports import free_port
@@ -208,7 +208,7 @@ def test_on_the_link_a_stop_waits_behind_no_other_command(monkeypatch: pytest.Mo
         monkeypatch.setattr(field.base, "stop", stopped.set)
         monkeypatch.setattr(field.journal.rows, "commit_hook", disk)
 
-        def ask(order: Order) -> None:
+        def ask(order: RunCommand) -> None:
             answers.append(station.ask(field.keys.command(order.verb), encode(order), timeout_s=NET_S))
 
         asking = [threading.Thread(target=ask, args=(order,)) for order in (skip, abort)]
@@ -304,6 +304,81 @@ def test_a_thread_that_dies_stops_the_base_before_anybody_is_told(monkeypatch: p
     with on_link(agent), pytest.raises(OSError, match="no such line"):
         agent.wait()
     assert calls[:2] == ["stop", "told"]
+
+
+# A base that does not stop
+
+
+def broken_stop() -> None:
+    raise OSError("no such line")
+
+
+@pytest.mark.parametrize(("verb", "state"), [("pause", "PAUSED"), ("abort", "ABORTED")])
+def test_a_base_that_does_not_stop_is_reported_stored_and_never_driven_again(
+    verb: Verb, state: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    field = started()
+    monkeypatch.setattr(field.base, "stop", broken_stop)
+    order = field.command(verb)
+    answer = field.controller.execute(order)
+    assert (answer.outcome, answer.reason, answer.state) == ("refused", "not_stopped", state)
+    assert "(no such line): use the emergency stop" in answer.message
+    assert field.controller.execute(order) == answer
+    assert not field.controller.step()
+    with pytest.raises(OSError, match="no such line"):
+        field.controller.serve()
+    monkeypatch.undo()
+    field.boot()
+    assert (field.controller.run.state, field.controller.execute(order)) == (state, answer)
+
+
+@pytest.mark.parametrize(
+    "stops",
+    [
+        lambda field: field.controller.on_link_silence(31.0),
+        lambda field: field.controller.hold("another robot answers"),
+    ],
+)
+def test_a_base_that_does_not_stop_ends_the_program_for_every_stop(
+    stops: Callable[[Field], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    field = started("hold")
+    monkeypatch.setattr(field.base, "stop", broken_stop)
+    stops(field)
+    assert field.controller.run.state == "HELD"
+    with pytest.raises(OSError, match="no such line"):
+        field.controller.serve()
+
+
+def test_an_error_is_told_though_the_base_does_not_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A robot whose thread has died must not look alive."""
+    field, told = Field(), list[Exception]()
+
+    def broken() -> None:
+        raise ZeroDivisionError
+
+    field.controller.works = (broken,)
+    monkeypatch.setattr(field.base, "stop", broken_stop)
+    agent = Agent(
+        keys=field.keys, link=field.board.link(), journal=field.journal, runner=field.controller,
+        clock=field.clock, command_clock=field.clock, failed=told.append,
+    )  # fmt: skip
+    with on_link(agent), pytest.raises(ZeroDivisionError):
+        agent.wait()
+    assert len(told) == 1
+
+
+def test_a_base_that_does_not_stop_at_the_start_ends_the_program_unless_it_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    field = Field()
+    monkeypatch.setattr(field.base, "stop", broken_stop)
+    with pytest.raises(OSError, match="no such line"):
+        field.boot()
+    monkeypatch.setattr(field.base, "not_ready", lambda: "its motors do not answer")
+    field.boot()
+    field.station().push(corridor())
+    assert field.order("start").reason == "not_ready"
 
 
 # A journal that fails

@@ -53,7 +53,7 @@ def test_a_robot_that_was_seen_and_is_gone_is_silent(
     assert (code, gone["robot"], gone["state"], gone["silent"]) == (1, "r1", None, True)
     assert gone["last_seen"] is not None
     assert main(["status", "--timeout", "0.2"]) == 1
-    assert "r1: NO DATA; IDLE when last seen, 20" in capsys.readouterr().out
+    assert "r1: NO DATA; IDLE at its last report, 20" in capsys.readouterr().out
 
 
 def test_a_robot_that_shows_itself_and_does_not_answer_is_silent(
@@ -91,7 +91,7 @@ def test_a_robot_that_left_for_good_is_forgotten(field: Field, capsys: pytest.Ca
         "nobody shows itself, and none is known"
     )
     assert main(["status", "--timeout", "0.2", "--forget", "r1"]) == 2
-    assert "never seen from here" in capsys.readouterr().err
+    assert "unknown here" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ from stopgo.bridge.station.session_socket import (
 from stopgo.bridge.station.shared_session import SharedSession, listening_at
 from stopgo.bridge.station.station import Station
 from stopgo.mission.errors import InputError, NegativeResult
-from stopgo.mission.run.orders import Answer
+from stopgo.mission.run.run_commands import Answer
 from tests.bridge.world import Field, corridor
 
 OPTIONS = SessionOptions(endpoint="tcp/127.0.0.1:7447", robot="r1")

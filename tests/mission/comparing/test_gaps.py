@@ -71,7 +71,7 @@ def test_what_was_not_seen_is_told_and_not_counted() -> None:
     assert gap.metres == pytest.approx(8.97)
     assert run.log.poses.length_m == pytest.approx(12.0)
     text = comparison_text(run)
-    assert "cross-track error ≤ 30.0 mm while seen (57.2 % of the path), unseen 0:57" in text
+    assert "cross-track error ≤ 30.0 mm while recorded (57.2 % of the path), unseen 0:57" in text
     assert "no poses for 0:57 from 1:42: 9.0 m of the path unseen, from (10.00, 0.03) to (2.00, 1.00)" in text
     told_json = msgspec.json.decode(msgspec.json.encode(comparison_json(run)))
     assert (told_json["seen"], told_json["unseen_s"]) == (pytest.approx(12 / 20.97), 57.0)

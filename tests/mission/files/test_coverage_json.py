@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stopgo.mission.files.coverage_json import coverage_json, write_coverage
+from stopgo.mission.files.coverage_json import coverage_json
 from stopgo.mission.geometry import frozen
 from stopgo.mission.stages.covered_intervals import runs_of
 from tests.mission.worlds import room_floor, room_mission, room_route, room_targets
@@ -75,5 +75,5 @@ def test_it_names_its_mission(document: dict[str, Any]) -> None:
 
 
 def test_the_same_plan_gives_the_same_bytes(tmp_path: Path) -> None:
-    write_coverage(room_route(), room_mission(), tmp_path / "coverage.json")
+    (tmp_path / "coverage.json").write_bytes(coverage_json(room_route(), room_mission()))
     assert (tmp_path / "coverage.json").read_bytes() == coverage_json(room_route(), room_mission())

@@ -11,7 +11,7 @@ import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
 from stopgo.mission.files.mission_json import encode
-from stopgo.mission.files.mission_schema import mission_schema
+from tests.mission.files.mission_schema import mission_schema
 from tests.mission.worlds import mission_of, square_tour
 
 SHIPPED = files("stopgo.mission").joinpath("mission.schema.json").read_bytes()
@@ -21,7 +21,7 @@ DOCUMENT: dict[str, Any] = json.loads(encode(square_tour()))
 
 def test_the_shipped_schema_is_the_generated_one() -> None:
     assert mission_schema() == SHIPPED, (
-        "python -m stopgo.mission.files.mission_schema > mission/mission.schema.json"
+        "python -m tests.mission.files.mission_schema > mission/mission.schema.json"
     )
 
 

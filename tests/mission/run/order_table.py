@@ -6,7 +6,7 @@ from typing import get_args
 
 from stopgo.mission.run.decision import Decision, Situation, decide
 from stopgo.mission.run.events import Pose
-from stopgo.mission.run.orders import FREE_VERBS, Order, Verb
+from stopgo.mission.run.run_commands import FREE_VERBS, RunCommand, Verb
 from stopgo.mission.run.states import DetailedState, Run
 from tests.bridge.world import corridor
 
@@ -40,8 +40,8 @@ def _cell(effect: str) -> str:
     return {"wrong_state": "–", "no_mission": "`no_mission`"}.get(effect, effect)
 
 
-def _order(verb: Verb, *, again: bool = False) -> Order:
-    return Order(
+def _order(verb: Verb, *, again: bool = False) -> RunCommand:
+    return RunCommand(
         cmd_id="c", verb=verb, commander="station", issued_ns=0, valid_for_s=5.0, again=again,
     )  # fmt: skip
 

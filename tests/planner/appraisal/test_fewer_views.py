@@ -18,7 +18,7 @@ def test_targets_with_a_single_view_are_reported() -> None:
     assert finding.code == FEWER_VIEWS
     seen = nouns[Selection].visibility.seen_by(int(nouns[Selection].chosen[0]))
     metres = nouns[Selection].targets.unit_length[seen].sum()
-    assert finding.message.startswith(f"{metres:.1f} m count as seen from fewer than 2 stops")
+    assert finding.message.startswith(f"{metres:.1f} m count as covered from fewer than 2 stops")
 
 
 def test_one_view_is_never_too_few() -> None:

@@ -12,7 +12,7 @@ import shapely
 import stopgo.recordings.samples
 from stopgo.mission.floor import FloorPlan
 from stopgo.planner.floors import read_floor
-from stopgo.recordings.samples.draw_office import draw
+from tests.planner.floors.draw_office import draw
 
 OFFICE = Path(stopgo.recordings.samples.__file__).with_name("office.dxf")
 
@@ -29,8 +29,8 @@ def test_the_script_draws_the_file() -> None:
 @pytest.mark.parametrize("seed", ["0", "1", "2"])
 def test_every_run_draws_the_same_bytes(tmp_path: Path, seed: str) -> None:
     path = tmp_path / "office.dxf"
-    command = [sys.executable, "-m", "stopgo.recordings.samples.draw_office", str(path)]
-    root = Path(stopgo.recordings.samples.__file__).parents[2]
+    command = [sys.executable, "-m", "tests.planner.floors.draw_office", str(path)]
+    root = Path(__file__).parents[3]
     subprocess.run(command, check=True, cwd=root, env={"PYTHONHASHSEED": seed, "PATH": ""})
     assert path.read_bytes() == OFFICE.read_bytes()
 

@@ -1,64 +1,97 @@
-"""A kernel runs wherever it is called, whether or not its machine code can be kept on disk."""
+"""Kernels run as built by the installation, or as written, with the same results."""
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from pickle import UnpicklingError
 
+import numpy as np
 import pytest
 
-from stopgo.planner.geometry.compiling import recompiled_if_unreadable
+from stopgo.planner.geometry import compiling
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.routing.tour import nanometres, search, trials
+from stopgo.planner.routing.tour_kernel import iterated_search
+from tests.planner.kernels import interpret, machine_code
 
 ROOT = Path(__file__).parents[3]
-NO_FILE_GROWS = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
-CALL = """
-import stopgo.planner.geometry.compiling, stopgo.planner.visibility.sight.kernel as kernel
-tell = stopgo.planner.geometry.compiling.compiled(kernel.within_reach)
-print(stopgo.planner.geometry.compiling.__file__, tell(3, 4, 3, 4, 1, 2, 5), tell(3, 4, 3, 4, 1, 2, 4))
-"""
+KERNELS = {
+    path: path.with_name(path.name.replace("_compiled.pxd", ".py"))
+    for path in sorted((ROOT / "planner").rglob("*_compiled.pxd"))
+}
+"""The source of each kernel, by the file of its types."""
 
 
-def called(folder: Path, code: str = CALL, **environment: str) -> None:
-    """Let a process call a kernel of the planner in `folder`, and hear the right answers."""
+@pytest.fixture
+def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    compiling._say_that_plans_take_longer.cache_clear()
+    monkeypatch.setattr(compiling, "compiled_module", lambda name: None)
+
+
+def test_an_uncompiled_kernel_is_told_once_and_before_large_work_only(
+    nothing_said: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert compiled(iterated_search, large=False) is None
+    assert capsys.readouterr().err == ""
+    assert compiled(iterated_search, large=True) is None
+    assert compiled(iterated_search, large=True) is None
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "kernels are not compiled" in told
+
+
+def test_a_tour_is_the_same_at_both_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.random.default_rng(5).random((40, 2))
+    cost = nanometres(np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)))
+    fast = search(cost, trials(cost, 200, seed=1))
+    interpret(monkeypatch)
+    assert np.array_equal(fast, search(cost, trials(cost, 200, seed=1)))
+
+
+def test_the_types_of_a_kernel_name_all_its_functions() -> None:
+    """A function that they miss would stay interpreted, and slow, without a word."""
+    assert len(KERNELS) > 2
+    for types, source in KERNELS.items():
+        written = {
+            node.name for node in ast.parse(source.read_text()).body if isinstance(node, ast.FunctionDef)
+        }
+        assert written == set(re.findall(r"^cp?def .*?(\w+)\(", types.read_text(), re.MULTILINE)), source
+
+
+def test_the_machine_code_is_of_the_present_source() -> None:
+    """A build older than its source would test something else."""
+    for types, source in KERNELS.items():
+        name = ".".join(source.relative_to(ROOT).with_suffix("").parts)
+        module = compiling.compiled_module(f"stopgo.{name}")
+        assert module is not None, "not compiled: `python setup.py build_ext --inplace`, with gcc and Cython"
+        assert Path(module.__file__).stat().st_mtime >= max(source.stat().st_mtime, types.stat().st_mtime)
+
+
+def test_arrays_that_cannot_be_written_are_taken(tmp_path: Path) -> None:
+    cost = np.arange(16, dtype=np.int64)
+    cost.flags.writeable = False
+    scratch = [np.zeros(8, dtype=np.int64) for _ in range(9)]
+    with pytest.raises(ValueError, match="dtype"):
+        machine_code(iterated_search)(cost.astype(np.int32), *scratch)
+
+
+def test_without_a_compiler_the_installation_is_complete_and_interpreted(tmp_path: Path) -> None:
+    tree = tmp_path / "tree"
+    ignored = shutil.ignore_patterns(".*", "tests", "docs", "build", "*_compiled*.so", "*.egg-info")
+    shutil.copytree(ROOT, tree, ignore=ignored, symlinks=True)
     done = subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "setup.py", "-q", "build", "--build-lib", str(tmp_path / "lib")],
+        cwd=tree,
+        env={**os.environ, "CC": "/nowhere/cc", "PATH": ""},
         capture_output=True,
         text=True,
-        cwd=folder,
-        env={**os.environ, **environment},
         check=False,
     )
-    assert (done.stdout.split()[1:], done.stderr) == (["True", "False"], "")
-    assert Path(done.stdout.split()[0]).is_relative_to(folder)
-
-
-def test_a_read_only_install_and_a_user_without_a_home(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "stopgo", tmp_path / "stopgo", ignore=shutil.ignore_patterns("__pycache__"))
-    (tmp_path / "stopgo" / "planner" / "__pycache__").write_text("where nothing can be written")
-    called(tmp_path, HOME="/dev/null", XDG_CACHE_HOME="/dev/null", NUMBA_CACHE_DIR="/dev/null/cache")
-
-
-def test_a_full_disk_under_the_cache(tmp_path: Path) -> None:
-    called(ROOT, NO_FILE_GROWS + CALL, NUMBA_CACHE_DIR=str(tmp_path))
-    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
-
-
-def test_a_cache_that_was_cut_off(tmp_path: Path) -> None:
-    called(ROOT, NUMBA_CACHE_DIR=str(tmp_path))
-    kept = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert len(kept) == 2
-    for path in kept:
-        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    called(ROOT, NUMBA_CACHE_DIR=str(tmp_path))
-
-
-@pytest.mark.parametrize("error", [OSError, EOFError, UnpicklingError])
-def test_whatever_is_wrong_with_the_cache_the_kernel_is_compiled_anew(error: type[Exception]) -> None:
-    def kept(number: int) -> int:
-        raise error
-
-    assert recompiled_if_unreadable(kept, lambda number: number + 1)(1) == 2
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "lib" / "stopgo" / "planner" / "routing" / "tour_kernel.py").exists()
+    assert not list((tmp_path / "lib").rglob("*_compiled*.so"))

@@ -10,12 +10,13 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner.candidates import candidates
-from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
-from stopgo.planner.visibility.bresenham import bresenham, clear_line, clear_lines
+from stopgo.planner.visibility.bresenham import bresenham
+from stopgo.planner.visibility.bresenham_kernel import clear_line, clear_lines
 from stopgo.planner.visibility.exact_sight import exact
 from stopgo.planner.visibility.raster import crossed_by, inside_of, raster_of
+from tests.planner.kernels import machine_code
 from tests.planner.worlds import box, column, element, floor_of, hall, moved, shell, turned, two_rooms
 
 
@@ -82,7 +83,8 @@ def test_interpreted_and_compiled_agree() -> None:
     own = random.random(500) < 0.5
     slow, fast = np.zeros(500, np.uint8), np.zeros(500, np.uint8)
     clear_lines(cells.tobytes(), 40, 20, 20, ends[:, 0].tolist(), ends[:, 1].tolist(), own.tolist(), slow)
-    compiled(clear_lines, clear_line)(cells, 40, 20, 20, ends[:, 0], ends[:, 1], own, fast)
+    columns = [np.ascontiguousarray(column) for column in (*ends.T, own.view(np.uint8))]
+    machine_code(clear_lines)(cells, 40, 20, 20, *columns, fast)
     assert np.array_equal(slow, fast)
     assert 0 < slow.sum() < 500
 

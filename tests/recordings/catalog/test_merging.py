@@ -13,7 +13,7 @@ from stopgo.recordings.embedded.checking import problems_of
 from stopgo.recordings.embedded.reading import read_recording
 from tests.recordings import run
 from tests.recordings.conftest import write_field
-from tests.recordings.test_views import assert_shown
+from tests.recordings.test_views import SMALL, assert_shown
 from tests.recordings.viewer import has_vulkan, viewer
 
 
@@ -55,6 +55,6 @@ def test_a_recording_is_not_written_over_itself(merged: Path, capsys: pytest.Cap
 
 @pytest.mark.skipif(not has_vulkan(), reason="no Vulkan driver")
 def test_each_run_has_a_report_and_no_view_complains(merged: Path, tmp_path: Path) -> None:
-    with viewer([merged]) as client:
+    with viewer([merged], size=SMALL) as client:
         assert_shown(client, "Mission", {"Report": None}, tmp_path)
         assert_shown(client, "Run", {"States": None}, tmp_path)

@@ -92,7 +92,8 @@ def test_two_runs_are_told_together_and_need_no_follow_up_for_what_one_of_them_d
     assert main(["review", str(sighted), *files, "--html", str(page)]) == 1
     text = capsys.readouterr().out
     assert (
-        "Together, the 2 runs scanned 78.5 % of what is visible; 70.0 % was asked.\nNo stop is left." in text
+        "Together, the 2 runs scanned 78.5 % of what is visible; 70.0 % was required.\nNo stop is left."
+        in text
     )
     assert "follow-up" not in text and "follow-up" not in page.read_text()
     assert "All runs together" in page.read_text() and "robot r1 (run 2)" in page.read_text()
@@ -108,7 +109,7 @@ def test_two_runs_that_lack_the_same_stop_get_one_follow_up(
     other = run_without(tmp_path / "other.rrd", mission, "S2")
     assert main(["review", str(sighted), str(skipping), str(other)]) == 1
     text = capsys.readouterr().out
-    assert "Together, the 2 runs scanned 57.1 % of what is visible; 70.0 % was asked." in text
+    assert "Together, the 2 runs scanned 57.1 % of what is visible; 70.0 % was required." in text
     assert "Not scanned by any run: S2." in text
     assert text.count("--top-up next.json") == 1
     assert f"stopgo replay {skipping} {other} --mission mission.json" in text

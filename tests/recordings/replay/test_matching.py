@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import NegativeResult
+from stopgo.mission.errors import Undecided
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.fitting import fitted
 from stopgo.recordings.replay.matching import Match, matched
@@ -120,11 +120,11 @@ def test_a_turned_and_shifted_log_is_fitted_to_the_stops() -> None:
 def test_a_fit_that_is_not_the_only_one_is_refused(stops: Mission) -> None:
     """Three halts on four equal steps may be the first three or the last three; two stops tell nothing."""
     halts = find_standstills(standing_at((4, 0), (8, 0), (12, 0)))
-    with pytest.raises(NegativeResult, match="--map"):
+    with pytest.raises(Undecided, match="--map"):
         fitted(halts, stops)
 
 
 def test_a_log_of_another_mission_is_not_fitted() -> None:
     track = logged(driven(wandering(8)))
-    with pytest.raises(NegativeResult, match="--map"):
+    with pytest.raises(Undecided, match="--map"):
         fitted(find_standstills(track, speed=1.0), wandering(9))

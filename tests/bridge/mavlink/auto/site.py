@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from stopgo.bridge.mavlink.auto.logbook import Logbook, logbook, remember
-from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
+from stopgo.bridge.mavlink.auto.vehicle_commands import Consent
 from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup

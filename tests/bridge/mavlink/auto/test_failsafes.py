@@ -2,36 +2,64 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import pytest
 
 from stopgo.mission.document import Scan
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.run.events import Paused
+from stopgo.mission.run.health_text import health_text
 from tests.bridge.mavlink.auto.site import KINDS, Site, real_tour, until, watched
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
 CAUSES = ("battery", "remote control lost", "ground station lost", "geofence", "crash", "position estimate")
+LASTS = {1: "remote control lost", 3: "geofence is breached", 5: "estimator has no position"}
+
+
+LONG = real_tour(scan=Scan(profile="default", duration_s=20.0, timeout_s=60.0))
 
 
 @pytest.mark.parametrize("profile", ["ardupilot", "px4"])
-@pytest.mark.parametrize("cause", [0, 3])
-def test_a_failsafe_that_holds_the_vehicle_is_named_with_its_text(
+@pytest.mark.parametrize("cause", [1, 3, 5])
+def test_a_failsafe_that_holds_the_vehicle_is_named_and_resume_waits_for_its_end(
     tmp_path: Path, profile: str, cause: int
 ) -> None:
-    mission = real_tour(scan=Scan(profile="default", duration_s=20.0, timeout_s=60.0))
-    site = Site(tmp_path, profile, mission=mission, faults=[f"failsafe@6={cause}"])
+    site = Site(tmp_path, profile, mission=LONG, faults=[f"failsafe@6={cause}"])
     text = autopilot_named(KINDS[profile]).failsafe_texts[cause]
     with site.up():
         assert site.order("start").outcome == "ok"
         with watched(site):
             until(site, lambda events, run: any(isinstance(event, Paused) for event in events))
+            with pytest.raises(NegativeResult, match=f"not_ready: .*{LASTS[cause]}"):
+                site.order("resume")
+            time.sleep(25.0)
             assert site.order("resume").outcome == "ok"
     paused = next(event for event in site.events if isinstance(event, Paused))
     assert paused.reason == f'mode HOLD, by the autopilot\'s failsafe ({CAUSES[cause]}: "{text}")'
     assert site.run.done == ("S1", "S2", "S3")
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_a_batterys_failsafe_lasts_until_the_autopilot_is_restarted(tmp_path: Path, profile: str) -> None:
+    site = Site(tmp_path, profile, mission=LONG, faults=["failsafe@6=0"])
+    with site.up():
+        site.order("start")
+        with watched(site):
+            until(site, lambda events, run: any(isinstance(event, Paused) for event in events))
+            for _ in range(2):
+                with pytest.raises(NegativeResult, match=r"not_ready: .*restart the autopilot"):
+                    site.order("resume")
+                time.sleep(40.0)
+            with site.reached() as station:
+                state = station.status()
+            assert (state.battery_ok, state.position_ok, state.fence_ok) == (False, True, None)
+            assert "its failsafe lasts" in health_text(state) and "geofence unknown" in health_text(state)
+            site.order("abort")
+    assert "(battery:" in next(event for event in site.events if isinstance(event, Paused)).reason
 
 
 def test_a_change_of_mode_without_a_failsafe_is_the_operators(tmp_path: Path) -> None:

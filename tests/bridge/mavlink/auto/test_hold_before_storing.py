@@ -12,13 +12,14 @@ import pytest
 
 from stopgo.bridge.mavlink.auto.logbook import Logbook, PendingCommand
 from stopgo.bridge.mavlink.auto.pending_commands import PendingCommands
-from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
+from stopgo.bridge.mavlink.auto.vehicle_commands import Consent, VehicleCommands
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.following.vehicle_health import VehicleHealth
 from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.run import states as runs
-from stopgo.mission.run.orders import FREE_VERBS, Order, Verb
+from stopgo.mission.run.run_commands import FREE_VERBS, RunCommand, Verb
 from tests.bridge.mavlink.auto.site import Site
 
 NET_S = 60.0
@@ -67,7 +68,7 @@ class SlowDisk:
 class Still:
     """An observer of a vehicle without a pose: also its status, position and poses."""
 
-    items, battery = None, 1.0
+    items, health = None, VehicleHealth()
 
     def __init__(self) -> None:
         self.status = self.position = self.poses = self
@@ -76,14 +77,14 @@ class Still:
         return None
 
 
-def stop_order(verb: Verb, cmd_id: str = "first") -> Order:
-    return Order(cmd_id=cmd_id, verb=verb, commander="test", issued_ns=0, valid_for_s=5.0)
+def stop_order(verb: Verb, cmd_id: str = "first") -> RunCommand:
+    return RunCommand(cmd_id=cmd_id, verb=verb, commander="test", issued_ns=0, valid_for_s=5.0)
 
 
-def orders_for(book: Logbook, vehicle: Any) -> VehicleOrders:
+def orders_for(book: Logbook, vehicle: Any) -> VehicleCommands:
     observer: Any = Still()
     no_commands: Any = None
-    return VehicleOrders(book, vehicle, observer, no_commands, book.clock, Consent())
+    return VehicleCommands(book, vehicle, observer, no_commands, book.clock, Consent())
 
 
 def started(book: Logbook) -> None:

@@ -68,18 +68,6 @@ def test_what_was_sent_is_remembered_item_by_item(tmp_path: Path) -> None:
         assert (book.run.state, book.run.mission_id) == ("READY", mission.id)
 
 
-def test_a_vehicle_whose_clock_begins_later_was_started_anew(tmp_path: Path) -> None:
-    with logbook(URL, 1, tmp_path) as book:
-        now_ns = book.clock.now_ns()
-        assert not book.booted(now_ns)
-        first = book.boot_id
-        assert not book.booted(now_ns + 10**9)
-        assert not book.booted(now_ns - 10**9)
-        assert book.boot_id == first
-        assert book.booted(now_ns + 10 * 10**9)
-        assert book.boot_id != first
-
-
 def test_the_usual_folder_is_named_by_url_and_vehicle(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.commands.order_commands import state_line
+from stopgo.bridge.commands.run_control_commands import state_line
 from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
 from stopgo.bridge.mavlink.simulated.estimator import Estimator

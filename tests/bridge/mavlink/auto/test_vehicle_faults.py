@@ -13,10 +13,12 @@ from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.bridge.station.follow import Silence
+from stopgo.mission.document import Scan
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Arrived, Held, Paused, Resumed, Started
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
+from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -152,6 +154,38 @@ def test_a_silent_vehicle_is_told_as_silence_and_its_run_goes_on(tmp_path: Path)
         thread.join(60.0)
     assert not thread.is_alive()
     assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_what_a_restart_took_from_the_vehicle_one_command_gives_again(profile: str, tmp_path: Path) -> None:
+    """Its origin, its mode and its arming."""
+    site = Site(tmp_path, profile)
+    with site.up():
+        site.order("start")
+        with site.reached():
+            until(site, lambda events, run: "Arrived S1" in told(events))
+    site.at, site.origin = None, None
+    with site.up(), watched(site):
+        until(site, lambda events, run: run.state == "PAUSED")
+        assert site.order("resume").state == "RUNNING"
+    assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
+
+
+def test_a_link_that_delivers_late_is_neither_a_reboot_nor_an_operator(tmp_path: Path) -> None:
+    mission = real_tour(scan=Scan(profile="default", duration_s=6.0, timeout_s=60.0))
+    site = Site(tmp_path, "ardupilot", mission=mission, speed_up=1.0)
+    with site.up(), Lossy(site.url.number, Roughness(), seed=1) as line:
+        site.url = line.url
+        with site.book() as book:
+            remember(book, site.mission, site.sent)
+        with watched(site):
+            site.order("start")
+            until(site, lambda events, run: "Arrived S1" in told(events))
+            line.stall(34.0)
+    words = told(site.events)
+    assert words[0] == "Started" and words[-1] == "Finished"
+    assert {word.split()[0] for word in words[1:-1]} <= {"Arrived", "Settled", "Unconfirmed", "Scanned"}
+    assert len({event.boot_id for event in site.events}) == 1
 
 
 def test_a_new_push_ends_the_run_that_it_replaces(tmp_path: Path) -> None:

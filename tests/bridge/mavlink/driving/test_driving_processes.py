@@ -22,6 +22,7 @@ from stopgo.mission.document import Mission, Scan, sealed
 from stopgo.mission.run.events import Scanned
 from tests.bridge.mavlink.driving.world import Operator, is_state, site_mission, until
 from tests.called import stopgo
+from tests.faults.sizes import some
 from tests.ports import free_port
 
 QUICK = {
@@ -76,7 +77,7 @@ def scans_begun(operator: Operator) -> int:
     return int(last.image_index) + 1
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_mission_over_zenoh_is_driven_by_an_autopilot_and_recorded(tmp_path: Path, profile: str) -> None:
     document, field = tmp_path / "mission.json", tmp_path / "field.rrd"
     document.write_bytes(msgspec.json.encode(brisk(closed=profile == "ardupilot")))
@@ -101,7 +102,7 @@ def test_a_mission_over_zenoh_is_driven_by_an_autopilot_and_recorded(tmp_path: P
     assert max(stop["deviation_m"] for stop in run["stops"]) < 0.05
 
 
-@pytest.mark.parametrize(("stop", "doing"), [("s1", "SCANNING"), ("s2", "NAVIGATING")])
+@pytest.mark.parametrize(("stop", "doing"), some([("s1", "SCANNING"), ("s2", "NAVIGATING")], every=2))
 def test_a_killed_gateway_comes_back_paused_and_scans_no_stop_twice(
     tmp_path: Path, stop: str, doing: str
 ) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.errors import InputError
-from stopgo.mission.files.coverage_json import write_coverage
+from stopgo.mission.files.coverage_json import coverage_json
 from stopgo.mission.files.exports.stretches import read_stretches
 from tests.mission.worlds import room_mission, room_route, square_tour
 
@@ -20,7 +20,7 @@ from tests.mission.worlds import room_mission, room_route, square_tour
 @pytest.fixture
 def written(tmp_path: Path) -> tuple[Path, Mission]:
     """The coverage of the room, and its mission."""
-    write_coverage(room_route(), room_mission(), tmp_path / "coverage.json")
+    (tmp_path / "coverage.json").write_bytes(coverage_json(room_route(), room_mission()))
     return tmp_path / "coverage.json", room_mission()
 
 

@@ -153,7 +153,7 @@ def test_a_battery_that_is_not_told_changes_nothing() -> None:
     telling = Telling()
     for remaining in (40, -1):
         telling.tell(dialect.MAVLink_sys_status_message(0, 0, 0, 0, 0, 0, remaining, 0, 0, 0, 0, 0, 0))
-    assert telling.observer.status.battery == 0.4
+    assert telling.observer.status.health.charge == 0.4
 
 
 def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:

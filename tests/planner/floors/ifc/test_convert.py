@@ -114,7 +114,9 @@ def test_a_floor_with_doors_that_is_left_out_ends_in_a_no(
     assert plan_storeys(house_file, tmp_path, Settings(), plan_one, as_json=False) == 1
     assert "left out: UG: nobody walks there; --storey UG" in capsys.readouterr().out
     monkeypatch.setattr(storeys, "survey_floor", lambda *_: replace(survey, floors=(low,)))
-    with pytest.raises(InputError, match=r"no storey that is planned unasked \(UG: nobody walks there\)"):
+    with pytest.raises(
+        InputError, match=r"no storey that is planned without --storey \(UG: nobody walks there\)"
+    ):
         plan_storeys(house_file, tmp_path, Settings(), plan_one, as_json=False)
 
 

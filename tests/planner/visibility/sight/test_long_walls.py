@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from stopgo.mission.errors import InputError
-from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.shapes import GRID, to_grid
 from stopgo.planner.visibility.sight.kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
 from stopgo.planner.visibility.sight.sight import scene_of, sight
+from tests.planner.kernels import machine_code
 from tests.planner.long_walls import RANGES, told
 from tests.planner.visibility.sight.test_sight import World
 
@@ -30,7 +30,7 @@ def test_long_walls_are_seen_as_far_as_the_range_and_no_farther(
 
 @pytest.mark.parametrize("speed", ["compiled", "interpreted"])
 def test_a_unit_a_millimetre_beyond_the_range_is_not_seen(speed: str) -> None:
-    tell = compiled(within_reach) if speed == "compiled" else within_reach
+    tell = machine_code(within_reach) if speed == "compiled" else within_reach
     ends = (20_856_540, 388_530, 20_856_540 - 20_978_260, 388_530 + 7500)
     assert not tell(*ends, 8211, 8392, 500_000)
     assert tell(*ends, 8391, 8392, 500_000)
@@ -39,7 +39,7 @@ def test_a_unit_a_millimetre_beyond_the_range_is_not_seen(speed: str) -> None:
 def test_the_greatest_numbers_are_told_as_in_python() -> None:
     """At the bounds of what is let in: one more bit, and products would not fit."""
     pieces, turn = 2 * MOST_UNITS, 2 * (2 * COORDINATE) ** 2
-    fast = compiled(not_negative), compiled(within_reach)
+    fast = machine_code(not_negative), machine_code(within_reach)
     for odd in (1, pieces // 2 - 1, pieces - 1):
         for at_a, at_b in itertools.product((-turn, -turn + 1, -1, 0, turn - 1, turn), repeat=2):
             truth = (pieces - odd) * at_a + odd * at_b >= 0

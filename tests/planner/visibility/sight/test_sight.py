@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import shapely
 
-import stopgo.planner.visibility.sight.sight
 from stopgo.planner.geometry.shapes import GRID, polygon_parts, snapped_union, to_grid, whole_steps
 from stopgo.planner.space.targets import face_segments, units_on
 from stopgo.planner.visibility.sight.mesh import containing, mesh_of
 from stopgo.planner.visibility.sight.sight import Runs, Scene, scene_of, sight
 from stopgo.planner.visibility.sight.sightlines import Midpoints
 from tests.faults.sizes import size
+from tests.planner.kernels import interpret
 from tests.planner.oracle import visible_pairs
 
 
@@ -115,10 +115,10 @@ def test_the_kernel_agrees_with_brute_force_on_lattice_floors(reach: float | Non
 def test_compiled_and_interpreted_kernels_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(20):
         world = lattice_world(1000 + seed)
-        monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", np.inf)
-        interpreted = sight(world.scene(), world.viewpoints, reach=2.5)
-        monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", -1)
         compiled = sight(world.scene(), world.viewpoints, reach=2.5)
+        with monkeypatch.context() as patch:
+            interpret(patch)
+            interpreted = sight(world.scene(), world.viewpoints, reach=2.5)
         for name in ("pointer", "segment", "low", "high"):
             assert np.array_equal(getattr(interpreted, name), getattr(compiled, name)), (seed, name)
 
@@ -140,12 +140,13 @@ def test_sight_between_free_points_is_symmetric(reach: float | None) -> None:
         assert seen.diagonal().all()
 
 
-@pytest.mark.parametrize("compile_above", [-1, np.inf])
+@pytest.mark.parametrize("speed", ["compiled", "interpreted"])
 def test_a_limited_look_sees_what_lies_between_its_limits(
-    compile_above: float, monkeypatch: pytest.MonkeyPatch
+    speed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Points on a limit may need a ray rotated beyond it, so only points between are certain."""
-    monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", compile_above)
+    if speed == "interpreted":
+        interpret(monkeypatch)
     for seed in range(20):
         world = lattice_world(6000 + seed)
         random = np.random.default_rng(seed)

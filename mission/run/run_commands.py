@@ -28,11 +28,12 @@ Reason = Literal[
     "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
     "storage", "untrusted", "replayed", "way_differs",
     "unsupported", "not_armed", "wrong_origin", "mission_differs", "no_position", "denied", "not_ready",
+    "not_stopped",
 ]  # fmt: skip
 """Reason why a robot refuses a command, or a mission."""
 
 
-class Order(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is"):
+class RunCommand(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is"):
     """A command; sent again with the same `cmd_id` it is executed once."""
 
     cmd_id: ShortText

@@ -1,6 +1,6 @@
 """Draws `office.dxf`, the sample floor of the demonstration: an office of 26 by 13 m on one storey.
 
-    python -m stopgo.recordings.samples.draw_office [office.dxf]
+    python -m tests.planner.floors.draw_office [office.dxf]
 
 Its bytes are the same every time, so that a plan of the sample can be repeated.
 """
@@ -229,7 +229,7 @@ def _global_id(name: str) -> str:
 
 
 def main() -> None:
-    default = Path(__file__).with_name("office.dxf")
+    default = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else default
     path.write_bytes(draw())
 

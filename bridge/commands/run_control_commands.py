@@ -51,15 +51,15 @@ if TYPE_CHECKING:
     from stopgo.bridge.station.fleet import FleetMember
     from stopgo.bridge.station.roster import LastSeen
     from stopgo.mission.run.events import StateReport
-    from stopgo.mission.run.orders import Answer, Verb
+    from stopgo.mission.run.run_commands import Answer, Verb
 
 STATUS_KEYS = (
     "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "outside",
-    "battery",
+    "battery", "battery_ok", "position_ok", "fence_ok",
 )  # fmt: skip
 
 
-def add_orders(app: typer.Typer) -> None:
+def add_run_control(app: typer.Typer) -> None:
     """Add the commands of this module to the front door."""
     app.command()(start)
     for verb in ABOUT:
@@ -112,7 +112,7 @@ NO_EFFECT: dict[Verb, tuple[str, ...]] = {
 
 def stops(verb: Verb) -> bool:
     """Return True for a command that stops a robot in every state."""
-    from stopgo.mission.run.orders import FREE_VERBS
+    from stopgo.mission.run.run_commands import FREE_VERBS
 
     return verb in FREE_VERBS
 
@@ -131,7 +131,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
         json_: Json = False,
     ) -> None:
         driving = connection.for_driving(arm=arm, disarm=disarm, any_origin=any_origin)
-        from stopgo.mission.run.orders import FREE_VERBS
+        from stopgo.mission.run.run_commands import FREE_VERBS
 
         driving = driving.for_stopping(verb) if stops(verb) else driving
         at_once = verb in FREE_VERBS
@@ -264,9 +264,9 @@ def member_line(member: FleetMember, before: LastSeen | None) -> str:
     if member.state is not None:
         return state_line(member.state)
     last = (
-        "never seen from here"
+        "never answered from here"
         if before is None
-        else f"{before.state} when last seen, {before.at:%Y-%m-%d %H:%M} UTC"
+        else f"{before.state} at its last report, {before.at:%Y-%m-%d %H:%M} UTC"
     )
     return f"{member.robot}: NO DATA; {last}; {member.trouble}"
 
@@ -280,14 +280,16 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
     """Print the robot's answer to a command."""
     with reporting_done(f"{robot}: {answer.verb} was carried out"):
         if json_:
-            print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
-                        "run_id": answer.run_id, "state": answer.state})  # fmt: skip
+            told = {key: getattr(answer, key) for key in ("verb", "outcome", "run_id", "state", "message")}
+            print_json({"robot": robot} | told)
         else:
-            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+            noted = f"; {answer.message}" if answer.message else ""
+            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}{noted}")
 
 
 def state_line(report: StateReport) -> str:
     """Return the state as one line of text."""
+    from stopgo.mission.run.health_text import health_text
     from stopgo.mission.run.tolerance import stops_outside_text
 
     mission = (
@@ -302,5 +304,5 @@ def state_line(report: StateReport) -> str:
         mission += f" (revision {report.next_revision} from the next stop on)"
     return (
         f"{report.robot}: {report.state}{stop}; {mission}; {report.done_count} done{outside}{skipped};"
-        f" battery {report.battery:.0%}"
+        f" {health_text(report)}"
     )

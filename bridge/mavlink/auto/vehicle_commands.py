@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
+from stopgo.bridge.console import say
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.auto.commanded_standstill import stand
 from stopgo.bridge.mavlink.auto.confirmed_commands import SHOWS_S, ConfirmedCommands, Denied
@@ -32,17 +33,19 @@ from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.resuming import ON_LINE_M, resume_place, route_lines
 from stopgo.mission.mavlink.following.steps import Observation
-from stopgo.mission.mavlink.local_frame import apart
+from stopgo.mission.mavlink.local_frame import VehicleOrigin, apart
 from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.decision import Decision, decide, handed_over
 from stopgo.mission.run.events import Pose
 from stopgo.mission.run.lease import Lease
-from stopgo.mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused, Verb
+from stopgo.mission.run.run_commands import DRIVING, FREE_VERBS, Answer, Refused, RunCommand, Verb
 from stopgo.mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
 """Longest time of one step of a command; after it, changes count as made by somebody else again."""
+PENDING_S = 1.0
+"""Time that a process may take to note that a pending command was carried out."""
 STOPS_KEPT = 1000
 """Answers to stops of this process that are kept in memory."""
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
@@ -67,7 +70,7 @@ class Consent:
     """The vehicle finds its position by satellites, whatever its origin."""
 
 
-class VehicleOrders:
+class VehicleCommands:
     """Carries out commands to one vehicle."""
 
     def __init__(
@@ -89,10 +92,10 @@ class VehicleOrders:
         self._wall = wall
         self._consent = consent
         self._stands = stands
-        self._stops: OrderedDict[str, tuple[Order, Answer]] = OrderedDict()
+        self._stops: OrderedDict[str, tuple[RunCommand, Answer]] = OrderedDict()
         """Answered stops of this process: one that comes again must not stop a resumed vehicle."""
 
-    def execute(self, order: Order) -> Answer:
+    def execute(self, order: RunCommand) -> Answer:
         """Carry out a command once, and store the answer.
 
         Raises
@@ -105,6 +108,7 @@ class VehicleOrders:
         before = answered(self._book.journal, order, self._book.run)
         if before is not None:
             return before
+        self._await_pending()
         decision = self._conflict(order) or self._decided(order)
         if isinstance(decision, Refused):
             return self._stored(order, decision, None)
@@ -117,7 +121,7 @@ class VehicleOrders:
                 return self._stored(order, denied.refused, None)
             return self._stored(order, change, decision.lease, decision.note)
 
-    def _stop_once(self, order: Order) -> Answer:
+    def _stop_once(self, order: RunCommand) -> Answer:
         known = self._stops.get(order.cmd_id)
         if known is not None and known[0] == order:
             return known[1]
@@ -127,7 +131,7 @@ class VehicleOrders:
             self._stops.popitem(last=False)
         return answer
 
-    def _stop(self, order: Order) -> Answer:
+    def _stop(self, order: RunCommand) -> Answer:
         """Have the vehicle stand, whatever the run's state; then change the run, if its state allows that."""
         with _Stopping(self._book, ordered_by(order.verb, order.commander)) as stopping:
             try:
@@ -145,7 +149,15 @@ class VehicleOrders:
                 return self._stored(order, Change(self._book.run), None)
             return self._stored(order, decision.change, decision.lease)
 
-    def _conflict(self, order: Order) -> Refused | None:
+    def _await_pending(self) -> None:
+        """Wait a while for the command that the run's progress requires: its HOLD must not follow our AUTO.
+
+        The process that watches sends it; without one it stays pending.
+        """
+        with self._commands.news:
+            self._commands.news.wait_for(lambda: self._book.pending is None, SHOWS_S + PENDING_S)
+
+    def _conflict(self, order: RunCommand) -> Refused | None:
         """Refuse a second command at a time."""
         other = self._book.ordered
         if other is None or other.until_ns <= self._book.clock.now_ns():
@@ -156,7 +168,7 @@ class VehicleOrders:
         """Refuse a vehicle whose local frame has not the mission's origin: its position means nothing."""
         if self._consent.any_origin:
             return None
-        origin = self._peer.origin()
+        origin = self._peer.origin() or self._origin_given_again(listed)
         if origin is None:
             return Refused(
                 "wrong_origin",
@@ -167,8 +179,20 @@ class VehicleOrders:
         satellites = "; or add --skip-origin-check, if it finds its position by satellites"
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 
-    def _decided(self, order: Order) -> Decision | Refused:
-        listed, run, here = self._book.listed, self._book.run, self._pose
+    def _origin_given_again(self, listed: ListedMission) -> VehicleOrigin | None:
+        """Give a vehicle the mission's origin that lost it by a restart during the run; its new origin."""
+        if self._book.run.over:
+            return None
+        site = listed.sent.origin
+        origin = self._peer.set_origin(VehicleOrigin(lat=site.lat, lon=site.lon, alt=site.alt))
+        if origin is not None:
+            say(f"{self._peer}: it had no origin after its restart, and got the mission's again")
+            with self._commands.news:
+                self._commands.news.wait_for(lambda: self._pose is not None, SHOWS_S)
+        return origin
+
+    def _decided(self, order: RunCommand) -> Decision | Refused:
+        listed, run = self._book.listed, self._book.run
         if listed is None:
             return Refused("no_mission", UNREMEMBERED)
         if order.verb in DRIVING and self._observer.position.items == 0:
@@ -176,6 +200,7 @@ class VehicleOrders:
         wrong_origin = self._wrong_origin(listed) if order.verb in DRIVING else None
         if wrong_origin is not None:
             return wrong_origin
+        here = self._pose
         if here is None and order.verb not in FREE_VERBS:
             return Refused("no_position", "the vehicle reports no position; does its navigation run?")
         if here is not None and order.verb != "start":
@@ -183,13 +208,13 @@ class VehicleOrders:
         situation = situation_of(
             self._book.journal, listed.mission, run=run, pose=here or NOWHERE,
             now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
-            battery=self._observer.status.battery, endurance_s=None, boot_id=self._book.boot_id,
+            battery=self._observer.status.health.charge, endurance_s=None, boot_id=self._book.boot_id,
         )  # fmt: skip
         return decide(order, situation)
 
     # One function per verb
 
-    def _start(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _start(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         run = decision.change.run
         observed = self._observe(run, listed)
         self._ready(listed)
@@ -197,7 +222,7 @@ class VehicleOrders:
         self._go(listed, first, None)
         return decision.change
 
-    def _resume(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _resume(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         run = self._book.run
         observed = self._observe(run, listed)
         self._ready(listed)
@@ -206,7 +231,7 @@ class VehicleOrders:
         self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
-    def _resumed(self, run: Run, order: Order, decision: Decision) -> Change:
+    def _resumed(self, run: Run, order: RunCommand, decision: Decision) -> Change:
         """Let the run go on, under its present commander."""
         before = self._book.journal.fact("lease", Lease)
         change = runs.resumed(run, order.commander)
@@ -216,7 +241,7 @@ class VehicleOrders:
         items = listed.stops[run.at]
         return items.at < observed.place < items.after
 
-    def _retry(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _retry(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         """Drive to the stop again; the vehicle is on the path to it, or next to it."""
         run = runs.changed(self._book.run, stop_state="WAITING", approaches=0)
         observed = self._observe(run, listed)
@@ -224,7 +249,7 @@ class VehicleOrders:
         self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
-    def _skip(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _skip(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         """Skip the stop: the vehicle still drives the path to it, and passes its waits once it is there."""
         before, after = self._book.run, decision.change.run
         observed = self._observe(after, listed)
@@ -241,7 +266,7 @@ class VehicleOrders:
             self._commands.jump(listed.sequence(beyond))
         return decision.change
 
-    def _home(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+    def _home(self, order: RunCommand, listed: ListedMission, decision: Decision) -> Change:
         raise Denied(Refused("unsupported", HOMEWARD))
 
     # Shared by several verbs
@@ -270,6 +295,9 @@ class VehicleOrders:
         unplaced = self._peer.unplaced()
         if unplaced:
             raise Denied(Refused("no_position", unplaced))
+        lasting = self._observer.status.health.lasting(self._book.run.reason)
+        if lasting:
+            raise Denied(Refused("not_ready", lasting))
         self._check_mission(listed)
         armed = self._observer.status.armed
         if not armed and not self._consent.arm:
@@ -299,11 +327,13 @@ class VehicleOrders:
 
     # Storing
 
-    def _ordering(self, order: Order) -> _Ordering:
+    def _ordering(self, order: RunCommand) -> _Ordering:
         ordered = ordered_by(order.verb, order.commander)
         return _Ordering(self._book, ordered, self._commands)
 
-    def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None, note: str = "") -> Answer:
+    def _stored(
+        self, order: RunCommand, outcome: Change | Refused, lease: Lease | None, note: str = ""
+    ) -> Answer:
         """Store the answer together with the changes by the command."""
         refused = outcome if isinstance(outcome, Refused) else None
         journal = self._book.journal
@@ -383,12 +413,12 @@ class _Stopping(_Noted):
             self._extend(ORDERING_NS)
 
 
-VERBS: dict[str, Callable[[VehicleOrders, Order, ListedMission, Decision], Change]] = {
-    "start": VehicleOrders._start,
-    "resume": VehicleOrders._resume,
-    "skip": VehicleOrders._skip,
-    "retry": VehicleOrders._retry,
-    "home": VehicleOrders._home,
+VERBS: dict[str, Callable[[VehicleCommands, RunCommand, ListedMission, Decision], Change]] = {
+    "start": VehicleCommands._start,
+    "resume": VehicleCommands._resume,
+    "skip": VehicleCommands._skip,
+    "retry": VehicleCommands._retry,
+    "home": VehicleCommands._home,
 }
 
 

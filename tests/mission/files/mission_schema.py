@@ -1,7 +1,7 @@
 """The JSON Schema of mission.json, made from the document's types and shipped as mission.schema.json.
 
 Regenerate the shipped file with
-`python -m stopgo.mission.files.mission_schema > mission/mission.schema.json`.
+`python -m tests.mission.files.mission_schema > mission/mission.schema.json`.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from stopgo.bridge.link.protocol import Accepted, encode
 from stopgo.mission.document import Mission
 from stopgo.mission.run.decision import STATES
 from stopgo.mission.run.events import TakenOver
-from stopgo.mission.run.orders import LONGEST_VALID_S, Verb
+from stopgo.mission.run.run_commands import LONGEST_VALID_S, Verb
 from stopgo.mission.run.states import DetailedState
 
 VERBS: tuple[Verb, ...] = get_args(Verb)

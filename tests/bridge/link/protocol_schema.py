@@ -1,7 +1,7 @@
 """JSON Schema of all messages on the link, generated from the code and shipped as protocol.schema.json.
 
 Regenerate the shipped file with
-`python -m stopgo.bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
+`python -m tests.bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 from stopgo.bridge.link.protocol import VERSION, Tagged
 from stopgo.bridge.link.seals import Seal
 from stopgo.mission.run.events import KINDS, AnyEvent, Health, PoseReport, StateReport, UnknownKind
-from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.run_commands import Answer, RunCommand
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -24,10 +24,10 @@ def protocol_schema() -> bytes:
 
     Any further field is valid in each of them, and so is an event of a kind that is not known.
     """
-    spoken = (*Tagged.__subclasses__(), Order, Answer, AnyEvent, StateReport, PoseReport, Health, Seal)
+    spoken = (*Tagged.__subclasses__(), RunCommand, Answer, AnyEvent, StateReport, PoseReport, Health, Seal)
     _, defs = msgspec.json.schema_components(spoken)
-    command = str(Order.__struct_config__.tag)
-    defs[command] = defs.pop(Order.__name__) | {"title": command}
+    command = str(RunCommand.__struct_config__.tag)
+    defs[command] = defs.pop(RunCommand.__name__) | {"title": command}
     defs[UnknownKind.__name__] = _of_any_other_kind(defs[UnknownKind.__name__])
     defs["Event"] = _event()
     defs["LogPage"]["properties"]["events"]["items"] = {"$ref": "#/$defs/Event"}

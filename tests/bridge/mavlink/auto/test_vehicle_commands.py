@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
+from stopgo.bridge.mavlink.auto.vehicle_commands import Consent, VehicleCommands
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
@@ -19,7 +19,7 @@ from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Aborted, Pose, Resumed, Started
-from stopgo.mission.run.orders import Order
+from stopgo.mission.run.run_commands import RunCommand
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 
@@ -123,11 +123,11 @@ def test_a_mission_that_another_station_has_cleared_is_not_told_or_started(tmp_p
 
 
 def test_an_abort_under_a_used_id_is_refused_and_never_told_that_it_was_done(tmp_path: Path) -> None:
-    start = Order(cmd_id="once", verb="start", commander="test", issued_ns=0, valid_for_s=5.0)
+    start = RunCommand(cmd_id="once", verb="start", commander="test", issued_ns=0, valid_for_s=5.0)
     abort = msgspec.structs.replace(start, verb="abort")
     with Site(tmp_path).book() as book:
         no_vehicle: Any = None
-        orders = VehicleOrders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent(), stands=True)
+        orders = VehicleCommands(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent(), stands=True)
         remember_answer(book.journal, start, answer_to(start, None, book.run))
         assert (orders.execute(start).outcome, orders.execute(abort).reason) == ("ok", "id_reused")
 

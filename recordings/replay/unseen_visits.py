@@ -1,0 +1,174 @@
+"""Visits that may have happened unseen: in a gap, before or after the log, or while poses jump."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from stopgo.mission.document import Stop
+from stopgo.mission.run.run_log import Track
+from stopgo.recordings.replay.matching import REACH_M, Match, least_stay_s, long_enough
+from stopgo.recordings.replay.position_errors import lasting_jump
+from stopgo.recordings.replay.replayed import Replay
+
+LEAST_GAP_S = 1.0
+"""Time without poses from which on the robot was not seen."""
+BROKEN_NS = 6 * 10**9
+"""Longest break between two standstills at one stop that jumping poses may have made."""
+FASTER = 1.5
+"""Speed in a gap, as a multiple of the mission's, up to which a robot may have driven to a stop and back."""
+
+
+def why_unseen(replay: Replay, number: int, unsure_m: float, *, halted: bool = False) -> str:
+    """Return why a good visit of a stop may have happened unseen; empty if the poses exclude one.
+
+    Stops may be visited in any order, so that every gap counts that is long enough to drive there, scan and
+    drive on. `unsure_m` is the uncertainty of positions. `halted`: the robot halted near it for long enough,
+    so that only its shorter halts within tolerance count.
+    """
+    stop, track = replay.mission.stops[number], replay.run.poses
+    if not len(track):
+        return ""
+    there = [match for match in replay.matches if match.stop == number]
+    if halted:
+        near_m = stop.tolerance_m + unsure_m
+        there = [
+            match for match in there if match.away_m <= near_m and not long_enough(match.standstill, stop)
+        ]
+    reasons = (
+        _possibly_longer(track, there, stop),
+        _in_a_gap(replay, stop, unsure_m),
+        _before_or_after(replay),
+        _after_a_jump(track),
+        _elsewhere_by_drift(replay, stop, unsure_m),
+    )
+    return next((reason for reason in reasons if reason), "")
+
+
+def _possibly_longer(track: Track, at: Sequence[Match], stop: Stop) -> str:
+    """Return why a standstill may have been longer than the log shows; empty if it was not."""
+    slack_ns, least_s = int(LEAST_GAP_S * 1e9), least_stay_s(stop)
+    if any(match.standstill.end_ns + slack_ns >= track.ns[-1] for match in at):
+        return "the log ends while the robot is stationary there; give a log that continues"
+    if any(match.standstill.begin_ns - slack_ns <= track.ns[0] for match in at):
+        return "the log begins while the robot is stationary there; give an earlier log"
+    begin_ns = None
+    for one, other in pairwise(at):
+        broken = other.standstill.begin_ns - one.standstill.end_ns <= BROKEN_NS
+        begin_ns = (begin_ns or one.standstill.begin_ns) if broken else None
+        if begin_ns is not None and (other.standstill.end_ns - begin_ns) / 1e9 >= least_s:
+            return JUMPS
+    for match in at:
+        if _until_a_jump_s(track, match) >= least_s:
+            return JUMPS
+        if possible_s(track, match) >= least_s:
+            return "poses are too rare to measure the standstill; give another source of poses"
+    return ""
+
+
+JUMPS = "its poses jump while it is stationary; give another source of poses"
+
+
+def possible_s(track: Track, match: Match) -> float:
+    """Return the longest time that a standstill may have taken: from the pose before it to that after."""
+    before = int(np.searchsorted(track.ns, match.standstill.begin_ns)) - 1
+    after = int(np.searchsorted(track.ns, match.standstill.end_ns, side="right"))
+    begin, end = track.ns[max(before, 0)], track.ns[min(after, len(track) - 1)]
+    return float(end - begin) / 1e9
+
+
+def _until_a_jump_s(track: Track, match: Match) -> float:
+    """Return the time around a standstill without any step of normal driving: jumps leave and come back."""
+    edges = [match.standstill.begin_ns, match.standstill.end_ns]
+    around = track.between(edges[0] - BROKEN_NS, edges[1] + BROKEN_NS)
+    near = np.hypot(*(around.xy - match.standstill.xy).T) <= NEAR_M
+    step = np.hypot(*np.diff(around.xy, axis=0).T) if len(around) > 1 else np.empty(0)
+    jumped = np.flatnonzero((step > NEAR_M) & (step > FASTEST_M_S * np.diff(around.ns) / 1e9))
+    if not len(jumped) or not near.any():
+        return 0.0
+    there = around.ns[near]
+    return float(there[-1] - there[0]) / 1e9
+
+
+NEAR_M, FASTEST_M_S = 0.1, 3.0
+"""Distance within which poses are of one standstill, and speed above which a step is a jump."""
+
+
+def _in_a_gap(replay: Replay, stop: Stop, unsure_m: float) -> str:
+    """Return the longest gap in which the robot may have driven to the stop, scanned, and driven on."""
+    speed = FASTER * replay.mission.robot.speed
+    reach = stop.tolerance_m + unsure_m
+    longest = 0.0
+    for seconds, begin, end in _gaps(replay.run.poses):
+        drive_m = sum(max(0.0, math.dist(point, (stop.x, stop.y)) - reach) for point in (begin, end))
+        if seconds >= max(LEAST_GAP_S, least_stay_s(stop)) + drive_m / speed:
+            longest = max(longest, seconds)
+    return f"{longest:.0f} s without poses on the path; give another source of poses" if longest else ""
+
+
+def _gaps(track: Track) -> Iterator[tuple[float, tuple[float, float], tuple[float, float]]]:
+    """Yield each step between poses longer than LEAST_GAP_S: seconds, and both positions."""
+    seconds = np.diff(track.ns) / 1e9
+    for k in np.flatnonzero(seconds > LEAST_GAP_S).tolist():
+        (ax, ay), (bx, by) = track.xy[k].tolist(), track.xy[k + 1].tolist()
+        yield float(seconds[k]), (ax, ay), (bx, by)
+
+
+def _before_or_after(replay: Replay) -> str:
+    """Return whether the log begins after the run, or ends before it."""
+    if not _over(replay):
+        return "the log ends before; give a log that continues"
+    return BEGINS_LATE if _begins_late(replay) else ""
+
+
+BEGINS_LATE = "the log begins after the start of the mission; give an earlier log"
+
+
+def _over(replay: Replay) -> bool:
+    """True if the log goes on until the robot is back at the end of the return, or has parked near it.
+
+    Without a return, the run is over when the robot has scanned at the last stop and halts nowhere else.
+    """
+    mission, end, track = replay.mission, (replay.mission.return_ or ())[-1:], replay.run.poses
+    if end:
+        away = float(np.hypot(*(track.xy[-1] - end[0])))
+        parked = any(match.standstill.end_ns + PARKED_NS >= track.ns[-1] for match in replay.matches[-1:])
+        return away <= REACH_M or (parked and away <= PARKED_M)
+    last = len(mission.stops) - 1
+    return any(
+        match.stop == last and long_enough(match.standstill, mission.stops[last])
+        for match in replay.matches[-1:]
+    )
+
+
+PARKED_M, PARKED_NS = 2.0, 10**9
+"""Distance from the end of the return within which a robot has parked, and time to the end of the log."""
+
+
+def _begins_late(replay: Replay) -> bool:
+    """True if the first pose is not at the mission's start."""
+    start, xy = replay.mission.start, replay.run.poses.xy[0]
+    return bool(np.hypot(*(xy - (start.x, start.y))) > REACH_M)
+
+
+def _after_a_jump(track: Track) -> str:
+    jump = lasting_jump(track)
+    if jump is None:
+        return ""
+    return f"the poses jump by {jump[1]:.1f} m and do not come back; give poses matched to a map"
+
+
+def _elsewhere_by_drift(replay: Replay, stop: Stop, unsure_m: float) -> str:
+    """Return whether a long standstill at no stop may have been at this one, by unsure poses."""
+    reach = stop.tolerance_m + 2 * unsure_m
+    for match in replay.matches:
+        away = math.dist(match.standstill.xy, (stop.x, stop.y))
+        if match.stop is None and away <= reach and long_enough(match.standstill, stop):
+            return DRIFTS
+    return ""
+
+
+DRIFTS = "the poses drift by more than the tolerance; give poses matched to a map, or a scan at the stop"

@@ -1,0 +1,74 @@
+"""A day's missions from a batch: what is planned for it, less what earlier runs acquired."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from stopgo.batches.batch_file import read_day
+from stopgo.batches.batch_run import Batch
+from stopgo.batches.day_page import Day, begin_of, write_day
+from stopgo.batches.day_plan import DayJob, plan_day, read_ways, robots_of, span
+from stopgo.batches.record import BatchRecord, EntryRecord
+from stopgo.batches.visits import Visits
+from stopgo.mission.errors import InputError
+
+
+def write_day_of(file: Path, out: Path, date: str, batch: Batch, record: BatchRecord, visits: Visits) -> Path:
+    """Allocate the missions of a day to the robots of a batch's file; returns the overview's path.
+
+    They are those of the entries with this date, and of those without a date.
+
+    Raises
+    ------
+    InputError
+        When the file has no robots, two variants of a floor are planned, or the ways cannot be read.
+    """
+    table = read_day(file)
+    dates = {entry.name: entry.settings.date for entry in batch.entries}
+    sites = {entry.name: entry.site for entry in batch.entries}
+    due = [item for item in record.entries if item.stops and dates[item.name] in (date, None)]
+    _one_variant([sites[item.name] for item in due], date)
+    acquired = [item.name for item in due if visits.acquired(item.missions)]
+    robots, ways = robots_of(table), None if table.ways is None else file.parent / table.ways
+    plan = plan_day(
+        [_job(item, sites[item.name]) for item in due if item.name not in acquired],
+        robots,
+        read_ways(ways),
+        default_s=span(table.way, "way"),
+        setup_s=span(table.setup, "setup"),
+    )
+    day = Day(
+        date=date,
+        begin_s=begin_of(table.begin),
+        plan=plan,
+        missions={item.name: _files(out, item.name) for item in due},
+        acquired=acquired,
+        begun={item.name: text for item in due if (text := _begun(item, visits))},
+    )
+    return write_day(out / "days" / date, day)
+
+
+def _one_variant(sites: list[str], date: str) -> None:
+    twice = sorted({site for site in sites if sites.count(site) > 1})
+    if twice:
+        raise InputError(
+            f"--day {date}: {twice[0]} is planned in several variants; leave one, with exclude or no matrix"
+        )
+
+
+def _job(item: EntryRecord, site: str) -> DayJob:
+    return DayJob(item.name, site, item.time_s or 0.0, item.stops or 0)
+
+
+def _files(out: Path, name: str) -> list[str]:
+    """Mission files of an entry, the main part first."""
+    return sorted(
+        (str(path) for path in (out / name).glob("mission*.json")), key=lambda path: (len(path), path)
+    )
+
+
+def _begun(item: EntryRecord, visits: Visits) -> str:
+    """Remedy for an entry with a run that did not acquire all; empty without one."""
+    runs = visits.begun(item.missions)
+    done = ", ".join(f"{run.scanned} of {run.asked} stops by {run.robot}, run {run.run_id}" for run in runs)
+    return f"{done}; stopgo review proposes a follow-up mission" if runs else ""

@@ -1,0 +1,259 @@
+"""Engines that work on many entries: processes of this machine, or the workers of a dask cluster.
+
+Both are `concurrent.futures.Executor`. A slot takes one entry at a time. An entry whose process ended
+(killed, or out of memory) is tried a second time, alone, when all others have ended; then it has failed.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from typing import Any, Protocol
+
+from stopgo.batches.content import computed_by
+from stopgo.batches.work import PlanOutcome, PlanTask, work
+from stopgo.mission.errors import InputError, OutcomeUnknown
+
+TRIES = 2
+TICK_S = 0.5
+BASE_BYTES = 350e6
+"""Memory of a process that plans a small floor."""
+BYTES_PER_BYTE = 12.0
+"""Memory per byte of the floor's file."""
+
+
+class Engine(Protocol):
+    """Slots that work on one entry each."""
+
+    slots: int
+
+    def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
+        """Begin an entry on a free slot."""
+        ...
+
+    def renew(self, slot: int) -> None:
+        """Make a slot usable again after its process ended."""
+        ...
+
+    def close(self, *, at_once: bool) -> None:
+        """End all slots; `at_once` ends what they are working on, too."""
+        ...
+
+
+class LocalEngine:
+    """A process for each slot on this machine; one that dies takes no other with it."""
+
+    def __init__(self, workers: int) -> None:
+        self.slots = workers
+        self._pools: list[Executor | None] = [None] * workers
+
+    def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
+        pool = self._pools[slot]
+        if pool is None:
+            pool = self._pools[slot] = worker_process()
+        return pool.submit(work, task)
+
+    def renew(self, slot: int) -> None:
+        pool, self._pools[slot] = self._pools[slot], None
+        if pool is not None:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+    def close(self, *, at_once: bool) -> None:
+        for pool in self._pools:
+            if pool is None:
+                continue
+            processes = list((getattr(pool, "_processes", None) or {}).values())
+            pool.shutdown(wait=not at_once, cancel_futures=True)
+            for process in processes if at_once else ():
+                process.kill()
+
+
+def worker_process(count: int = 1) -> ProcessPoolExecutor:
+    """Return processes that work on entries; they end with this one, and leave Ctrl-C to it."""
+    context = get_context("spawn")
+    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=(os.getpid(),))
+
+
+def _begin_worker(parent: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """End this process when its parent is gone: its pool would wait for entries for ever."""
+    while os.getppid() == parent or os.name != "posix":
+        time.sleep(1.0)
+    os._exit(1)
+
+
+class ClusterEngine:
+    """The workers of a dask cluster; all see the store and the floors under the same paths."""
+
+    def __init__(self, address: str) -> None:
+        from distributed import Client
+
+        self._address = address
+        _must_answer(address)
+        try:
+            self._client: Any = Client(address, timeout="10s")
+        except (OSError, ValueError) as error:
+            raise _not_reached(address, error) from None
+        self._refuse_others(address)
+        self._executor = self._client.get_executor(pure=False)
+
+    def _refuse_others(self, address: str) -> None:
+        """Refuse a cluster without workers, with another stopgo, or with several threads in a process."""
+        versions = self._client.run(computed_by)
+        if not versions:
+            self._client.close()
+            raise InputError(f"--scheduler {address}: has no workers; start some with: dask worker {address}")
+        own = computed_by()
+        for worker, version in versions.items():
+            if version != own:
+                self._client.close()
+                text = f"{worker}: has another stopgo ({version}) than this machine ({own})"
+                raise InputError(f"{text}; install the same on both")
+        threads = self._client.nthreads()
+        for worker, count in threads.items():
+            if count != 1:
+                self._client.close()
+                raise InputError(f"{worker}: has {count} threads; start it with --nthreads 1")
+        self.slots = len(threads)
+
+    def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
+        if self._client.status != "running":
+            raise OutcomeUnknown(f"--scheduler {self._address}: is gone; call the batch again to continue it")
+        return self._executor.submit(work, task)
+
+    def renew(self, slot: int) -> None:
+        """Dask starts its workers again itself."""
+
+    def close(self, *, at_once: bool) -> None:
+        self._executor.shutdown(wait=not at_once)
+        self._client.close()
+
+
+def _must_answer(address: str) -> None:
+    """Refuse an address at which nothing listens: the library would try for many seconds."""
+    host, _, port = address.rpartition("//")[2].rpartition(":")
+    if not port.isdigit():
+        raise InputError(f"--scheduler {address}: give an address such as tcp://127.0.0.1:8786")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=10.0).close()
+    except (OSError, OverflowError) as error:
+        raise _not_reached(address, error) from None
+
+
+def _not_reached(address: str, error: Exception) -> InputError:
+    reason = getattr(error, "strerror", None) or error
+    return InputError(f"--scheduler {address}: not reached ({reason}); start one with: dask scheduler")
+
+
+def engine_for(*, workers: int, scheduler: str | None) -> Engine:
+    """Return the engine that the options choose."""
+    return LocalEngine(workers) if scheduler is None else ClusterEngine(scheduler)
+
+
+@dataclass
+class Running:
+    """Entries in progress; each outcome is yielded when it is there."""
+
+    engine: Engine
+    tasks: Sequence[PlanTask]
+    memory: float
+    """Bytes that all slots together may use."""
+    begun: Callable[[str], None] = lambda name: None
+    """Called with the name of an entry that begins."""
+    waiting: Callable[[], None] = lambda: None
+    """Called while entries are in progress."""
+    _tries: dict[str, int] = field(default_factory=dict)
+    _now: dict[Future[PlanOutcome], tuple[int, PlanTask]] = field(default_factory=dict)
+
+    def __enter__(self) -> Running:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
+        self.engine.close(at_once=kind is not None)
+
+    def outcomes(self, stopped: Callable[[], bool] = lambda: False) -> Iterator[PlanOutcome]:
+        """Work on all entries, the largest files first; once `stopped`, begin no more."""
+        queue = deque(sorted(self.tasks, key=_memory_of, reverse=True))
+        alone: deque[PlanTask] = deque()
+        while queue or alone or self._now:
+            if stopped():
+                queue.clear()
+                alone.clear()
+            self._fill(queue)
+            if not queue and not self._now and alone:
+                self._start(0, alone.popleft())
+            done, _ = wait(self._now, timeout=TICK_S, return_when=FIRST_COMPLETED)
+            self.waiting()
+            for future in done:
+                slot, task = self._now.pop(future)
+                outcome = self._outcome_of(future, slot, task)
+                if outcome is None:
+                    alone.append(task)
+                else:
+                    yield outcome
+
+    def _fill(self, queue: deque[PlanTask]) -> None:
+        """Begin entries while there are free slots and memory; one always runs."""
+        free = [slot for slot in range(self.engine.slots) if slot not in {s for s, _ in self._now.values()}]
+        for slot in free:
+            used = sum(_memory_of(task) for _, task in self._now.values())
+            fitting = next((t for t in queue if not self._now or used + _memory_of(t) <= self.memory), None)
+            if fitting is None:
+                return
+            queue.remove(fitting)
+            self._start(slot, fitting)
+
+    def _start(self, slot: int, task: PlanTask) -> None:
+        self._tries[task.name] = self._tries.get(task.name, 0) + 1
+        self.begun(task.name)
+        self._now[self.engine.submit(slot, task)] = (slot, task)
+
+    def _outcome_of(self, future: Future[PlanOutcome], slot: int, task: PlanTask) -> PlanOutcome | None:
+        """The outcome; None if the entry is to be tried again."""
+        try:
+            return future.result()
+        except (BrokenProcessPool, CancelledError):
+            self.engine.renew(slot)
+        except Exception as error:  # noqa: BLE001  where the entry's process ends
+            if type(error).__name__ != "KilledWorker":  # dask's word for a process that ended
+                return _failed(task, f"unexpected error ({type(error).__name__}: {error}); please report it")
+        if self._tries[task.name] < TRIES:
+            return None
+        problem = "its process ended twice (killed, or out of memory), the second time alone"
+        return _failed(task, f"{problem}; give it a machine with more memory")
+
+
+def _failed(task: PlanTask, problem: str) -> PlanOutcome:
+    return PlanOutcome(name=task.name, status="failed", exit_code=2, problem=f"{task.floor}: {problem}")
+
+
+def _memory_of(task: PlanTask) -> float:
+    """Estimated memory of an entry, bytes."""
+    try:
+        size = os.path.getsize(task.floor)
+    except OSError:
+        size = 0
+    return BASE_BYTES + BYTES_PER_BYTE * size
+
+
+def free_memory() -> float:
+    """Memory that this machine can give to processes, bytes; nine tenths of what is available."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            available = next(int(line.split()[1]) for line in file if line.startswith("MemAvailable"))
+        return 0.9 * 1024 * available
+    except (OSError, StopIteration, ValueError):
+        return 4e9

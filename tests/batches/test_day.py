@@ -1,0 +1,179 @@
+"""Tests of a day's missions: allocation to robots and shifts, visits of earlier days, pages."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise, permutations, product
+from pathlib import Path
+
+import pytest
+
+from stopgo.batches import engine
+from stopgo.batches.day_page import begin_of
+from stopgo.batches.day_plan import DayJob, DayPlan, DayRobot, plan_day, read_ways, span
+from stopgo.batches.entries import Entry
+from stopgo.batches.visits import PlannedMission, Visits, with_since
+from stopgo.batches.work import work
+from stopgo.mission.errors import InputError
+from stopgo.mission.settings import Settings
+from stopgo.recordings.catalog.run_index import IndexedRun
+from tests.batches.halls import batch_file, hall
+from tests.batches.inline_engine import InlineEngine
+from tests.called import stopgo as called
+
+HOUR = 3600.0
+
+
+def job(name: str, hours: float, site: str = "") -> DayJob:
+    return DayJob(name, site or name, hours * HOUR, stops=10)
+
+
+def planned(jobs: Sequence[DayJob], robots: Sequence[DayRobot]) -> DayPlan:
+    return plan_day(jobs, robots, {}, default_s=0.5 * HOUR, setup_s=0.0)
+
+
+def test_two_robots_share_what_one_shift_cannot_hold() -> None:
+    plan = planned(
+        [job(n, 3.0) for n in "abcd"], [DayRobot("r1", 8 * HOUR, "a"), DayRobot("r2", 8 * HOUR, "b")]
+    )
+    assert [len(steps) for steps in plan.steps] == [2, 2]
+    assert not plan.left
+    assert all(back <= 8 * HOUR for back in plan.returns_s)
+
+
+def test_what_fits_into_no_shift_is_left_and_named() -> None:
+    plan = planned([job("long", 9.0), job("short", 1.0)], [DayRobot("r1", 8 * HOUR, "")])
+    assert [item.name for item in plan.left] == ["long"]
+    assert [step.job.name for step in plan.steps[0]] == ["short"]
+
+
+def test_the_way_back_belongs_to_the_shift() -> None:
+    assert planned([job("a", 3.0)], [DayRobot("r1", 4 * HOUR, "depot")]).left == ()
+    assert len(planned([job("a", 3.01)], [DayRobot("r1", 4 * HOUR, "depot")]).left) == 1
+
+
+def test_times_of_a_day_add_up() -> None:
+    ways = {("depot", "a"): 600.0, ("a", "b"): 60.0, ("b", "depot"): 600.0, ("a", "depot"): 600.0}
+    ways |= {("depot", "b"): 600.0, ("b", "a"): 60.0}
+    robot = DayRobot("r1", 8 * HOUR, "depot")
+    plan = plan_day([job("a", 1.0), job("b", 1.0)], [robot], ways, default_s=9e3, setup_s=300.0)
+    first, second = plan.steps[0]
+    assert (first.begin_s, first.end_s) == (900.0, 900.0 + HOUR)
+    assert second.begin_s == first.end_s + 60.0 + 300.0
+    assert plan.returns_s[0] == second.end_s + 600.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_as_many_jobs_are_taken_as_by_trying_everything(seed: int) -> None:
+    lengths = [((seed * 7 + k * 5) % 9 + 1) / 2 for k in range(5)]
+    jobs = [job(name, hours) for name, hours in zip("abcde", lengths, strict=True)]
+    robots = [DayRobot("r1", 6 * HOUR, "a"), DayRobot("r2", 5 * HOUR, "e")]
+    plan = planned(jobs, robots)
+    assert 5 - len(plan.left) == _most(jobs, robots)
+    assert plan == planned(jobs, robots), "the same again"
+
+
+def _most(jobs: Sequence[DayJob], robots: Sequence[DayRobot]) -> int:
+    """The most jobs that fit, by all allocations and orders."""
+    best = 0
+    for owners in product(range(len(robots) + 1), repeat=len(jobs)):
+        given = [
+            [item for item, owner in zip(jobs, owners, strict=True) if owner == k] for k in range(len(robots))
+        ]
+        if all(_fits(own, robot) for own, robot in zip(given, robots, strict=True)):
+            best = max(best, sum(map(len, given)))
+    return best
+
+
+def _fits(jobs: Sequence[DayJob], robot: DayRobot) -> bool:
+    return any(_length(order, robot) <= robot.shift_s for order in permutations(jobs))
+
+
+def _length(order: Sequence[DayJob], robot: DayRobot) -> float:
+    sites = [robot.at, *(item.site for item in order), robot.at]
+    ways = sum(0.5 * HOUR for one, other in pairwise(sites) if one != other)
+    return ways + sum(item.duration_s for item in order)
+
+
+@pytest.mark.parametrize("text", ["from,to,minutes\na,b", "a,b,x", "a,b,-1", "a,b,nan", "a,b,1e9"])
+def test_a_wrong_way_is_named_with_its_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "ways.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"ways.csv: line \d"):
+        read_ways(path)
+
+
+def test_ways_go_both_ways(tmp_path: Path) -> None:
+    path = tmp_path / "ways.csv"
+    path.write_text("from;to;minutes\na;b;2\n")
+    assert read_ways(path) == {("a", "b"): 120.0, ("b", "a"): 120.0}
+    with pytest.raises(InputError, match="cannot be read"):
+        read_ways(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("text", ["", "soon", "-1h", "nan", "9000h"])
+def test_a_wrong_duration_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="shift"):
+        span(text, "shift")
+
+
+@pytest.mark.parametrize("text", ["25:00", "7", "07:61", "x"])
+def test_a_wrong_begin_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="begin"):
+        begin_of(text)
+
+
+def run(mission: str, answer: str) -> IndexedRun:
+    return IndexedRun(
+        mission_id=mission, name="", revisions=(1,), run_id="r", robot="r1", began_ns=0, driven_s=1.0,
+        ended="Finished", scanned=3, asked=3, deviation_m=0.0, coverage=0.9, answer=answer,
+    )  # fmt: skip
+
+
+def entry(date: str | None, site: str = "tower/EG") -> Entry:
+    return Entry(
+        f"{site}/{date}", site, Path("tower.ifc"), replace(Settings(), date=date), "plans.toml: line 1"
+    )
+
+
+def test_a_floor_is_scanned_for_what_was_finished_since_its_last_acquired_run() -> None:
+    missions = {
+        "one": PlannedMission("tower/EG", "2026-01-01"),
+        "two": PlannedMission("tower/EG", "2026-02-01"),
+    }
+    visits = Visits(missions, {"one": [run("one", "yes")], "two": [run("two", "no")]})
+    limited, left_out = with_since([entry("2026-01-01"), entry("2026-03-01")], "last", visits)
+    assert [item.settings.since for item in limited] == ["2026-01-01"]
+    assert left_out == ["tower/EG/2026-01-01: scanned at its status of 2026-01-01"]
+    other, _ = with_since([entry("2026-03-01", "hall")], "last", visits)
+    assert other[0].settings.since is None
+
+
+def test_a_run_that_did_not_acquire_all_is_begun_and_not_done() -> None:
+    visits = Visits({}, {"one": [run("one", "no")], "two": [run("two", "no"), run("two", "yes")]})
+    assert not visits.acquired(["one"])
+    assert visits.acquired(["two"])
+    assert not visits.acquired([])
+    assert [item.mission_id for item in visits.begun(["one", "two", "three"])] == ["one"]
+
+
+def test_a_day_has_a_page_for_each_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "LocalEngine", lambda workers: InlineEngine(workers, work))
+    hall(tmp_path / "a.dxf")
+    hall(tmp_path / "b.dxf", width=8.0)
+    day = '[day]\nrobots = [{ name = "r1", shift = "8h" }, { name = "r/2", shift = "1min" }]\n'
+    batch_file(tmp_path, day + '[[floors]]\nfiles = "*.dxf"')
+    out = tmp_path / "out"
+    batch = ("batch", str(tmp_path / "plans.toml"), "-o", str(out))
+    done = called(*batch, "--day", "2026-11-25", "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    folder = out / "days" / "2026-11-25"
+    assert str(folder / "index.html") in done.stderr
+    robots = json.loads((folder / "day.json").read_text())["robots"]
+    assert [len(item["missions"]) for item in robots] == [2, 0]
+    assert "stopgo push" in (folder / "r1.html").read_text()
+    assert len(list(folder.glob("r_2*.html"))) == 1, "a name that is no path"
+    assert called(*batch, "--day", "soon").returncode == 2
+    assert called(*batch, "--since", "last").returncode == 2

@@ -1,0 +1,29 @@
+"""Verdicts on logs with a known truth: none is false, and few logs that could tell are undecided."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tests.faults.sizes import size
+from tests.recordings.truth.bench import answered, cases
+
+PARTS = 4
+"""The cases are dealt out among so many tests, which run side by side."""
+MOST_UNTOLD = 0.1
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("part", range(PARTS))
+def test_no_verdict_on_a_log_is_false(part: int, tmp_path: Path) -> None:
+    chosen = list(cases())[part :: PARTS * size(short=29, full=1)]
+    found = []
+    for number, case in enumerate(chosen):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        found.append(answered(case, folder))
+    assert [(item.case.name, item.kind, item.text) for item in found if item.kind.startswith("false")] == []
+    counts = Counter(item.kind for item in found)
+    assert counts["untold"] <= MOST_UNTOLD * (counts["untold"] + counts["right"])
