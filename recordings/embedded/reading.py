@@ -33,8 +33,12 @@ class Recording:
 
     @property
     def mission_id(self) -> str:
-        """Id of the mission, which is also the id of its plan and field recordings."""
-        return self.contents.recording_id
+        """Id of the mission; it is also the id of its plan's recording, and of a run's until version 0.2."""
+        for name in (entities.PROPERTY_RUN, entities.PROPERTY_PLAN):
+            found = self.contents.properties.get(name, {}).get("mission_id")
+            if found:
+                return str(found)
+        return self.missions[-1].id if self.missions else self.contents.recording_id
 
 
 def read_recording(path: Path) -> Recording:

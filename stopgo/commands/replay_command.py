@@ -233,7 +233,7 @@ class _ReplayFiles:
         if self.out is not None:
             from stopgo.recordings.replay.drawing import write_recording
 
-            write_recording(replays, self.out)
+            write_recording(replays, self.out, None if plans is None else plans.recordings[0].recording)
         if self.csv is not None:
             write_atomic(self.csv, as_csv(replays[0]))
         if self.html is not None:

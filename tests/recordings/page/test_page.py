@@ -214,7 +214,9 @@ def test_recordings_of_two_missions_are_no_one_report(
 ) -> None:
     found = review([sighted])
     (item,) = found.recordings
-    contents = replace(item.recording.contents, recording_id="f" * 32)
+    known = item.recording.contents.properties
+    properties = known | {"plan": known["plan"] | {"mission_id": "f" * 32}}
+    contents = replace(item.recording.contents, properties=properties)
     other = replace(item, recording=replace(item.recording, contents=contents))
     with pytest.raises(Exception, match="needs recordings of one mission"):
         subject_of(replace(found, recordings=(item, other)))
