@@ -49,7 +49,7 @@ class Observer:
         fix = self.poses.take(name, message, listed, now_ns)
         if fix is not None:
             self._scan_watch.take_pose(fix.pose, fix.speed)
-            self._note_progress(fix.pose, listed, now_ns)
+            self._note_progress(fix.pose, listed)
         if name == "MISSION_CURRENT":
             self._take_current(message, listed, now_ns)
         elif name == "MISSION_ITEM_REACHED":
@@ -66,11 +66,12 @@ class Observer:
         if listed is not None:
             self._scan_watch.take_item(listed, self.position.place(listed), same=same)
 
-    def _note_progress(self, pose: Pose, listed: ListedMission | None, now_ns: int) -> None:
+    def _note_progress(self, pose: Pose, listed: ListedMission | None) -> None:
+        """Note a pose at the vehicle's own time: a link may deliver it late."""
         known = listed is not None and self.position.is_known
         place = self.position.place(listed) if listed is not None and known else None
         drives = self.status.mode == AUTO and self.status.armed
-        self.progress.take(pose, listed, place, now_ns, drives=drives)
+        self.progress.take(pose, listed, place, self.status.boot_ms * 10**6, drives=drives)
 
     def fresh(self, within_s: float, now_ns: int) -> bool:
         """Return True if the most important messages come often enough."""

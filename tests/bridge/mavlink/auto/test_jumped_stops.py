@@ -45,14 +45,21 @@ def test_several_stops_that_are_jumped_over_at_once_are_all_skipped(tmp_path: Pa
     assert site.run.skipped == ("S1", "S2") and site.run.done == ()
 
 
-def test_a_jump_back_gives_nothing_away(tmp_path: Path) -> None:
-    """Back to a stop that is done: it is not scanned again for the run, and the next one is."""
-    site = Site(tmp_path, "ardupilot")
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_a_jump_back_to_a_stop_that_is_done_is_held_and_the_run_goes_on_where_it_was(
+    profile: str, tmp_path: Path
+) -> None:
+    site = Site(tmp_path, profile, speed_up=1.0)
     with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
         site.order("start")
         until(site, lambda events, run: "Scanned S1" in told(events))
         peer.send(set_current(peer.who, site_sequence(site, "S1")))
+        until(site, lambda events, run: run.state == "HELD")
+        assert "operator has set the vehicle's current item back" in site.run.reason
+        assert "(to S1, which is behind)" in site.run.reason
+        assert site.order("retry").state == "RUNNING"
     assert site.run.done == ("S1", "S2", "S3") and not site.run.skipped
+    assert told(site.events).count("Scanned S1") == 1
 
 
 def site_sequence(site: Site, stop: str) -> int:
