@@ -152,8 +152,7 @@ def replay(
 
     The log's frame is never guessed: its transform comes from the georeference, --map or --align.
 
-    Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log cannot be read, or is of
-    another mission.
+    Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log is unreadable or another's.
     """
     read = _read(logs, stamps, frame)
     if list_:
@@ -163,10 +162,9 @@ def replay(
     files.check()
     driven = _missions(mission or [], read)
     placing = replace(_placing(map_, align, time_offset, poses, robot_name), level_m=_height(floor_height))
-    plans = None if plan is None else _plans(plan, driven[0])
+    plans = _plans(plan, driven[0])
     replays = files.compare_and_write(_replays(read, driven, placing, plans, one_run=one_run), plans, driven)
-    _print_replays(replays, as_json=json_)
-    return _exit_code(replays)
+    return _print_replays(replays, as_json=json_)
 
 
 @dataclass(frozen=True)
@@ -325,8 +323,10 @@ def _height(level: float | None) -> float | None:
     return level
 
 
-def _plans(path: Path, mission: Mission) -> Review:
-    """Return a plan's recording, if it is of the mission."""
+def _plans(path: Path | None, mission: Mission) -> Review | None:
+    """Return a plan's recording, if it is of the mission; None without one."""
+    if path is None:
+        return None
     from stopgo.recordings.page.reviewed import review as read
 
     found = read([path])
@@ -365,13 +365,15 @@ def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:
         typer.echo(printable_lines("\n".join(map(listing.as_text, logs))))
 
 
-def _print_replays(replays: list[Replay], *, as_json: bool) -> None:
+def _print_replays(replays: list[Replay], *, as_json: bool) -> int:
+    """Print the comparisons; return the exit code of all."""
     from stopgo.recordings.replay import replay_text
 
     if as_json:
         _print_json([replay_text.as_json(item) for item in replays], "replays")
     else:
         typer.echo("\n\n".join(map(replay_text.as_text, replays)))
+    return _exit_code(replays)
 
 
 def _print_json(items: list[dict[str, Any]], name: str) -> None:
