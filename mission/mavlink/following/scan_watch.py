@@ -9,11 +9,21 @@ from stopgo.mission.mavlink.following.listed_mission import ListedMission, StopI
 from stopgo.mission.run.events import Pose
 from stopgo.mission.run.scan_motion import ScanMotion
 
+TRIGGER_SLACK_NS = 10**9
+"""Lateness of the report of a scan's item: it comes several times a second, and may be lost."""
+UNLIKELY = 0.5
+"""Fraction of a scan's wait before which a report is taken for that of an older scan, if one is missing."""
+
 
 class ScanWatch:
     """Takes poses and confirmed items; `why` says how the vehicle moved during the scan at a stop."""
 
     def __init__(self) -> None:
+        self._began_ns = 0
+        """Time since when the current item belongs to the watched scan."""
+        self._is_reported = True
+        self._older_is_missing = False
+        """True if a scan was left before its report came: its scanner may still be at work."""
         self._watched: tuple[ListedMission, str, ScanMotion] | None = None
         self._open: list[tuple[Pose, float]] = []
         """Poses and speeds since the last report of the current item."""
@@ -21,7 +31,27 @@ class ScanWatch:
     def take_pose(self, pose: Pose, speed: float) -> None:
         self._open.append((pose, speed))
 
-    def take_item(self, listed: ListedMission | None, place: int, *, same: bool) -> None:
+    def take_report(self, listed: ListedMission | None, now_ns: int) -> bool:
+        """Take a new report of the scanner; return False if it must be that of an older scan.
+
+        Somebody may have driven the vehicle on while its scanner worked: that scan ends at another stop.
+        """
+        missing, self._older_is_missing, watched = self._older_is_missing, False, self._watched
+        if missing and listed is not None and watched is not None and watched[0] is listed:
+            items = next(items for items in listed.stops if items.stop == watched[1])
+            wait_s = listed.wait_s(items.scan, items.after)
+            if now_ns - self._began_ns < UNLIKELY * wait_s * 1e9:
+                return False
+        self._is_reported = True
+        return True
+
+    def is_after_trigger(self, listed: ListedMission, stop: str, ns: int) -> bool:
+        """Return True if a report of that time came once the stop's scan had been triggered."""
+        watched = self._watched
+        at_scan = watched is not None and watched[:2] == (listed, stop)
+        return at_scan and ns >= self._began_ns - TRIGGER_SLACK_NS
+
+    def take_item(self, listed: ListedMission | None, place: int, now_ns: int, *, same: bool) -> None:
         """Take a report of the current item; `same` if it has not changed since the last one."""
         taken, self._open = self._open, []
         at = None if listed is None else _scan_at(listed, place)
@@ -30,6 +60,8 @@ class ScanWatch:
         if self._watched is None or self._watched[0] is not listed or self._watched[1] != at.stop:
             tolerance_m = next(stop.tolerance_m for stop in listed.mission.stops if stop.id == at.stop)
             self._watched = (listed, at.stop, ScanMotion(tolerance_m))
+            self._older_is_missing = self._older_is_missing or not self._is_reported
+            self._began_ns, self._is_reported = now_ns, False
         for pose, speed in taken if same else ():
             self._watched[2].take(pose, speed)
 
