@@ -180,7 +180,7 @@ def followed(hands: Hands, befalls: list[Any], chance: random.Random) -> None:
 
 
 def check_told(hands: Hands, mishap: object) -> None:
-    """Whoever watches is told of a foreign hand in time; a jump to where it is anyway, or at the end, is none."""
+    """Whoever watches is told of a foreign hand in time; a jump to where it is, or at the end, is none."""
     before = hands.site.events[-1].number
     hands.world.sleep(TOLD_S)
     events = [event for event in hands.site.events if event.number > before - 3]

@@ -57,7 +57,7 @@ class Observer:
         elif name == "CAMERA_IMAGE_CAPTURED":
             capture = capture_of(message, None if listed is None else listed.sent)
             at_stop = self.position.is_at_stop(listed)
-            if self.captures.is_new(capture) and not self._scan_watch.take_report(listed, now_ns):
+            if self.captures.is_new(capture) and not self._scan_watch.take_report(now_ns):
                 return self._ignored(capture, name)
             self.captures.take(capture, self.poses.pose(now_ns), now_ns, at_stop=at_stop)
         return name

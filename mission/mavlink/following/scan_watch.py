@@ -11,8 +11,6 @@ from stopgo.mission.run.scan_motion import ScanMotion
 
 TRIGGER_SLACK_NS = 10**9
 """Lateness of the report of a scan's item: it comes several times a second, and may be lost."""
-UNLIKELY = 0.5
-"""Fraction of a scan's wait before which a report is taken for that of an older scan, if one is missing."""
 
 
 class ScanWatch:
@@ -22,8 +20,10 @@ class ScanWatch:
         self._began_ns = 0
         """Time since when the current item belongs to the watched scan."""
         self._is_reported = True
-        self._older_is_missing = False
-        """True if a scan was left before its report came: its scanner may still be at work."""
+        self._left_due_ns: int | None = None
+        """Planned end of the last scan, also after it was left for another attempt."""
+        self._older_due_ns: int | None = None
+        """Planned end of a scan that was left before its report came: its scanner may still be at work."""
         self._watched: tuple[ListedMission, str, ScanMotion] | None = None
         self._open: list[tuple[Pose, float]] = []
         """Poses and speeds since the last report of the current item."""
@@ -31,19 +31,25 @@ class ScanWatch:
     def take_pose(self, pose: Pose, speed: float) -> None:
         self._open.append((pose, speed))
 
-    def take_report(self, listed: ListedMission | None, now_ns: int) -> bool:
+    def take_report(self, now_ns: int) -> bool:
         """Take a new report of the scanner; return False if it must be that of an older scan.
 
         Somebody may have driven the vehicle on while its scanner worked: that scan ends at another stop.
         """
-        missing, self._older_is_missing, watched = self._older_is_missing, False, self._watched
-        if missing and listed is not None and watched is not None and watched[0] is listed:
-            items = next(items for items in listed.stops if items.stop == watched[1])
-            wait_s = listed.wait_s(items.scan, items.after)
-            if now_ns - self._began_ns < UNLIKELY * wait_s * 1e9:
-                return False
+        older_ns, self._older_due_ns = self._older_due_ns, None
+        due_ns = self._due_ns()
+        if older_ns is not None and due_ns is not None and abs(now_ns - older_ns) < abs(now_ns - due_ns):
+            return False
         self._is_reported = True
         return True
+
+    def _due_ns(self) -> int | None:
+        """Planned end of the watched scan."""
+        if self._watched is None:
+            return None
+        listed, stop, _ = self._watched
+        items = next(items for items in listed.stops if items.stop == stop)
+        return self._began_ns + round(listed.wait_s(items.scan, items.after) * 1e9)
 
     def is_after_trigger(self, listed: ListedMission, stop: str, ns: int) -> bool:
         """Return True if a report of that time came once the stop's scan had been triggered."""
@@ -59,9 +65,11 @@ class ScanWatch:
             return self._leave(listed, place)
         if self._watched is None or self._watched[0] is not listed or self._watched[1] != at.stop:
             tolerance_m = next(stop.tolerance_m for stop in listed.mission.stops if stop.id == at.stop)
+            if not self._is_reported:
+                self._older_due_ns = self._left_due_ns
             self._watched = (listed, at.stop, ScanMotion(tolerance_m))
-            self._older_is_missing = self._older_is_missing or not self._is_reported
             self._began_ns, self._is_reported = now_ns, False
+            self._left_due_ns = self._due_ns()
         for pose, speed in taken if same else ():
             self._watched[2].take(pose, speed)
 

@@ -48,23 +48,32 @@ def at(watch: ScanWatch, place: int, seconds: float) -> None:
     watch.take_item(LISTED, place, round(seconds * 1e9), same=False)
 
 
-def test_a_report_that_comes_soon_after_a_scan_was_left_without_one_is_that_of_the_older_scan() -> None:
+def test_a_report_near_the_end_of_a_scan_that_was_left_without_one_is_that_of_the_older_scan() -> None:
     """As after a jump from one stop's scan to the next stop: the scanner works on meanwhile."""
     s1, s2 = LISTED.stops[0], LISTED.stops[1]
-    watch, wait_s = ScanWatch(), LISTED.wait_s(LISTED.stops[1].scan, LISTED.stops[1].after)
+    watch, wait_s = ScanWatch(), LISTED.wait_s(s1.scan, s1.after)
     at(watch, s1.scan, 10.0)
     at(watch, s2.at, 11.0)
-    at(watch, s2.scan, 20.0)
-    assert not watch.take_report(LISTED, round((20.0 + wait_s / 4) * 1e9))
-    assert watch.take_report(LISTED, round((20.0 + wait_s / 4 + 0.1) * 1e9))
+    at(watch, s2.scan, 10.0 + 0.9 * wait_s)
+    assert not watch.take_report(round((10.0 + wait_s) * 1e9))
+    assert watch.take_report(round((10.0 + 1.9 * wait_s) * 1e9))
 
 
-def test_a_report_that_comes_late_enough_is_that_of_the_present_scan() -> None:
+def test_another_attempt_does_not_take_the_report_of_the_one_that_was_broken_off() -> None:
+    s1 = LISTED.stops[0]
+    watch, wait_s = ScanWatch(), LISTED.wait_s(s1.scan, s1.after)
+    at(watch, s1.scan, 10.0)
+    at(watch, s1.at, 12.0)
+    at(watch, s1.scan, 10.0 + 0.9 * wait_s)
+    assert not watch.take_report(round((10.0 + wait_s) * 1e9))
+
+
+def test_a_report_near_its_planned_end_is_that_of_the_present_scan() -> None:
     s1, s2 = LISTED.stops[0], LISTED.stops[1]
     watch, wait_s = ScanWatch(), LISTED.wait_s(s2.scan, s2.after)
     at(watch, s1.scan, 10.0)
-    at(watch, s2.scan, 20.0)
-    assert watch.take_report(LISTED, round((20.0 + wait_s) * 1e9))
+    at(watch, s2.scan, 40.0)
+    assert watch.take_report(round((40.0 + 0.9 * wait_s) * 1e9))
 
 
 def test_a_report_from_before_the_trigger_is_none_of_the_stop() -> None:
