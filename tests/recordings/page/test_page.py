@@ -120,7 +120,7 @@ def test_the_plan_has_a_scale_bar_and_true_north() -> None:
 
 def test_a_bar_marks_the_required_coverage() -> None:
     mission, sight = planned()
-    asked = replace(sight, ledger=replace(sight.ledger, kind_required=0.7))
+    asked = replace(sight, totals=replace(sight.totals, kind_required=0.7))
     page = report_html(ReportSubject((mission,), (), asked)).decode()
     assert '<i style="left:70.0%"></i>' in page
 
