@@ -79,8 +79,24 @@ def scan_errors(
     count = len(xy)
     joined = _joined(count, ends, [*anchors, *_held(count, ends, seen)])
     free = [k for k in range(count) if joined[k] and k not in anchors]
-    row = {k: 3 * place for place, k in enumerate(free)}
-    normal = np.zeros((3 * len(free), 3 * len(free)))
+    normal = _normal_matrix({k: 3 * place for place, k in enumerate(free)}, ends, information, seen)
+    covariance = np.linalg.inv(normal) if free else normal
+    errors = np.where(joined, 0.0, np.inf)
+    for place, k in enumerate(free):
+        own = covariance[3 * place : 3 * place + 3, 3 * place : 3 * place + 3]
+        there = np.array([[1.0, 0.0, -xy[k, 1]], [0.0, 1.0, xy[k, 0]]])
+        errors[k] = np.sqrt(np.linalg.eigvalsh(there @ own @ there.T)[-1])
+    return errors
+
+
+def _normal_matrix(
+    row: dict[int, int],
+    ends: Sequence[tuple[int, int]],
+    information: Sequence[FloatArray],
+    seen: Sequence[SeenPoint],
+) -> FloatArray:
+    """Normal matrix of the free scans, whose first rows these are."""
+    normal = np.zeros((3 * len(row), 3 * len(row)))
     for (a, b), block in zip(ends, information, strict=True):
         for i, j, sign in ((a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)):
             if i in row and j in row:
@@ -89,13 +105,7 @@ def scan_errors(
         if k in row:
             move = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]) / TARGET_M
             normal[row[k] : row[k] + 3, row[k] : row[k] + 3] += move.T @ move
-    covariance = np.linalg.inv(normal) if free else normal
-    errors = np.where(joined, 0.0, np.inf)
-    for k in free:
-        own = covariance[row[k] : row[k] + 3, row[k] : row[k] + 3]
-        there = np.array([[1.0, 0.0, -xy[k, 1]], [0.0, 1.0, xy[k, 0]]])
-        errors[k] = np.sqrt(np.linalg.eigvalsh(there @ own @ there.T)[-1])
-    return errors
+    return normal
 
 
 def _held(count: int, ends: Sequence[tuple[int, int]], seen: Sequence[SeenPoint]) -> list[int]:

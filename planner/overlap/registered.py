@@ -76,7 +76,7 @@ def inaccurate(route: Route) -> Iterator[Finding]:
         yield Finding(
             "accuracy_not_met",
             f"the predicted error of {_names(route)[worst]} is {errors[worst]:.1f} mm (99 %) in the frame of "
-            f"{predicted.frame}, with {asked:g} mm required, and no further stop lowers it; measure a target "
+            f"{predicted.frame}, with {asked:g} mm required, and no other stop lowers it; measure a target "
             f"that it sees as a control point, near ({x:.1f}, {y:.1f}), and give it as --control",
             at=(x, y),
         )

@@ -1,4 +1,4 @@
-"""Selection -> selection whose scans are as accurate as required, by further stops that stiffen the network.
+"""Selection -> selection whose scans are as accurate as required, by more stops that stiffen the network.
 
 Each step adds the candidate that lowers the greatest predicted error most. Tried are those that register
 with the scan of this error, and with at least one more scan. The bound stays: more stops only add demands.
@@ -19,13 +19,13 @@ from stopgo.planner.overlap.network_error import information_of, network_errors
 from stopgo.planner.selection import cover_problem, coverage_steps
 
 MOST_TRIED = 40
-"""Candidates tried for each further stop, those that register with most scans."""
+"""Candidates tried for each other stop, those that register with most scans."""
 LEAST_GAIN = 0.01
-"""Fraction by which a further stop must lower the greatest error."""
+"""Fraction by which a other stop must lower the greatest error."""
 
 
 def accurate(selection: Selection) -> Selection:
-    """The selection with further stops until every scan is accurate enough, or none helps."""
+    """The selection with other stops until every scan is accurate enough, or none helps."""
     asked = selection.settings.accuracy
     if asked is None or not selection.settings.registers:
         return selection
