@@ -83,10 +83,10 @@ def pose_in(raw: bytes) -> PoseReport:
     return msgspec.json.decode(raw, type=PoseReport)
 
 
-def one_leg() -> Mission:
+def one_leg(length_m: float = LEG_M) -> Mission:
     """A mission with one stop at the end of a long leg."""
     made = corridor(stops=1, closed=False)
-    stop = msgspec.structs.replace(made.stops[0], x=LEG_M, approach=((0.0, 0.0), (LEG_M, 0.0)))
+    stop = msgspec.structs.replace(made.stops[0], x=length_m, approach=((0.0, 0.0), (length_m, 0.0)))
     return sealed(msgspec.structs.replace(made, stops=(stop,)))
 
 

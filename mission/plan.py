@@ -12,6 +12,7 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, OfVisibility, Route, Selection, Visibility
 from stopgo.mission.stages.figures import Figures, percent
+from stopgo.mission.stages.plan_results import PlanResults
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,6 +35,12 @@ class PartPlan(OfVisibility):
         """Yield every stage result from the floor to the figures, in the order in which they are made."""
         yield from (self.floor, self.space, self.candidates, self.visibility)
         yield from (self.selection, self.route, self.figures)
+
+    @property
+    def results(self) -> PlanResults:
+        """The plan in numbers."""
+        each = (*self.stage_results(), schedule(self.mission), self.mission)
+        return PlanResults.of({type(item): item for item in each})
 
     def __repr__(self) -> str:
         share, length = percent(self.figures.whole.coverage), self.route.length

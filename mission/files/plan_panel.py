@@ -23,6 +23,7 @@ from stopgo.mission.geometry import polyline_length
 from stopgo.mission.stages import Route, Selection
 from stopgo.mission.stages.figures import Figures, Share
 from stopgo.mission.stages.network import network_of
+from stopgo.mission.stages.plan_results import PlanResults
 
 BODY = 2.5
 LINE = 4.2
@@ -105,7 +106,7 @@ def share_in_words(mission: Mission) -> str:
 def _stops(mission: Mission, selection: Selection) -> str:
     if mission.share is not UNSET:
         return f"{len(mission.stops)} of this {mission.share.kind}"
-    return f"{len(mission.stops)}, lower bound {selection.bound} over {selection.among}"
+    return f"{len(mission.stops)}; {PlanResults.of({Selection: selection}).bound_text}"
 
 
 def _coverage(mission: Mission, selection: Selection) -> str:
@@ -287,7 +288,7 @@ SHARE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
 STOP_COLUMNS = ("x m", "y m", "heading °", "units", "new", "arrives")
 STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 
-SHARE_HEAD = Row(("coverage", "all", "visible", "covered", "covered %"), SHARE_EDGES, bold=True, to_left=True)
+SHARE_HEAD = Row(("coverage", "all", "visible", "covered", "%"), SHARE_EDGES, bold=True, to_left=True)
 
 
 def shared_rows(missions: Sequence[Mission]) -> list[Row]:

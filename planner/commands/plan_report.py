@@ -20,6 +20,7 @@ from stopgo.mission.plan import PartPlan
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures, Share, percent
 from stopgo.mission.stages.network import Network, network_lines, network_of, network_table
+from stopgo.mission.stages.seen_area import SeenSurface
 from stopgo.planner.overlap.registered import predicted_errors
 
 
@@ -32,6 +33,8 @@ class PlanReport:
     times_s: dict[str, float]
     too_near: tuple[Problem, ...] = field(default=(), kw_only=True)
     """Stops and legs nearer to a body of the model than promised."""
+    surface: SeenSurface | None = field(default=None, kw_only=True)
+    """Area that the stops see by the model's solids; None for a floor that is no model."""
 
     @property
     def mission(self) -> Mission:
@@ -58,7 +61,7 @@ class PlanReport:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that `--json` prints."""
-        route = self.part.route
+        results = self.part.results
         return {
             "floor": self._floor(),
             "mission": _attributes(self.mission, "id", "revision", "digest"),
@@ -67,42 +70,46 @@ class PlanReport:
             "coverage": coverage_table(self.figures),
             **quality_table(self.figures),
             "route": {
-                "length_m": route.length,
-                "bound_m": route.bound,
-                "method": route.method,
-                "tour": route.tour,
-                "start": route.start_reason,
+                "length_m": results.route_m,
+                "bound_m": results.route_bound_m,
+                "method": results.router,
+                "tour": results.tour,
+                "start": results.begins_at,
             },
             "schedule": _attributes(
                 schedule(self.mission), "drive_s", "turn_s", "settle_s", "scan_s", "total_s"
             ),
-            **time_table(route),
+            **time_table(self.part.route),
             "unreached": [_attributes(item, "room", "why", "area_m2") for item in self.figures.unreached],
             **({"too_near": [str(item) for item in self.too_near]} if self.too_near else {}),
+            **({} if self.surface is None else {"surface": self.surface.as_json()}),
             "times_s": {key: round(value, 4) for key, value in self.times_s.items()},
             "files": {key: str(path) for key, path in self.files.items()},
         }
 
     def _stage_results(self) -> dict[str, Any]:
         """Counts of targets, candidates, visible units and stops, for JSON."""
-        selection, visibility = self.part.selection, self.part.visibility
-        targets = visibility.targets
+        results, targets = self.part.results, self.part.visibility.targets
         by_kind = targets.by_kind(self.part.floor.elements)
         return {
             "targets": {
-                "total": targets.total,
+                "total": results.target_units,
                 "raw": sum(targets.raw.get(kind, 0) for kind in by_kind),
                 "by_kind": by_kind,
                 "raw_by_kind": targets.raw,
             },
-            "candidates": _attributes(self.part.candidates, "generated", "reachable", "strategy"),
-            "visibility": {"visible": int(visibility.visible.sum()), "method": visibility.method},
+            "candidates": {
+                "generated": results.candidates,
+                "reachable": results.reachable_candidates,
+                "strategy": results.strategy,
+            },
+            "visibility": {"visible": results.visible_units, "method": results.visibility},
             "selection": {
-                "stops": len(selection.chosen),
-                "coverage": selection.coverage,
-                "bound": selection.bound,
-                "bound_over": selection.among,
-                "method": selection.method,
+                "stops": results.stops,
+                "coverage": results.coverage,
+                "bound": results.stops_bound,
+                "bound_over": self.part.selection.among,
+                "method": results.selector,
             },
         }
 
@@ -135,14 +142,13 @@ class PlanReport:
     def as_text(self) -> str:
         """Return the lines for a person: the plan, its coverage, the floor left out, and the findings."""
         result, figures = self.as_json(), self.figures
-        floor, times, chosen = result["floor"], result["schedule"], result["selection"]
+        floor, times = result["floor"], result["schedule"]
         lines = [
             f"{printable(floor['name'])}: {floor['area_m2']:.0f} m², {floor['rooms']} rooms, "
             f"{floor['openings']} openings; {floor['reached_m2']:.0f} of {figures.rooms_m2:.0f} m² reached",
             f"  targets     {result['targets']['total']} units, "
             f"{result['visibility']['visible']} visible from {result['candidates']['reachable']} candidates",
-            f"  stops       {chosen['stops']} "
-            f"(of {chosen['bound_over']} at least {chosen['bound']} are needed)",
+            f"  stops       {self.part.results.stops} ({self.part.results.bound_text})",
             *self._route_lines(result["route"]),
             f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "
             f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
@@ -151,6 +157,7 @@ class PlanReport:
             *network_lines(self.network),
             *self._error_lines(),
             *coverage_lines(figures),
+            *([] if self.surface is None else self.surface.lines()),
         ]
         lines += [f"  unreached   {printable(room.text)}" for room in figures.unreached]
         lines += finding_lines(figures.findings)

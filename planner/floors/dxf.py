@@ -204,7 +204,7 @@ def _no_walls(sheet: DxfSheet, untold: WallLayers | None = None) -> str:
     seen = f" ({'; '.join(untold.evidence)})" if untold.evidence else ""
     return (
         f"{why}; the lines on {_listed(untold.layers)} enclose {untold.area:.4g} m²{seen}, which is not "
-        f"enough to tell that they are walls; {untold.option} accepts them"
+        f"enough to show that they are walls; {untold.option} accepts them"
     )
 
 

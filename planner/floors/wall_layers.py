@@ -1,4 +1,4 @@
-"""Choice of the layers that hold a drawing's walls where no name tells: each is tried, its floor judged.
+"""Choice of the layers that hold a drawing's walls where no name shows them: each is tried, its floor judged.
 
 A trial reads the drawing as if the user had given the layers. What its floor shows counts as evidence: doors
 in gaps of the walls, walls of two lines, rooms with a name in them, written areas that are true of their
@@ -97,7 +97,7 @@ class WallLayers:
         why = "; ".join(self.evidence)
         return Finding(
             "walls_by_geometry",
-            f"no layer's name tells the walls: they are read from {names}, where {why} "
+            f"no layer's name shows the walls: they are read from {names}, where {why} "
             f"({self.option} confirms it)",
         )
 

@@ -8,23 +8,12 @@ import msgspec
 
 from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission
-from stopgo.mission.document.schedule import Schedule
 from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.figures import Figures
+from stopgo.mission.stages.plan_results import PlanResults, StageResults
 from stopgo.recordings.drawing.canvas import LocalOrigin
-
-StageResults = dict[type, Any]
-
-
-def plan_results(stages: StageResults) -> dict[str, Any]:
-    """Return the results of a plan's stages by name; stages that were not reached are left out."""
-    results: dict[str, Any] = {}
-    for kind, summarise in _RESULTS.items():
-        if kind in stages:
-            results.update(summarise(stages[kind]))
-    return results
 
 
 def parameters(stages: StageResults) -> dict[str, Any] | None:
@@ -45,7 +34,7 @@ def parameter_values(values: dict[str, Any]) -> dict[str, str]:
 
 def plan_report(stages: StageResults, origin: LocalOrigin) -> str:
     """Return the plan as markdown."""
-    results = plan_results(stages)
+    results = PlanResults.of(stages).properties
     title = stages[Mission].name if Mission in stages else results.get("floor", "plan")
     lines = [f"# {title}", "", "| | |", "|---|---|"]
     lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in _ordered(results)]
@@ -70,101 +59,6 @@ def _ordered(results: dict[str, Any]) -> list[tuple[str, Any]]:
     names = [name for name in FIRST if name in results]
     names += [name for name in results if name not in FIRST]
     return [(name, results[name]) for name in names]
-
-
-def _floor(floor: FloorPlan) -> dict[str, Any]:
-    return {
-        "floor": floor.name,
-        "floor_digest": floor.digest,
-        "area_m2": round(float(floor.area), 2),
-        "rooms": len(floor.rooms),
-        "openings": len(floor.openings),
-        "findings": len(floor.findings),
-    }
-
-
-def _space(space: NavigableSpace) -> dict[str, Any]:
-    passable = sum(state.passable for state in space.openings)
-    return {
-        "passable_openings": passable,
-        "target_units": space.targets.total,
-        "findings": len(space.findings),  # those of the floor are among them
-    }
-
-
-def _candidates(candidates: Candidates) -> dict[str, Any]:
-    return {
-        "candidates": candidates.generated,
-        "reachable_candidates": candidates.reachable,
-        "strategy": candidates.strategy,
-    }
-
-
-def _visibility(visibility: Visibility) -> dict[str, Any]:
-    return {"visible_units": int(visibility.visible.sum()), "visibility": visibility.method}
-
-
-def _selection(selection: Selection) -> dict[str, Any]:
-    return {
-        "stops": len(selection.chosen),
-        "stops_bound": int(selection.bound),
-        **({"stops_bound_over": selection.among} if selection.everywhere else {}),
-        "coverage": round(selection.coverage, 4),
-        "coverage_required": float(selection.required),
-        "selector": selection.method,
-    }
-
-
-def _route(route: Route) -> dict[str, Any]:
-    return {
-        "route_m": round(float(route.length), 3),
-        "route_bound_m": round(float(route.bound), 3),
-        "tour": route.tour,
-        "router": route.method,
-        "begins_at": route.start_reason,
-        **_least_time(route),
-    }
-
-
-def _least_time(route: Route) -> dict[str, Any]:
-    time = route.time
-    if time is None:
-        return {}
-    return {
-        "least_time_bound_s": round(float(time.bound), 1),
-        "two_step_s": round(float(time.two_step_s), 1),
-        "two_step_stops": time.two_step_stops,
-    }
-
-
-def _schedule(schedule: Schedule) -> dict[str, Any]:
-    return {"planned_s": round(float(schedule.total_s), 1)}
-
-
-def _figures(figures: Figures) -> dict[str, Any]:
-    return {"findings": len(figures.findings)}  # of all stages, not of the floor alone
-
-
-def _mission(mission: Mission) -> dict[str, Any]:
-    return {
-        "mission_id": mission.id,
-        "revision": mission.revision,
-        "digest": mission.digest,
-        "stopgo": mission.origin.stopgo,
-    }
-
-
-_RESULTS: dict[type, Any] = {
-    FloorPlan: _floor,
-    NavigableSpace: _space,
-    Candidates: _candidates,
-    Visibility: _visibility,
-    Selection: _selection,
-    Route: _route,
-    Schedule: _schedule,
-    Mission: _mission,
-    Figures: _figures,
-}
 
 
 def _shown(value: Any) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.run_log import LogSource
+from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.mission.stages.stop_reasons import StopReason
 from stopgo.recordings.embedded.findings import EmbeddedFindings, findings_in
 from stopgo.recordings.embedded.floor_lines import FloorLines, floor_lines
@@ -75,8 +76,8 @@ def _found(recording: Recording) -> EmbeddedFindings | None:
     return found if found.findings or found.unreached else None
 
 
-def _results(items: Sequence[RecordingReview]) -> dict[str, Any]:
-    return next((item.plan for item in items if item.plan is not None), {})
+def _results(items: Sequence[RecordingReview]) -> PlanResults:
+    return PlanResults.read(next((item.plan for item in items if item.plan is not None), {}))
 
 
 def _source(recording: Recording) -> LogSource:

@@ -73,7 +73,7 @@ def _plan_tiles(subject: ReportSubject) -> str:
     share = None if subject.sight is None else subject.sight.planned.whole
     visible = "" if share is None else f"{percent(share.visible_share)} of all is visible"
     tiles = [
-        tile("stops", str(len(mission.stops)), _bound(subject)),
+        tile("stops", str(len(mission.stops)), subject.results.bound_text),
         tile("coverage", percent(None if share is None else share.coverage), visible),
         tile("route", f"{route_length(mission):.1f} m", "back to the start" if mission.return_ else "open"),
         tile("run time", duration(times.total_s), _least_time(subject, times.scan_s)),
@@ -81,15 +81,9 @@ def _plan_tiles(subject: ReportSubject) -> str:
     return tag("div", *tiles, class_="tiles")
 
 
-def _bound(subject: ReportSubject) -> str:
-    bound, over = (subject.results.get(name) for name in ("stops_bound", "stops_bound_over"))
-    among = f"of {over} " if over else ""  # without it, the bound is over the plan's candidates
-    return "" if bound is None else f"{among}at least {bound} are needed"
-
-
 def _least_time(subject: ReportSubject, scan_s: float) -> str:
     """Return a note: scanning time, and for a plan of least time its lower bound."""
-    bound, before = subject.results.get("least_time_bound_s"), subject.results.get("two_step_s")
+    bound, before = subject.results.least_time_bound_s, subject.results.two_step_s
     if bound is None or before is None:
         return f"of which scanning {duration(scan_s)}"
     return (
@@ -236,8 +230,8 @@ def _clock(seconds: float | None) -> str:
 def _coverage_tables(acquired: Acquired) -> Iterator[str]:
     yield section("Rooms, worst first", _share_grid(acquired.rooms, "room"))
     yield section("Kinds", _share_grid(acquired.kinds, "kind"))
-    ledger = acquired.sight.ledger
-    planned = {item.name: item for item in ledger.by_element(acquired.sight.all_seen)}
+    totals = acquired.sight.totals
+    planned = {item.name: item for item in totals.by_element(acquired.sight.all_seen)}
     pairs = [(planned[item.name], item) for item in acquired.elements if item.visible]
     worst = sorted(pairs, key=lambda pair: (pair[1].seen - pair[0].seen, pair[1].name))
     short = [pair for pair in worst if pair[1].seen < pair[0].seen]
@@ -304,8 +298,8 @@ def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
     first = next((item for item in known if item is not None), None)
     if first is None:
         return ""
-    names = [share.name for share in first.sight.ledger.rooms_seen(first.seen)]
-    columns = [[] if item is None else item.sight.ledger.rooms_seen(item.seen) for item in known]
+    names = [share.name for share in first.sight.totals.rooms_seen(first.seen)]
+    columns = [[] if item is None else item.sight.totals.rooms_seen(item.seen) for item in known]
     return grid(header, [
         row([shown(name), *(percent(column[k].coverage) if k < len(column) else "" for column in columns)])
         for k, name in enumerate(names)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.run_verdict import Judgement, judge
 from stopgo.mission.document import Mission
 from stopgo.mission.run.run_log import LogSource
+from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.mission.stages.sight import Sight
 from stopgo.mission.stages.stop_reasons import StopReason
 from stopgo.recordings.embedded.findings import EmbeddedFindings
@@ -27,7 +27,7 @@ class ReportSubject:
     sight: Sight | None = None
     """Visibility of the newest plan's stops."""
     floor: FloorLines | None = None
-    results: dict[str, Any] = field(default_factory=dict)
+    results: PlanResults = field(default_factory=PlanResults)
     """Results of the plan's stages, by name."""
     reasons: tuple[StopReason, ...] = ()
     """Reasons for the stops of the newest plan."""

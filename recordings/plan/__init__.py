@@ -14,6 +14,7 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import bounds
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.figures import Figures
+from stopgo.mission.stages.plan_results import PlanResults, StageResults
 from stopgo.mission.stages.sight import Sight
 from stopgo.mission.stages.stop_reasons import driven_coverage, stop_reasons
 from stopgo.recordings.drawing import entities
@@ -28,11 +29,9 @@ from stopgo.recordings.drawing.canvas import (
     open_canvas,
 )
 from stopgo.recordings.drawing.markdown import (
-    StageResults,
     parameter_values,
     parameters,
     plan_report,
-    plan_results,
 )
 from stopgo.recordings.embedded.checking import embed_end
 from stopgo.recordings.embedded.findings import embed_findings
@@ -79,7 +78,7 @@ class PlanRecording:
 
     def __init__(self, recording_id: str) -> None:
         self.recording_id = recording_id
-        self._results: StageResults = {}
+        self._results: dict[type, Any] = {}
 
     def observe(self, result: object) -> None:
         """Collect one stage result; a later one replaces an earlier one of the same type."""
@@ -161,7 +160,11 @@ def _describe_plan(canvas: Canvas, results: StageResults) -> None:
     report = rr.TextDocument(plan_report(results, canvas.origin), media_type="text/markdown")
     canvas.show(entities.REPORT, report)
     canvas.at(entities.LATEST_REPORT, report, step=0, candidate=0, mission_s=0.0)
-    values = {"local_origin": list(canvas.origin), "stopgo": __version__, **plan_results(results)}
+    values = {
+        "local_origin": list(canvas.origin),
+        "stopgo": __version__,
+        **PlanResults.of(results).properties,
+    }
     canvas.describe(entities.PROPERTY_PLAN, values)
     settings = parameters(results)
     if settings is not None:

@@ -8,6 +8,7 @@ import rerun as rr
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
 from stopgo.recordings.drawing.pens import BOLD, ORDER, THICK, Pen, style
@@ -138,7 +139,7 @@ def _plot_coverage(canvas: Canvas, selection: Selection) -> None:
     canvas.show(required, rr.SeriesLines(colors=palette.OUTLINE, names="required", widths=1))
     canvas.say(
         f"selection ({selection.method}): {count} stops, coverage {percent(selection.coverage)},"
-        f" at least {selection.bound} are needed{' of all positions' if selection.everywhere else ''}",
+        f" {PlanResults.of({Selection: selection}).bound_text}",
         step=step_of_choice(max(count, 1)),
     )
 

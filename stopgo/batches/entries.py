@@ -168,7 +168,7 @@ def _chosen(
             if not item.planned:
                 left_out[f"{floor}: {item.name}: {item.reason}"] = None
         if not chosen:
-            raise InputError(f"{floor}: has no storey that is planned unasked; give storeys")
+            raise InputError(f"{floor}: has no storey that is planned without storeys; give storeys")
         return chosen
     names: dict[str | None, None] = {}
     for pattern in group.storeys:

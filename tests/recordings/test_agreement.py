@@ -50,7 +50,7 @@ def test_candidates_stops_and_coverage_agree_wherever_they_are_told(tmp_path: Pa
     assert "Reasons for each stop" in page and ">0.3</td>" in page and "21.4 %" in page
     assert "78.5 %" in page and ">2</b>" in page
     log = [line for _, (line,) in cells(path, "/log/plan", "TextLog:text")]
-    assert "selection (greedy): 2 stops, coverage 78.5 %, at least 2 are needed" in log
+    assert "selection (greedy): 2 stops, coverage 78.5 %, of these candidates at least 2 are needed" in log
     assert any("5 positions" in line or "3 reachable" in line for line in log)
 
 

@@ -21,10 +21,10 @@ from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.plan import Plan
 from stopgo.mission.settings import Settings, recorded_values
 from stopgo.mission.stages import Route
+from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.planner import plan
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
 from stopgo.planner.task_allocation.dividing import division_cost
-from stopgo.recordings.drawing.markdown import plan_results
 from tests.planner.worlds import box, column, floor_of, hall, shell
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
@@ -73,7 +73,7 @@ def test_a_person_reads_both_numbers() -> None:
     assert found.time is not None
     (line,) = time_lines(found)
     assert "no plan over these candidates takes less than" in line
-    assert plan_results({Route: found})["two_step_s"] == round(found.time.two_step_s, 1)
+    assert PlanResults.of({Route: found}).properties["two_step_s"] == round(found.time.two_step_s, 1)
 
 
 def test_without_it_plans_and_ids_are_what_they_were() -> None:

@@ -82,7 +82,7 @@ def test_written_areas_that_are_true_show_rooms_of_single_lines(tmp_path: Path) 
 
 def test_written_areas_that_are_false_tell_against_walls(tmp_path: Path) -> None:
     areas = [lambda model: text(model, "12 m²", 1, 1), lambda model: text(model, "11 m2", 6, 1)]
-    with pytest.raises(InputError, match="not enough to tell that they are walls"):
+    with pytest.raises(InputError, match="not enough to show that they are walls"):
         read([double_walls, names, *areas], tmp_path)
 
 
@@ -94,7 +94,7 @@ def test_rooms_drawn_as_closed_lines_on_their_layer_are_walled(tmp_path: Path) -
 
 @pytest.mark.parametrize("title", ["FRONT ELEVATION", "Section A-A", "Ansicht Nord", "Site plan 1:500"])
 def test_a_title_of_another_view_tells_against_walls(title: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="not enough to tell"):
+    with pytest.raises(InputError, match="not enough to show"):
         read([double_walls, swing, names, lambda model: text(model, title, 2, -1)], tmp_path)
 
 
@@ -109,7 +109,7 @@ def test_lines_that_lie_about_tell_against_walls(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("draw", [[cells], [lambda model: rectangle(model, "0", 0, 0, 20, 30)]])
 def test_one_kind_of_evidence_is_not_enough_and_one_option_accepts(draw: list, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="enough to tell") as refused:
+    with pytest.raises(InputError, match="enough to show") as refused:
         read(draw, tmp_path)
     option = re.search(r"; (--layer .*) accepts them", str(refused.value))
     assert option is not None

@@ -73,7 +73,9 @@ def test_nav2_is_given_every_leg_and_the_way_back(mission: Mission) -> None:
 
 def test_nav2_says_in_which_frame_it_is() -> None:
     assert b"# Frame: the robot's map;" in exported(on_a_map(), "nav2", Supplements())
-    assert b"# Frame: the site 'room', not turned" in exported(laboratory(), "nav2", Supplements())
+    assert b"# Frame: the site 'room', not transformed to a map" in exported(
+        laboratory(), "nav2", Supplements()
+    )
     (way_, *_) = FORMATS["nav2"].notes(on_a_map(), Supplements())
     assert "plans its own path" in way_
     assert len(FORMATS["nav2"].notes(laboratory(), Supplements())) == 2
