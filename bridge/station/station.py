@@ -98,13 +98,9 @@ def connect(
         raise InputError(f"--as {who}: the keys in {keys} belong to {held.holder.name}; leave --as out")
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
         station = Station(
-            link,
-            KeyExpressions(robot, site),
-            commander=who,
-            timeout_s=timeout_s,
-            patience_s=patience_s,
+            link, KeyExpressions(robot, site), commander=who, timeout_s=timeout_s, patience_s=patience_s,
             held=held,
-        )
+        )  # fmt: skip
         if at_once and held is not None and can_ask_directly(endpoint):
             station.direct = partial(DirectQuestion, endpoint, held)
         begin = station.look_for if at_once else station.reach
