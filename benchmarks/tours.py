@@ -25,10 +25,10 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.routing.colony import ant_colony
 from stopgo.planner.routing.grid_graph import RESOLUTIONS, paths_on_grids
+from stopgo.planner.routing.paths import Paths
 from stopgo.planner.routing.proof import Proof, tour_proof
 from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.routing.tour import length_of, nanometres, search, shortest_tour, trials
-from stopgo.planner.routing.ways import Ways
 from stopgo.planner.space.navigable import navigable
 
 SIDE = 100.0
@@ -240,7 +240,7 @@ def ways_table() -> str:
     )
 
 
-def _timed(action: Callable[[], Ways]) -> tuple[Ways, float]:
+def _timed(action: Callable[[], Paths]) -> tuple[Paths, float]:
     action()
     begin = time.perf_counter()
     result = action()

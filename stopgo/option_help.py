@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from stopgo.mission.settings.parameter import FIRST, GROUPS
+from stopgo.plain_values import converted_plainly
 from stopgo.renamed_options import RENAMED, NewName
 from stopgo.root_help import root_help
 
@@ -24,11 +25,16 @@ NARROW = 70
 OptionGroup = tuple[str, list[TyperOption]]
 
 
-class UnbrokenText:
-    """Help text whose words are not broken at hyphens: a person copies options and paths from it."""
+class PlainCommand:
+    """A command that starts without pydantic, and whose help breaks no word at a hyphen: words are copied."""
 
     help: str | None
     epilog: str | None
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters; their words are converted without a library."""
+        made: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        return converted_plainly(made)
 
     def format_help_text(self, ctx: Any, formatter: Any) -> None:
         """Write what the command does."""
@@ -39,7 +45,7 @@ class UnbrokenText:
         _write_paragraphs(self.epilog, formatter)
 
 
-class GroupedCommand(UnbrokenText, TyperCommand):
+class GroupedCommand(PlainCommand, TyperCommand):
     """A command whose help shows its options in groups; `--help-all` describes every option."""
 
     _help_all: Any = None
@@ -49,7 +55,7 @@ class GroupedCommand(UnbrokenText, TyperCommand):
         *params, own_help = super().get_params(ctx)
         if self._help_all is None:
             self._help_all = _all_of(own_help, hidden=not self._is_long())
-        return [*params, self._help_all, own_help]
+        return converted_plainly([*params, self._help_all, own_help])
 
     def _is_long(self) -> bool:
         return sum(isinstance(param, TyperOption) for param in self.params) > LONGEST
@@ -71,7 +77,7 @@ class GroupedCommand(UnbrokenText, TyperCommand):
                     _write_names(title, options, formatter)
 
 
-class GroupedCommands(UnbrokenText, TyperGroup):
+class GroupedCommands(PlainCommand, TyperGroup):
     """A command with subcommands, whose help shows the first sentence of each."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -82,7 +88,7 @@ class GroupedCommands(UnbrokenText, TyperGroup):
             )
 
 
-class RootCommand(TyperGroup):
+class RootCommand(PlainCommand, TyperGroup):
     """The `stopgo` command."""
 
     def get_help(self, ctx: Any) -> str:

@@ -20,8 +20,10 @@ from stopgo.result_files import is_missing, report_missing_rerun, result_folder
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
+    from stopgo.mission.floor.model_solids import ModelSolids
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
+    from stopgo.mission.stages.seen_area import SeenSurface
     from stopgo.planner.commands.plan_report import PlanReport
     from stopgo.planner.floors.standing_body import StandingBody
     from stopgo.recordings.plan import PlanRecording
@@ -54,7 +56,7 @@ def _planned(
     floor: Path, out: Path, settings: Settings, watch: Stopwatch, all_parts: bool, options: PrintOptions
 ) -> list[PlanReport]:
     from stopgo.planner.commands.outputs import names
-    from stopgo.planner.floors import options_of, read_floor, standing_bodies
+    from stopgo.planner.floors import model_solids, options_of, read_floor, standing_bodies
 
     read = read_floor(floor, options_of(settings))
     folder = result_folder(out)
@@ -62,7 +64,9 @@ def _planned(
         must_be_writable(path)
     with _print_findings_on_error(read):
         made = plan(read, settings, observe=watch.observe, all_parts=all_parts)
-    bodies = standing_bodies(floor, options_of(settings))
+    bodies = ModelBodies(
+        standing_bodies(floor, options_of(settings)), model_solids(floor, options_of(settings))
+    )
     reports = [_write_part(made, number, folder, options, watch, bodies) for number in range(len(made.parts))]
     _set_aside_old(folder, len(reports), read, settings)
     if made.divided is None:
@@ -107,7 +111,7 @@ def _write_part(
     folder: Path,
     options: PrintOptions,
     watch: Stopwatch,
-    bodies: Sequence[StandingBody],
+    bodies: ModelBodies,
 ) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
     from stopgo.planner.checking.model_clearance import too_near
@@ -119,7 +123,7 @@ def _write_part(
     recording = _recording(part.mission.id)
     if recording is None:
         del files["recording"]
-    contents = _PartContents(part, plan, options, datetime.date.today().isoformat())
+    contents = _PartContents(part, plan, options, _today(), bodies.seen_from(part, watch))
     sheets = contents.sheets(files["sheets"])
     unwanted = [files.pop("sheets")] if sheets is None else []
     unwanted += [files.pop("picture")] if plan.divided and number else []
@@ -139,8 +143,12 @@ def _write_part(
     for path in unwanted:
         set_aside_file(path)
     watch.lap("files")
-    near = tuple(too_near(part.mission, bodies, plan.settings))
-    return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near)
+    near = tuple(too_near(part.mission, bodies.standing, plan.settings))
+    return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near, surface=contents.surface)
+
+
+def _today() -> str:
+    return datetime.date.today().isoformat()
 
 
 def _revised(part: PartPlan, path: Path) -> PartPlan:
@@ -165,6 +173,23 @@ def _recording(recording_id: str) -> PlanRecording | None:
 
 
 @dataclass(frozen=True, eq=False)
+class ModelBodies:
+    """Bodies of the floor's model: those in the robot's way, and all that stops the laser."""
+
+    standing: Sequence[StandingBody]
+    solids: ModelSolids | None
+    """None for a floor that is no model."""
+
+    def seen_from(self, part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
+        """Area that the stops of a part see; None for a floor that is no model."""
+        from stopgo.planner.checking.seen_surface import seen_surface
+
+        found = None if self.solids is None else seen_surface(part.route, self.solids)
+        watch.lap("surface")
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class _PartContents:
     """Contents of the files of one part of a plan."""
 
@@ -172,6 +197,7 @@ class _PartContents:
     plan: Plan
     options: PrintOptions
     date: str
+    surface: SeenSurface | None = None
 
     def record(self, recording: PlanRecording) -> None:
         """Hand every stage result of the part to the recording."""
@@ -205,7 +231,7 @@ class _PartContents:
         """The bytes of coverage.json."""
         from stopgo.mission.files.coverage_json import coverage_json
 
-        return coverage_json(self.part.route, self.part.mission, self.part.figures)
+        return coverage_json(self.part.route, self.part.mission, self.part.figures, self.surface)
 
     def picture(self) -> bytes:
         """The bytes of plan.svg; it shows all stops where robots or tours divide them."""

@@ -112,6 +112,10 @@ class World:
     def time_ns(self) -> int:
         return self._origin_ns + self.monotonic_ns()
 
+    def set_date(self, seconds: float) -> None:
+        """Set the date forward or back; what waits goes on waiting."""
+        self._origin_ns += round(seconds * 1e9)
+
     def sleep(self, seconds: float) -> None:
         with self._monitor:
             self._park(None, self._due_ns(seconds))

@@ -117,6 +117,37 @@ def test_an_older_installation_beside_it_changes_nothing(installed: Path, tmp_pa
     assert run(f"{OURS}\n{THEIRS}{CHECKS}", site).returncode == 0
 
 
+def test_of_two_versions_the_first_on_the_path_is_whole(installed: Path, tmp_path: Path) -> None:
+    other = shutil.copytree(installed, tmp_path / "other")
+    (other / "stopgo" / "planner" / "__init__.py").write_text("raise ImportError('the other version')\n")
+    code = f"import sys; sys.path.append({str(other)!r})\n{OURS}\nprint(stopgo.planner.__file__)"
+    done = run(code, installed)
+    assert (done.returncode, done.stdout.strip()) == (
+        0,
+        str(installed / "stopgo" / "planner" / "__init__.py"),
+    )
+
+
+READ_ONLY = """
+import os, sys
+site = {site!r}
+def refuse(event, arguments):
+    writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
+    if (writes or event in ("os.mkdir", "os.rename", "os.remove")) and str(arguments[0]).startswith(site):
+        raise PermissionError(30, "Read-only file system", arguments[0])
+sys.addaudithook(refuse)
+import stopgo
+sys.argv = ["stopgo", "plan", "hall.dxf", "-o", {out!r}]
+sys.exit(stopgo.main())
+"""
+
+
+def test_a_read_only_installation_plans(installed: Path, tmp_path: Path) -> None:
+    done = run(READ_ONLY.format(site=str(installed), out=str(tmp_path)), installed)
+    assert (done.returncode, (tmp_path / "mission.json").exists()) == (0, True), done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_an_installation_that_was_cut_off_is_told_in_one_line(installed: Path, tmp_path: Path) -> None:
     site = shutil.copytree(installed, tmp_path / "site")
     shutil.rmtree(site / "stopgo" / "bridge")

@@ -100,8 +100,8 @@ WRONG: dict[str, tuple[str, str, str]] = {
     ),
     "ways of words": (
         "graph",
-        "from stopgo.planner.routing.ways import Ways\n"
-        "def f(space, points): return Ways(points, [['a']], None)",
+        "from stopgo.planner.routing.paths import Paths\n"
+        "def f(space, points): return Paths(points, [['a']], None)",
         "ValueError: could not convert string to float",
     ),
     "covers too little": ("selector", "def f(cover, settings): return [], 0", "its 0 rows leave . of the"),
@@ -113,13 +113,20 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "half a tour": ("router", "def f(lengths, *, seed): return [0]", "order has the shape"),
     "stays": ("router", "def f(lengths, *, seed): return [0] * len(lengths)", "route visits a point twice"),
     "old signature": ("router", "def f(lengths): return []", "TypeError: f.. got an unexpected"),
-    "no ways": ("graph", "def f(space, points): return 3", "gave a int, not a Ways"),
+    "no ways": ("graph", "def f(space, points): return 3", "gave a int, not a Paths"),
+    "in the words of 0.1": (
+        "graph",
+        "from stopgo.planner.routing.ways import Ways\n"
+        "def f(space, points): return Ways(points, [['a']], None)",
+        "ValueError: could not convert string to float",
+    ),
     "through the wall": (
         "graph",
-        NUMPY + "from itertools import combinations\nfrom stopgo.planner.routing.ways import shortest_ways\n"
+        NUMPY + "from itertools import combinations\n"
+        "from stopgo.planner.routing.paths import shortest_paths\n"
         "def f(space, points):\n"
         "    n = len(points)\n"
-        "    return shortest_ways(points, np.array(list(combinations(range(n), 2))), n)",
+        "    return shortest_paths(points, np.array(list(combinations(range(n), 2))), n)",
         "leg to .* is too close to an obstacle or an edge",
     ),
 }  # fmt: skip
@@ -144,7 +151,7 @@ def test_a_variant_that_is_not_there_is_named(stage: str, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "old", ["mission.events", "planner.routing.ways", "recordings.logs", "bridge.robot.base"]
+    "old", ["mission.events", "planner.routing.paths", "recordings.logs", "bridge.robot.base"]
 )
 def test_an_import_path_of_the_first_release_is_named_with_todays(
     module: Write, old: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -143,7 +143,7 @@ def body_of(
         refuse_options(given, "an autopilot", *ONLY_SIMULATED)
         return AutopilotBody(
             controller.removeprefix(MAVLINK), driven.arm, read_trigger(driven.trigger), driven.signing_key,
-            driven.vehicle, driven.insecure,
+            driven.vehicle, driven.insecure, guards=True,
         )  # fmt: skip
     from stopgo.bridge.robot.plugin_body import plugin_body
 

@@ -30,12 +30,12 @@ class Acquired:
 
     @cached_property
     def shares(self) -> Shares:
-        return self.sight.ledger.shares(self.seen)
+        return self.sight.totals.shares(self.seen)
 
     @cached_property
     def elements(self) -> tuple[Share, ...]:
         """Every element with targets, in the floor's order."""
-        return self.sight.ledger.by_element(self.seen)
+        return self.sight.totals.by_element(self.seen)
 
     @property
     def planned(self) -> Shares:
@@ -44,22 +44,22 @@ class Acquired:
     @cached_property
     def rooms(self) -> tuple[tuple[Share, Share], ...]:
         """Rooms with targets as planned and as acquired, least seen first; last, units in no room."""
-        ledger = self.sight.ledger
-        planned, acquired = ledger.rooms_seen(self.sight.all_seen), ledger.rooms_seen(self.seen)
+        totals = self.sight.totals
+        planned, acquired = totals.rooms_seen(self.sight.all_seen), totals.rooms_seen(self.seen)
         return (*_paired(planned[:-1], acquired[:-1]), *_paired(planned[-1:], acquired[-1:]))
 
     @cached_property
     def kinds(self) -> tuple[tuple[Share, Share], ...]:
         """The same of every kind of element."""
-        ledger = self.sight.ledger
-        return _paired(ledger.kinds_seen(self.sight.all_seen), ledger.kinds_seen(self.seen))
+        totals = self.sight.totals
+        return _paired(totals.kinds_seen(self.sight.all_seen), totals.kinds_seen(self.seen))
 
     @cached_property
     def answer(self) -> Certainty:
         """Answer to: is all seen that was required, of the whole, every room and every kind?"""
         if not self.shares.short:
             return "yes"
-        if self.unknown or not self.sight.ledger.shares(self.perhaps).short:
+        if self.unknown or not self.sight.totals.shares(self.perhaps).short:
             return "unknown"
         return "no"
 

@@ -31,12 +31,12 @@ def acquired_by(
     done = [item.stop for item in stops if _is_scanned(item)]
     doubtful = [item.stop for item in stops if item.is_doubtful]
     views = _views(done, planned, plans)
-    seen = last.ledger.enough(views)
+    seen = last.totals.enough(views)
     wanted = [item.stop for item in stops if item.outcome not in (SCANNED, UNCONFIRMED)]
     return Acquired(
         sight=last,
         seen=seen,
-        perhaps=last.ledger.enough(views + _views(doubtful, planned, plans)),
+        perhaps=last.totals.enough(views + _views(doubtful, planned, plans)),
         lost={stop: last.brings(stop, views) for stop in wanted if stop in last.ids},
         unknown=tuple(stop for stop in done if _plan_with(stop, planned, plans) is None),
     )
@@ -60,13 +60,13 @@ def acquired_together(runs: Sequence[Comparison], sights: Iterable[Sight]) -> Ac
         if item.is_doubtful or item.outside_tolerance
     }
     views = _views_at(done.values(), plans)
-    seen = last.ledger.enough(views)
+    seen = last.totals.enough(views)
     also = [stop for position, stop in perhaps.items() if position not in done]
     left = [stop.id for stop in newest.stops if (stop.x, stop.y) not in done]
     return Acquired(
         sight=last,
         seen=seen,
-        perhaps=last.ledger.enough(views + _views_at(also, plans)),
+        perhaps=last.totals.enough(views + _views_at(also, plans)),
         lost={stop: last.brings(stop, views) for stop in left if stop in last.ids},
         unknown=tuple(stop.id for stop in done.values() if not any(plan.knows(stop) for plan in plans)),
     )
@@ -92,7 +92,7 @@ def _is_scanned(item: StopComparison) -> bool:
 
 def _views_at(stops: Iterable[Stop], sights: Sequence[Sight]) -> IntArray:
     """Return the number of these stops, one for each position, that see each unit."""
-    views = np.zeros(len(sights[-1].ledger.weight), dtype=np.int64)
+    views = np.zeros(len(sights[-1].totals.weight), dtype=np.int64)
     for stop in stops:
         views += _views([stop.id], {stop.id: stop}, sights)
     return frozen(views, np.int64)
@@ -104,12 +104,12 @@ def _plans_of(mission: Mission, sights: Iterable[Sight]) -> list[Sight]:
         (item for item in sights if item.mission_id == mission.id and item.revision <= mission.revision),
         key=lambda item: item.revision,
     )
-    return [item for item in mine if len(item.ledger.weight) == len(mine[-1].ledger.weight)]
+    return [item for item in mine if len(item.totals.weight) == len(mine[-1].totals.weight)]
 
 
 def _views(stops: Iterable[str], planned: dict[str, Stop], sights: Sequence[Sight]) -> IntArray:
     """Return the number of these stops that see each unit."""
-    views = np.zeros(len(sights[-1].ledger.weight), dtype=np.int64)
+    views = np.zeros(len(sights[-1].totals.weight), dtype=np.int64)
     for stop in stops:
         sight = _plan_with(stop, planned, sights)
         if sight is not None:

@@ -14,7 +14,7 @@ from stopgo.mission.stages.figures import Share, Shares
 class AsDriven:
     """Targets visible from the positions where a robot was stationary long enough for a scan."""
 
-    ledger: CoverageTotals
+    totals: CoverageTotals
     """The units of the floor, n of them."""
     planned: BoolArray
     """True for units that enough stops of the mission see (n,)."""
@@ -23,18 +23,18 @@ class AsDriven:
 
     @cached_property
     def shares(self) -> Shares:
-        return self.ledger.shares(self.driven)
+        return self.totals.shares(self.driven)
 
     @cached_property
     def pairs(self) -> tuple[tuple[Share, Share], ...]:
         """Fractions of the whole, of every kind and of every room with targets: as planned, and as driven."""
-        planned = {share.name: share for share in _all(self.ledger.shares(self.planned))}
+        planned = {share.name: share for share in _all(self.totals.shares(self.planned))}
         return tuple((planned[share.name], share) for share in _all(self.shares))
 
     @cached_property
     def elements(self) -> tuple[Share, ...]:
         """Every element with targets, in the floor's order, as driven."""
-        return self.ledger.by_element(self.driven)
+        return self.totals.by_element(self.driven)
 
     @property
     def enough(self) -> bool:

@@ -146,7 +146,7 @@ def _pieces(comparison: Comparison) -> list[list[str]] | None:
 
 def _acquired_json(acquired: Acquired) -> dict[str, Any]:
     return {
-        "rule": acquired.sight.ledger.rule,
+        "rule": acquired.sight.totals.rule,
         "asked": acquired.shares.whole.required,
         "planned": acquired.planned.whole.coverage,
         "acquired": acquired.shares.whole.coverage,

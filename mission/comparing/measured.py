@@ -39,7 +39,7 @@ class Unplanned:
 class Measured:
     """Points assigned to the floor's targets."""
 
-    ledger: CoverageTotals
+    totals: CoverageTotals
     """The units of the floor, n of them."""
     hit: BoolArray
     """True for units with a point within the tolerance (n,)."""
@@ -74,26 +74,26 @@ class Measured:
 
     def absent(self, visible: BoolArray) -> tuple[str, ...]:
         """Return the elements without a point, though much of them was visible: units (n,)."""
-        amount = np.where(visible & self.ledger.visible, self.ledger.weight, 0)
-        size = len(self.ledger.elements)
-        could = np.bincount(self.ledger.element, amount, minlength=size) * self.ledger.scale
-        did = np.bincount(self.ledger.element, amount * self.hit, minlength=size)
+        amount = np.where(visible & self.totals.visible, self.totals.weight, 0)
+        size = len(self.totals.elements)
+        could = np.bincount(self.totals.element, amount, minlength=size) * self.totals.scale
+        did = np.bincount(self.totals.element, amount * self.hit, minlength=size)
         return tuple(
             item.id
-            for k, item in enumerate(self.ledger.elements)
+            for k, item in enumerate(self.totals.elements)
             if could[k] >= LEAST_VISIBLE and did[k] == 0
         )
 
     @cached_property
     def shares(self) -> Shares:
-        return self.ledger.shares(self.hit)
+        return self.totals.shares(self.hit)
 
     @cached_property
     def deviations(self) -> tuple[tuple[str, int, float, float], ...]:
         """Each element with points: id, number of points, and their mean and rms deviation in metres."""
         middles = (self.edges_m[1:] + self.edges_m[:-1]) / 2
         found = []
-        for element, counts in zip(self.ledger.elements, self.histogram, strict=True):
+        for element, counts in zip(self.totals.elements, self.histogram, strict=True):
             many = int(counts.sum())
             if many:
                 mean = float((counts * middles).sum() / many)

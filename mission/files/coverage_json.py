@@ -20,6 +20,7 @@ from stopgo.mission.stages import Route, Targets
 from stopgo.mission.stages.covered_intervals import runs_of, seen_units
 from stopgo.mission.stages.figures import Figures, Share
 from stopgo.mission.stages.network import network_of, network_table
+from stopgo.mission.stages.seen_area import SeenSurface
 
 DIGITS = 6
 """A micrometre, and a millionth of a segment."""
@@ -56,6 +57,21 @@ class CoverageRoom(msgspec.Struct, frozen=True):
     coverage: float | None
 
 
+class CoverageArea(msgspec.Struct, frozen=True):
+    """Area in m² of the targets of a kind that count as seen, and its part that rays reach."""
+
+    total_m2: float
+    seen_m2: float
+
+
+class CoverageSurface(msgspec.Struct, frozen=True):
+    """Area that the stops see by the solids of the floor's model."""
+
+    height_m: float
+    kinds: dict[str, CoverageArea]
+    hidden_m: float = 0.0
+
+
 class CoverageOf(msgspec.Struct, frozen=True):
     id: str
     digest: str
@@ -71,6 +87,7 @@ class Coverage(msgspec.Struct, frozen=True):
     elements: tuple[CoverageElement, ...]
     kinds: dict[str, CoverageCounts] = {}
     rooms: tuple[CoverageRoom, ...] = ()
+    surface: CoverageSurface | None = None
 
 
 def read_coverage(path: Path, mission: Mission) -> Coverage:
@@ -104,7 +121,9 @@ def _check_mission(of: CoverageOf, mission: Mission, path: Path) -> None:
         )
 
 
-def coverage_json(route: Route, mission: Mission, figures: Figures | None = None) -> bytes:
+def coverage_json(
+    route: Route, mission: Mission, figures: Figures | None = None, surface: SeenSurface | None = None
+) -> bytes:
     """Return the coverage of every target element as JSON, one boundary segment a line; rooms if given.
 
     `visible` counts the units that any reachable candidate sees, `seen` those of them that the stops see,
@@ -128,6 +147,7 @@ def coverage_json(route: Route, mission: Mission, figures: Figures | None = None
         "total": counts.summary(targets),
         "kinds": {kind: counts.summary(rows) for kind, rows in sorted(by_kind.items())},
         **({} if figures is None else {"rooms": [_room(share) for share in figures.rooms]}),
+        **({} if surface is None else {"surface": surface.as_json()}),
         **network_table(network_of(mission)),
     }
     segments = _segments_by_element(route)

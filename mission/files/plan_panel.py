@@ -288,7 +288,7 @@ SHARE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
 STOP_COLUMNS = ("x m", "y m", "heading °", "units", "new", "arrives")
 STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 
-SHARE_HEAD = Row(("coverage", "all", "visible", "covered", "covered %"), SHARE_EDGES, bold=True, to_left=True)
+SHARE_HEAD = Row(("coverage", "all", "visible", "covered", "%"), SHARE_EDGES, bold=True, to_left=True)
 
 
 def shared_rows(missions: Sequence[Mission]) -> list[Row]:

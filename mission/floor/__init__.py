@@ -73,6 +73,8 @@ class Element:
     target: bool = False
     to_scan: bool = True
     """False if it is no target whatever its kind: it is not built yet, or was scanned before."""
+    heights: tuple[float, float] | None = None
+    """Lower and upper height above the floor in metres, if the model contains them."""
 
 
 @dataclass(frozen=True, eq=False)

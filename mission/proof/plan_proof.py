@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 from msgspec import UnsetType
 
@@ -17,6 +18,10 @@ ALLOWED_SHARE = 0.01
 ALLOWED_UNITS = 3
 """Tolerated units of a stop without a line of sight, or a fiftieth: rays that touch corners."""
 ALLOWED_OF_STOP = 0.02
+ALLOWED_AREA = 0.02
+"""Tolerated difference of the plan's area and the model's …"""
+ALLOWED_M2 = 1.0
+"""… or of a small kind, in m²."""
 ALLOWED_UNITS_OF_PART = 5
 """Tolerated missed units of a room or a kind, however small it is."""
 REGISTERED_M = 0.01
@@ -59,6 +64,8 @@ class Simulation:
     poses: bool = True
     """True if registration starts from the robot's poses."""
     seed: int = 1
+    solids: Literal["extruded", "model"] = "extruded"
+    """Solids at which rays are cast: the floor raised to its walls' height, or those of its model."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,30 @@ class CloudQuality:
     """Fraction that some stop hits at most so far off the perpendicular."""
     by_stops: dict[int, float]
     """Fraction that at least so many stops hit."""
+
+
+@dataclass(frozen=True)
+class ProvenArea:
+    """Area of promised targets of a kind: the plan's claim, and what rays at the model's solids reach."""
+
+    kind: str
+    claimed_m2: float
+    """Area of the targets that the plan counts as seen, over their whole height."""
+    claimed: float
+    """Fraction of it that the plan claims."""
+    total_m2: float
+    """Area that has a surface in the model."""
+    seen_m2: float
+
+    @property
+    def shown(self) -> float:
+        """Fraction that rays reach."""
+        return self.seen_m2 / self.total_m2 if self.total_m2 else 1.0
+
+    @property
+    def short(self) -> bool:
+        """True if the plan claims more than the model shows."""
+        return self.claimed - self.shown > max(ALLOWED_AREA, ALLOWED_M2 / max(self.total_m2, ALLOWED_M2))
 
 
 @dataclass(frozen=True)
@@ -199,11 +230,14 @@ class PlanProof:
     missed: dict[str, float]
     """Missed part of the promise, by reason."""
     clouds: tuple[ScanCloud, ...] = ()
+    areas: tuple[ProvenArea, ...] = ()
+    """By kind, if rays were cast at the model's solids."""
 
     @cached_property
     def unmet(self) -> tuple[str, ...]:
         """Promises of the plan that the simulation does not meet, in words."""
-        return (*_short_whole(self), *_short_parts(self), *_short_stops(self), *_short_pairs(self))
+        parts = (*_short_whole(self), *_short_parts(self), *_short_areas(self))
+        return (*parts, *_short_stops(self), *_short_pairs(self))
 
     @property
     def met(self) -> bool:
@@ -229,6 +263,14 @@ def _short_parts(proof: PlanProof) -> list[str]:
         and item.simulated is not None
         and item.simulated < min(item.required, item.coverage or 0.0) - ALLOWED_SHARE
         and item.missed > ALLOWED_UNITS_OF_PART * proof.grain
+    ]
+
+
+def _short_areas(proof: PlanProof) -> list[str]:
+    return [
+        f"area of {item.kind}: {percent(item.claimed)} claimed, the model's solids show {percent(item.shown)}"
+        for item in proof.areas
+        if item.short
     ]
 
 

@@ -16,6 +16,7 @@ from stopgo.mission.proof.plan_proof import (
     CloudQuality,
     PlanProof,
     PromisedShare,
+    ProvenArea,
     ScanNetwork,
     ScanPair,
     Simulation,
@@ -44,6 +45,7 @@ def proof_json(proof: PlanProof) -> dict[str, Any]:
         "missed": proof.missed,
         "stops": [msgspec.to_builtins(item) for item in proof.stops],
         "surface": _surface_json(proof.quality),
+        "areas": [_area_json(item) for item in proof.areas],
         "network": _network_json(proof.network),
     }
 
@@ -56,6 +58,11 @@ def _surface_json(quality: CloudQuality) -> dict[str, Any]:
         "incidence_deg": {str(key): round(value, 4) for key, value in quality.by_incidence_deg.items()},
         "stops": {str(key): round(value, 4) for key, value in quality.by_stops.items()},
     }
+
+
+def _area_json(item: ProvenArea) -> dict[str, Any]:
+    amounts = {name: round(getattr(item, name), 3) for name in ("claimed_m2", "total_m2", "seen_m2")}
+    return {"kind": item.kind, **amounts, "claimed": round(item.claimed, 4), "shown": round(item.shown, 4)}
 
 
 def _network_json(network: ScanNetwork) -> dict[str, Any]:
@@ -115,6 +122,7 @@ def coverage_words(whole: PromisedShare, unit: str) -> str:
 def _sections(proof: PlanProof) -> Iterator[tuple[str, list[str]]]:
     yield "acquired", [coverage_words(proof.whole, proof.unit), *missed_words(proof)]
     yield "surface", surface_words(proof)
+    yield "area", area_words(proof)
     loose = [pair_words(pair) for pair in proof.network.pairs if not pair.registered]
     yield "network", [*network_words(proof), *loose]
     yield "assumed", assumed_words(proof.simulation)
@@ -138,6 +146,16 @@ def surface_words(proof: PlanProof) -> list[str]:
         f"spacing at most: {', '.join(spacing)}",
         f"incidence at most: {', '.join(angles)}",
         f"stops at least: {', '.join(stops)}",
+    ]
+
+
+def area_words(proof: PlanProof) -> list[str]:
+    """Return the lines on the area of promised targets, by the plan and by the model's solids."""
+    return [
+        f"{item.kind}: {percent(item.claimed)} of the promised targets' area claimed, "
+        f"{percent(item.shown)} of {item.total_m2:.0f} m² reached by rays at the model's solids"
+        for item in proof.areas
+        if item.total_m2
     ]
 
 
@@ -187,12 +205,18 @@ def assumed_words(simulation: Simulation) -> list[str]:
         if simulation.cone_deg
         else "no blind cone below it (--blind-cone 60 tries a common one)"
     )
+    walls = (
+        "solids as modelled, doors open, glass passed; "
+        if simulation.solids == "model"
+        else f"walls up to {simulation.ceiling_m:g} m ({known}), openings equally high; "
+        "floor and ceiling level"
+    )
     return [
         f"rays every {simulation.step_deg:g}° to {simulation.range_m:g} m along {along}, "
         f"noise {1000 * simulation.noise_m:g} mm",
         f"points up to {simulation.joining_m:g} m for registration",
         f"scanner level at {simulation.height_m:g} m, {cone}",
-        f"walls up to {simulation.ceiling_m:g} m ({known}), openings equally high; floor and ceiling level",
+        walls.rstrip("; "),
         f"{start}; registered: from both sides under {1000 * REGISTERED_M:g} mm and {REGISTERED_DEG:g}°",
         f"a promise is met within {100 * ALLOWED_SHARE:g} percentage point",
     ]

@@ -125,7 +125,7 @@ class CoverageTotals:
         return frozen(of_element[self.element], np.int64)
 
 
-def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> CoverageTotals:
+def totals_of_plan(visibility: Visibility, why: Mapping[str, str] | None = None) -> CoverageTotals:
     """Return the totals of a plan; `why` has the reason by room where the robot does not go."""
     return totals_of(visibility.space, visibility.visible, visibility.asked, why)
 

@@ -11,7 +11,7 @@ import numpy as np
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
 from stopgo.mission.stages import Route, Targets
-from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
+from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.mission.stages.figures import Figures, Shares
 
 SAME_PLACE_M = 1e-6
@@ -40,7 +40,7 @@ class Sight:
     digest: str
     """Digest of the mission."""
     targets: Targets
-    ledger: CoverageTotals
+    totals: CoverageTotals
     stops: tuple[SeenFrom, ...]
     pointer: IntArray
     first: IntArray
@@ -49,7 +49,7 @@ class Sight:
     @cached_property
     def planned(self) -> Shares:
         """Coverage by all stops."""
-        return self.ledger.shares(self.all_seen)
+        return self.totals.shares(self.all_seen)
 
     @cached_property
     def all_seen(self) -> BoolArray:
@@ -70,11 +70,11 @@ class Sight:
 
     def seen_units(self, stops: Collection[str]) -> BoolArray:
         """Return True for units that enough of these stops see (n,); stops of other plans see nothing."""
-        return self.ledger.enough(self.views_from(stops))
+        return self.totals.enough(self.views_from(stops))
 
     def views_from(self, stops: Collection[str]) -> IntArray:
         """Return the number of these stops that see each unit (n,)."""
-        views = np.zeros(len(self.ledger.weight), dtype=np.int64)
+        views = np.zeros(len(self.totals.weight), dtype=np.int64)
         for stop in stops:
             number = self._number.get(stop)
             if number is not None:
@@ -84,21 +84,21 @@ class Sight:
     def _seen_by(self, number: int) -> BoolArray:
         """Return True for units that a stop sees (n,)."""
         runs = slice(int(self.pointer[number]), int(self.pointer[number + 1]))
-        change = np.zeros(len(self.ledger.weight) + 1, dtype=np.int64)
+        change = np.zeros(len(self.totals.weight) + 1, dtype=np.int64)
         np.add.at(change, self.first[runs], 1)
         np.add.at(change, self.last[runs] + 1, -1)
         return np.asarray(np.cumsum(change[:-1]) > 0)
 
     def shares(self, stops: Collection[str]) -> Shares:
         """Return the coverage by these stops."""
-        return self.ledger.shares(self.seen_units(stops))
+        return self.totals.shares(self.seen_units(stops))
 
     def brings(self, stop: str, views: IntArray) -> float:
         """Return the gain of this stop, as a fraction of all visible, after views from others (n,)."""
-        visible = self.ledger.amount(self.ledger.visible)
-        after = self.ledger.enough(views + self.views_from([stop]))
-        more = after & ~self.ledger.enough(views) & self.ledger.visible
-        return self.ledger.amount(more) / visible if visible else 0.0
+        visible = self.totals.amount(self.totals.visible)
+        after = self.totals.enough(views + self.views_from([stop]))
+        more = after & ~self.totals.enough(views) & self.totals.visible
+        return self.totals.amount(more) / visible if visible else 0.0
 
     @cached_property
     def _number(self) -> dict[str, int]:
@@ -116,7 +116,7 @@ def sight_of(route: Route, mission: Mission, figures: Figures) -> Sight:
         revision=mission.revision,
         digest=mission.digest,
         targets=visibility.targets,
-        ledger=ledger_of(visibility, {item.room: item.why for item in figures.unreached}),
+        totals=totals_of_plan(visibility, {item.room: item.why for item in figures.unreached}),
         stops=tuple(SeenFrom(stop.id, stop.x, stop.y) for stop in mission.stops),
         pointer=frozen(np.concatenate([[0], np.cumsum(counts)]), np.int64),
         first=frozen(np.concatenate([[0][:0], *(visibility.first[run] for run in runs)]), np.int64),

@@ -9,7 +9,7 @@ import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Route, Visibility, weights_of
-from stopgo.mission.stages.coverage_totals import OUTSIDE, CoverageTotals, ledger_of
+from stopgo.mission.stages.coverage_totals import OUTSIDE, CoverageTotals, totals_of_plan
 from stopgo.mission.stages.figures import Share, percent
 
 NEARLY = 0.8
@@ -114,17 +114,17 @@ def stop_reasons(route: Route, stops: Sequence[str]) -> tuple[StopReason, ...]:
     if not len(selection.chosen):
         return ()
     visibility = selection.visibility
-    ledger = ledger_of(visibility)
+    totals = totals_of_plan(visibility)
     sights = [visibility.seen_by(int(row)) for row in selection.chosen]
-    often = np.bincount(np.concatenate(sights), minlength=len(ledger.weight))
-    offers = _Offers(visibility, ledger)
+    often = np.bincount(np.concatenate(sights), minlength=len(totals.weight))
+    offers = _Offers(visibility, totals)
     steps = [offers.choose(int(row)) for row in selection.chosen]
-    rooms = _Rooms(ledger, ledger.enough(often))
-    visible = ledger.amount(ledger.visible)
+    rooms = _Rooms(totals, totals.enough(often))
+    visible = totals.amount(totals.visible)
     found = []
     for name, choice in zip(stops, route.order.tolist(), strict=True):
         sight = sights[choice]
-        counted = sight[ledger.visible[sight]]
+        counted = sight[totals.visible[sight]]
         alone = counted[often[counted] == visibility.asked[counted]]
         new, runners = steps[choice]
         losing, lost = rooms.without(alone)
@@ -134,16 +134,16 @@ def stop_reasons(route: Route, stops: Sequence[str]) -> tuple[StopReason, ...]:
                 step=choice + 1,
                 candidate=int(selection.chosen[choice]),
                 units=len(sight),
-                sees=_amount(ledger, counted),
+                sees=_amount(totals, counted),
                 new=new,
                 alone_units=len(alone),
-                alone=_amount(ledger, alone),
+                alone=_amount(totals, alone),
                 visible=visible,
                 coverage=float(selection.coverage_steps[choice]),
                 rooms=losing,
                 lost=lost,
                 runners=runners,
-                unit="units" if ledger.rule == "paper" else "m",
+                unit="units" if totals.rule == "paper" else "m",
             )
         )
     return tuple(found)
@@ -162,23 +162,23 @@ def driven_coverage(route: Route) -> FloatArray:
     return np.asarray(np.cumsum(gained) / max(int(counts.sum()), 1), dtype=np.float64)
 
 
-def _amount(ledger: CoverageTotals, units: IntArray) -> float:
-    return float(int(ledger.weight[units].sum()) * ledger.scale)
+def _amount(totals: CoverageTotals, units: IntArray) -> float:
+    return float(int(totals.weight[units].sum()) * totals.scale)
 
 
 class _Offers:
     """Gain of every candidate, updated as candidates are chosen."""
 
-    def __init__(self, visibility: Visibility, ledger: CoverageTotals) -> None:
-        self._visibility, self._ledger = visibility, ledger
+    def __init__(self, visibility: Visibility, totals: CoverageTotals) -> None:
+        self._visibility, self._totals = visibility, totals
         self._row, segment, self._first, self._last = visibility.runs_apart
-        summed = np.concatenate([[0], np.cumsum(np.where(ledger.visible, ledger.weight, 0))])
+        summed = np.concatenate([[0], np.cumsum(np.where(totals.visible, totals.weight, 0))])
         gain = summed[self._last + 1] - summed[self._first]
         self.gain: IntArray = np.zeros(visibility.rows, dtype=np.int64)
         np.add.at(self.gain, self._row, gain)
         self._by_segment = np.argsort(segment, kind="stable")
         self._segment = segment[self._by_segment]
-        self._lacking: IntArray = np.where(ledger.visible, visibility.asked, 0)
+        self._lacking: IntArray = np.where(totals.visible, visibility.asked, 0)
         """Number of further views that each unit needs until it counts."""
         self._chosen: BoolArray = np.zeros(visibility.rows, dtype=np.bool_)
 
@@ -195,7 +195,7 @@ class _Offers:
         self._lacking[fresh] -= 1
         done = fresh[self._lacking[fresh] == 0]
         self.gain -= shared if len(done) == len(fresh) else self._shared(done)
-        return new * self._ledger.scale, runners
+        return new * self._totals.scale, runners
 
     def _runners(self, row: int, shared: IntArray) -> tuple[RunnerUp, ...]:
         candidates, gain = self._visibility.candidates, self.gain
@@ -203,7 +203,7 @@ class _Offers:
         rows = np.flatnonzero(alike & ~self._chosen)
         best = rows[np.argsort(-gain[rows], kind="stable")][:MOST_RUNNERS]
         positions = candidates.xy[candidates.kept[best]].tolist()
-        amounts = (gain[best] * self._ledger.scale).tolist()
+        amounts = (gain[best] * self._totals.scale).tolist()
         columns = zip(best.tolist(), positions, amounts, strict=True)
         return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in columns)
 
@@ -212,7 +212,7 @@ class _Offers:
         segments = np.unique(self._visibility.targets.unit_segment[fresh])
         low, high = (np.searchsorted(self._segment, segments, side=side) for side in ("left", "right"))
         runs = self._by_segment[_ranges(low, high)]
-        summed = np.concatenate([[0], np.cumsum(self._ledger.weight[fresh])])
+        summed = np.concatenate([[0], np.cumsum(self._totals.weight[fresh])])
         begin, end = summed[np.searchsorted(fresh, np.stack([self._first[runs], self._last[runs] + 1]))]
         found: IntArray = np.zeros(len(self.gain), dtype=np.int64)
         np.add.at(found, self._row[runs], end - begin)
@@ -229,26 +229,26 @@ def _ranges(low: IntArray, high: IntArray) -> IntArray:
 class _Rooms:
     """Totals of each room, visible and seen, and the loss without some units."""
 
-    def __init__(self, ledger: CoverageTotals, seen: BoolArray) -> None:
-        self._ledger = ledger
-        self._room = ledger.room
-        size = len(ledger.rooms) + 1  # the last one is what faces none
-        weight: FloatArray = ledger.weight.astype(np.float64)
-        masks = (np.ones_like(seen), ledger.visible, ledger.visible & seen)
+    def __init__(self, totals: CoverageTotals, seen: BoolArray) -> None:
+        self._totals = totals
+        self._room = totals.room
+        size = len(totals.rooms) + 1  # the last one is what faces none
+        weight: FloatArray = totals.weight.astype(np.float64)
+        masks = (np.ones_like(seen), totals.visible, totals.visible & seen)
         self._sums = [
-            np.bincount(ledger.room % size, np.where(m, weight, 0.0), minlength=size) for m in masks
+            np.bincount(totals.room % size, np.where(m, weight, 0.0), minlength=size) for m in masks
         ]
 
     def without(self, units: IntArray) -> tuple[tuple[Share, ...], tuple[float, ...]]:
         """Return the rooms that lose, as seen without these units, and each room's loss."""
-        size, scale = len(self._sums[0]), self._ledger.scale
-        lost = np.bincount(self._room[units] % size, self._ledger.weight[units], minlength=size)
+        size, scale = len(self._sums[0]), self._totals.scale
+        lost = np.bincount(self._room[units] % size, self._totals.weight[units], minlength=size)
         losing = sorted(np.flatnonzero(lost).tolist(), key=lambda k: (-lost[k], k))
         shares = tuple(self._share(k, float(lost[k])) for k in losing)
         return shares, tuple(float(lost[k]) * scale for k in losing)
 
     def _share(self, k: int, lost: float) -> Share:
-        groups, scale = self._ledger.rooms, self._ledger.scale
+        groups, scale = self._totals.rooms, self._totals.scale
         total, visible, seen = (float(column[k]) * scale for column in self._sums)
         name = groups[k].name if k < len(groups) else OUTSIDE
         required = groups[k].required if k < len(groups) else None

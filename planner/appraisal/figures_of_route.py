@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from stopgo.mission.floor import Finding, Rank
 from stopgo.mission.stages import Candidates, Route, Selection
-from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.covered_intervals import seen_units
 from stopgo.mission.stages.figures import Figures, Shares
 from stopgo.planner.appraisal.plausibility import floor_of_rooms, near_legs, plausibility_findings
@@ -62,7 +62,7 @@ def figures_of_share(route: Route, whole: Figures) -> Figures:
 
 def shares_of(selection: Selection, *, why: Mapping[str, str] | None = None) -> Shares:
     """Return the coverage of the whole, of every room and of every kind, the lowest first."""
-    return ledger_of(selection.visibility, why).shares(seen_units(selection))
+    return totals_of_plan(selection.visibility, why).shares(seen_units(selection))
 
 
 def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]:

@@ -13,7 +13,7 @@ from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import BoolArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
-from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.figures import LimitCost, Quality, percent
 from stopgo.planner.selection import quick_estimate
 from stopgo.planner.visibility import within_all_limits
@@ -40,8 +40,8 @@ def quality_of(selection: Selection) -> Quality | None:
     for key, words in limits.items():
         fewer, bound = quick_estimate(_under(in_sight, without_limit(settings, key)))
         costs.append(LimitCost(key, words, stops=stops, without=fewer, bound=bound))
-    ledger = ledger_of(seen)
-    return Quality(tuple(costs), ledger.amount(in_sight.visible), ledger.amount(_possible(seen)))
+    totals = totals_of_plan(seen)
+    return Quality(tuple(costs), totals.amount(in_sight.visible), totals.amount(_possible(seen)))
 
 
 def _in_sight(seen: Visibility) -> Visibility:
@@ -67,8 +67,8 @@ def not_met(selection: Selection) -> Iterator[Finding]:
     limits = limits_in_words(limits_spec_of(seen.settings))
     if not limits:
         return
-    ledger = replace(ledger_of(seen), visible=_in_sight(seen).visible)
-    shares = ledger.shares(_possible(seen))
+    totals = replace(totals_of_plan(seen), visible=_in_sight(seen).visible)
+    shares = totals.shares(_possible(seen))
     short = [f"{item.name} {percent(item.coverage)}" for item in shares.short]
     if short:
         more = f" and {len(short) - MOST_NAMED} more" if len(short) > MOST_NAMED else ""
@@ -86,10 +86,10 @@ def fewer_views(selection: Selection) -> Iterator[Finding]:
     counted = seen.seen_from(selection.chosen) & seen.visible
     fewer = frozen(counted & (seen.views_from(selection.chosen) < required), np.bool_)
     if fewer.any():
-        ledger = ledger_of(seen)
-        unit = "units" if ledger.rule == "paper" else "m"
+        totals = totals_of_plan(seen)
+        unit = "units" if totals.rule == "paper" else "m"
         yield Finding(
             FEWER_VIEWS,
-            f"{ledger.amount(fewer):.1f} {unit} count as covered from fewer than {required} stops, as no "
+            f"{totals.amount(fewer):.1f} {unit} count as covered from fewer than {required} stops, as no "
             "more candidates see them; lower --grid for more candidates",
         )

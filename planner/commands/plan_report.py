@@ -20,6 +20,7 @@ from stopgo.mission.plan import PartPlan
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures, Share, percent
 from stopgo.mission.stages.network import Network, network_lines, network_of, network_table
+from stopgo.mission.stages.seen_area import SeenSurface
 from stopgo.planner.overlap.registered import predicted_errors
 
 
@@ -32,6 +33,8 @@ class PlanReport:
     times_s: dict[str, float]
     too_near: tuple[Problem, ...] = field(default=(), kw_only=True)
     """Stops and legs nearer to a body of the model than promised."""
+    surface: SeenSurface | None = field(default=None, kw_only=True)
+    """Area that the stops see by the model's solids; None for a floor that is no model."""
 
     @property
     def mission(self) -> Mission:
@@ -79,6 +82,7 @@ class PlanReport:
             **time_table(self.part.route),
             "unreached": [_attributes(item, "room", "why", "area_m2") for item in self.figures.unreached],
             **({"too_near": [str(item) for item in self.too_near]} if self.too_near else {}),
+            **({} if self.surface is None else {"surface": self.surface.as_json()}),
             "times_s": {key: round(value, 4) for key, value in self.times_s.items()},
             "files": {key: str(path) for key, path in self.files.items()},
         }
@@ -153,6 +157,7 @@ class PlanReport:
             *network_lines(self.network),
             *self._error_lines(),
             *coverage_lines(figures),
+            *([] if self.surface is None else self.surface.lines()),
         ]
         lines += [f"  unreached   {printable(room.text)}" for room in figures.unreached]
         lines += finding_lines(figures.findings)

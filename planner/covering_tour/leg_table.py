@@ -16,7 +16,7 @@ from stopgo.mission.document.schedule import straight_times, turn_time
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.routing.legs import Legs
-from stopgo.planner.routing.ways import Ways
+from stopgo.planner.routing.paths import Paths
 
 MICROSECONDS = 1e6
 """Per second."""
@@ -59,7 +59,7 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
     """
     whole_turn = round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
     if legs.graph.ours:
-        seconds, leaving, arriving = _followed(legs.ways, len(legs.points), robot)
+        seconds, leaving, arriving = _followed(legs.paths, len(legs.points), robot)
     else:
         step = legs.points[None, :, :] - legs.points[:, None, :]
         seconds = straight_times(legs.lengths, speed=robot.speed, acceleration=robot.acceleration)
@@ -77,14 +77,14 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
     )
 
 
-def _followed(ways: Ways, count: int, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _followed(paths: Paths, count: int, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Seconds (n, n) of the paths between the first points, and headings at their beginnings and ends."""
     seconds, leaving, arriving = (np.zeros((count, count)) for _ in range(3))
     for first in range(0, count, SOURCES):
         source = np.arange(first, min(count, first + SOURCES))
-        before = dijkstra(ways.graph, False, source, return_predecessors=True)[1]
+        before = dijkstra(paths.graph, False, source, return_predecessors=True)[1]
         start, end = np.nonzero(source[:, None] < np.arange(count)[None, :])
-        found = _back(ways.xy, before, source, start, end, robot)
+        found = _back(paths.xy, before, source, start, end, robot)
         for table, values in zip((seconds, leaving, arriving), found, strict=True):
             table[source[start], end] = values
     for table, other in ((seconds, seconds), (leaving, arriving), (arriving, leaving)):

@@ -14,6 +14,7 @@ from typing import cast
 from stopgo.mission.console.plugins import Variant
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings
 from stopgo.mission.settings.layer_kinds import kinds_by_name
 from stopgo.planner.floors.reader import BodiesModule, FloorFile, FloorOptions, Reader
@@ -81,6 +82,14 @@ def standing_bodies(path: Path, options: FloorOptions | None = None) -> tuple[St
     if not reader.ours or not reader.what.has_bodies:
         return ()
     return cast("BodiesModule", reader.what.load()).standing(file, options)
+
+
+def model_solids(path: Path, options: FloorOptions | None = None) -> ModelSolids | None:
+    """Return all that stops the laser on the floor that `read_floor` reads; None if it is no model."""
+    file, reader, options = _opened(path, options)
+    if not reader.ours or not reader.what.has_bodies:
+        return None
+    return cast("BodiesModule", reader.what.load()).laser(file, options)
 
 
 def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:

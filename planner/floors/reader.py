@@ -13,6 +13,7 @@ from typing import Any, Literal, Protocol, cast
 
 from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.planner.floors.standing_body import StandingBody
 from stopgo.planner.floors.survey import Survey
 
@@ -99,6 +100,9 @@ class BodiesModule(Protocol):
 
     def standing(self, file: FloorFile, options: FloorOptions) -> tuple[StandingBody, ...]:
         """Return the bodies in the robot's height on the floor that the options choose."""
+
+    def laser(self, file: FloorFile, options: FloorOptions) -> ModelSolids:
+        """Return all that stops the laser on the floor that the options choose."""
 
 
 @dataclass(frozen=True)

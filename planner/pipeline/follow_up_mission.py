@@ -23,13 +23,14 @@ from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Route, Selection, Visibility
-from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
+from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.covering_tour import least_time_route
-from stopgo.planner.floors import options_of, read_floor
+from stopgo.planner.floors import model_solids, options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing import route
 from stopgo.planner.routing.assemble import assemble
@@ -52,6 +53,13 @@ class PlannedFloor:
     floor: FloorPlan
     settings: Settings
     mission: Mission
+    path: Path | None = None
+    """Its file, if it was read from one."""
+
+    @cached_property
+    def model_solids(self) -> ModelSolids | None:
+        """All that stops the laser, if the floor is a storey of a building model."""
+        return None if self.path is None else model_solids(self.path, options_of(self.settings))
 
     @cached_property
     def space(self) -> NavigableSpace:
@@ -86,7 +94,7 @@ def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
     """
     must_be_own_floor(path, mission)
     settings = read_settings(None, mission.origin.parameters)
-    return PlannedFloor(read_floor(path, options_of(settings)), settings, mission)
+    return PlannedFloor(read_floor(path, options_of(settings)), settings, mission, path)
 
 
 def as_driven(planned: PlannedFloor, poses: ScanPoses) -> AsDriven:
@@ -99,20 +107,20 @@ def as_driven(planned: PlannedFloor, poses: ScanPoses) -> AsDriven:
     """
     lines = SightLines(planned.space)
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in planned.mission.stops]).reshape(-1, 3)
-    ledger = ledger_of(planned.seen)
+    totals = totals_of_plan(planned.seen)
     return AsDriven(
-        ledger=ledger,
-        planned=_seen_by(_views(planned.space, lines, stops), ledger),
-        driven=_seen_by(_views(planned.space, lines, poses), ledger),
+        totals=totals,
+        planned=_seen_by(_views(planned.space, lines, stops), totals),
+        driven=_seen_by(_views(planned.space, lines, poses), totals),
     )
 
 
-def _seen_by(views: Iterable[IntArray], ledger: CoverageTotals) -> BoolArray:
+def _seen_by(views: Iterable[IntArray], totals: CoverageTotals) -> BoolArray:
     """True for each unit that enough of the poses see; `views` has the units of each pose."""
-    counted = np.zeros(len(ledger.weight), dtype=np.int64)
+    counted = np.zeros(len(totals.weight), dtype=np.int64)
     for units in views:
         counted[units] += 1
-    return ledger.enough(counted)
+    return totals.enough(counted)
 
 
 def _views(space: NavigableSpace, lines: SightLines, poses: ScanPoses) -> list[IntArray]:
@@ -177,7 +185,7 @@ def _driven(selection: Selection, settings: Settings, done: IntArray) -> Route:
 def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
     """Return the coverage of a mission's own stops, for one view of each target."""
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
-    once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))
+    once = replace(totals_of_plan(known.seen), asked=frozen([1], np.int64))
     return (
         once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage or 0.0
     )
@@ -221,7 +229,7 @@ def _with_poses(
         views = _views(space, SightLines(space), poses)
     else:
         start = planned.mission.start
-        poses = np.tile((start.x, start.y, start.heading), (int(ledger_of(seen).asked.max()), 1))
+        poses = np.tile((start.x, start.y, start.heading), (int(totals_of_plan(seen).asked.max()), 1))
         views = [np.flatnonzero(measured & seen.visible)] * len(poses)
     joined = _joined(seen.candidates, poses)
     units = [*(seen.seen_by(row) for row in range(seen.rows)), *views]

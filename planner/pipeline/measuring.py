@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from stopgo.mission.comparing.measured import Measured, Unplanned
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, bounds, frozen
 from stopgo.mission.stages import NavigableSpace
-from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
+from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.pipeline.cloud_registration import misplaced_m
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, hull_of
@@ -52,9 +52,9 @@ def measured(
         counts.add(points)
         away_m = misplaced_m(points, counts.units, tolerance) if surveyed else None
         misplaced += [] if away_m is None else [away_m]
-    ledger = ledger_of(planned.seen)
+    totals = totals_of_plan(planned.seen)
     return Measured(
-        ledger=_at_scan_height(ledger) if surveyed else ledger,
+        totals=_at_scan_height(totals) if surveyed else totals,
         hit=frozen(counts.hit, np.bool_),
         tolerance_m=tolerance,
         points=counts.points,
@@ -65,10 +65,10 @@ def measured(
     )
 
 
-def _at_scan_height(ledger: CoverageTotals) -> CoverageTotals:
+def _at_scan_height(totals: CoverageTotals) -> CoverageTotals:
     """Return the totals without elements that lie above head height."""
-    above = np.array([item.kind in ABOVE for item in ledger.elements], bool)
-    return replace(ledger, visible=frozen(ledger.visible & ~above[ledger.element], np.bool_))
+    above = np.array([item.kind in ABOVE for item in totals.elements], bool)
+    return replace(totals, visible=frozen(totals.visible & ~above[totals.element], np.bool_))
 
 
 class _SweepCounts:

@@ -1,7 +1,7 @@
 """Selection -> route: the order of the stops, and the paths between them.
 
 A router is a function `(lengths, seed) -> order` over a symmetric matrix of lengths in metres. A graph is
-a function `(space, points) -> Ways`; `Ways` holds the shortest paths between the points.
+a function `(space, points) -> Paths`; `Paths` holds the shortest paths between the points.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing.colony import ant_colony
 from stopgo.planner.routing.grid_graph import grid_paths
 from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.paths import Paths
 from stopgo.planner.routing.proof import tour_proof
 from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
-from stopgo.planner.routing.ways import Ways
 from stopgo.planner.space.reach import reach_of
 
 Router = Callable[..., IntArray]
 ROUTERS: dict[str, Router] = {"default": shortest_tour, "aco": ant_colony}
 METHODS = {"default": "2-opt, Or-opt, iterated", "aco": "ant colony"}
-Graph = Callable[[NavigableSpace, FloatArray], Ways]
+Graph = Callable[[NavigableSpace, FloatArray], Paths]
 GRAPHS: dict[str, Graph] = {"exact": paths_between, "grid": grid_paths}
 
 
@@ -58,14 +58,14 @@ def route(selection: Selection) -> Route:
     if not np.isfinite(legs.lengths).all():
         raise NegativeResult(f"{space.floor.name}: the route's end is not connected with its stops")
     sequence, bound, method = _ordered(legs.lengths, ends, router, seed=settings.seed)
-    method += "" if settings.graph == "exact" else f", over the ways of --graph {settings.graph}"
+    method += "" if settings.graph == "exact" else f", over the paths of --graph {settings.graph}"
     return assembled(selection, points, legs, sequence, ends, bound, method)
 
 
 def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
     """The paths between all pairs of points (n, 2), by the graph of the settings."""
     graph = variant("graph", space.settings.graph, GRAPHS)
-    return Legs(graph, graph.of_kind(graph.called(space, points), Ways), points)
+    return Legs(graph, graph.of_kind(graph.called(space, points), Paths), points)
 
 
 def points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:

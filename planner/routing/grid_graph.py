@@ -29,8 +29,8 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.room_grid import main_axes, room_grid
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_shape
+from stopgo.planner.routing.paths import Paths, shortest_paths
 from stopgo.planner.routing.roadmap import anchors_of, on_crossings, outward_corners
-from stopgo.planner.routing.ways import Ways, shortest_ways
 from stopgo.planner.space.opening_joins import middle_and_normal
 
 RESOLUTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)
@@ -45,7 +45,7 @@ NEIGHBOURS = 32
 """Nearest nodes among which the nearest reachable by a straight line is taken."""
 
 
-def grid_paths(space: NavigableSpace, points: FloatArray) -> Ways:
+def grid_paths(space: NavigableSpace, points: FloatArray) -> Paths:
     """Paths between all pairs of points (n, 2) over the coarsest grids that connect them.
 
     Raises
@@ -65,7 +65,7 @@ def grid_paths(space: NavigableSpace, points: FloatArray) -> Ways:
     )
 
 
-def paths_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Sequence[float]) -> Ways:
+def paths_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Sequence[float]) -> Paths:
     """Paths over grids of the first of `resolutions` that is fine enough for each room, else of the last."""
     origin = local_origin(space.floor)
     free, doors, net = _free(space), _doors(space), Net()
@@ -93,7 +93,7 @@ def paths_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Se
     for joint in (entry, gap, corner):
         pairs, _ = nearest_seen(net.xy[joint], net.xy[every], free)
         net.join(joint[pairs[:, 0]], every[pairs[:, 1]])
-    return shortest_ways(net.xy + origin, net.edges, len(points))
+    return shortest_paths(net.xy + origin, net.edges, len(points))
 
 
 class Net:

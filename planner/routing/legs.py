@@ -9,7 +9,7 @@ import numpy as np
 
 from stopgo.mission.console.plugins import Variant
 from stopgo.mission.geometry import FloatArray, frozen, polyline_length
-from stopgo.planner.routing.ways import Ways
+from stopgo.planner.routing.paths import Paths
 
 TOLERANCE = 1e-6
 """Largest error in metres of a path's ends and of its length."""
@@ -20,7 +20,7 @@ class Legs:
     """Paths between points (n, 2), by a graph of the settings."""
 
     graph: Variant[Any]
-    ways: Ways
+    paths: Paths
     points: FloatArray
 
     def __post_init__(self) -> None:
@@ -38,14 +38,14 @@ class Legs:
     @property
     def lengths(self) -> FloatArray:
         """(n, n) in metres; infinite where there is no path."""
-        return np.asarray(self.ways.lengths, dtype=np.float64)
+        return np.asarray(self.paths.lengths, dtype=np.float64)
 
     def path(self, start: int, end: int) -> FloatArray:
         """The polyline (n, 2) from one point to another, both included."""
         if self.graph.ours:
-            return self.ways.way(start, end)
+            return self.paths.path(start, end)
         with self.graph.named_errors():
-            given = self.ways.way(start, end)
+            given = self.paths.path(start, end)
         line = frozen(self.graph.array(given, "a path", (None, 2)))
         ends = self.points[[start, end]]
         if not len(line) or np.abs(line[[0, -1]] - ends).max() > TOLERANCE:

@@ -24,7 +24,7 @@ from stopgo.planner.geometry.shapes import (
     to_shape,
     whole_steps,
 )
-from stopgo.planner.routing.ways import Ways, shortest_ways
+from stopgo.planner.routing.paths import Paths, shortest_paths
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.sight.mesh import mesh_of
 from stopgo.planner.visibility.sight.sight import scene_of, sight
@@ -35,7 +35,7 @@ TOUCH = 1e-9
 """Products of areas (m⁴) below this are floating-point noise."""
 
 
-def paths_between(space: NavigableSpace, points: FloatArray) -> Ways:
+def paths_between(space: NavigableSpace, points: FloatArray) -> Paths:
     """Shortest paths between all pairs of points (n, 2) of the drive area."""
     origin = local_origin(space.floor)
     corners = outward_corners(space)
@@ -50,7 +50,7 @@ def paths_between(space: NavigableSpace, points: FloatArray) -> Ways:
         on_crossings(points - origin, nodes, links),
         to_anchors,
     ]
-    return shortest_ways(nodes + origin, np.concatenate(edges), len(points))
+    return shortest_paths(nodes + origin, np.concatenate(edges), len(points))
 
 
 def anchors_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, IntArray]:

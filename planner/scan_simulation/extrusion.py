@@ -23,6 +23,8 @@ BEAM_WIDTH_M = 0.2
 """Assumed width of beams drawn as single lines."""
 SEE_THROUGH_M = {"windows": (0.9, 2.1), "railings": (0.0, 1.0), "other": (0.0, 1.0)}
 """Assumed lower and upper height of targets that the laser passes, by kind."""
+LEAST_M = 0.02
+"""Elements lower than this have the assumed heights."""
 NONE = -1
 BEAM_KIND = "beams"
 """The kind that is fixed below the ceiling."""
@@ -86,7 +88,11 @@ def extruded(floor: FloorPlan, closed: Sequence[FloatArray], ceiling: float) -> 
 
 
 def heights_of(item: Element, ceiling: float) -> tuple[float, float]:
-    """Lower and upper height of an element above the floor."""
+    """Lower and upper height of an element above the floor: as modelled, else as assumed."""
+    if item.heights is not None:
+        low, high = (min(max(height, 0.0), ceiling) for height in item.heights)
+        if high - low >= LEAST_M:
+            return low, high
     if item.kind == BEAM_KIND:
         return ceiling - BEAM_M, ceiling
     return (0.0, ceiling) if item.occludes else SEE_THROUGH_M.get(item.kind, SEE_THROUGH_M["other"])

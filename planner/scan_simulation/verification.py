@@ -17,11 +17,13 @@ from stopgo.mission.document.limits import limits_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage
 from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, frozen
 from stopgo.mission.proof.plan_proof import (
     CloudQuality,
     PlanProof,
     PromisedShare,
+    ProvenArea,
     ScanCloud,
     ScanNetwork,
     Simulation,
@@ -31,6 +33,7 @@ from stopgo.mission.stages import NavigableSpace, Targets, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE
 from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
+from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model
 from stopgo.planner.scan_simulation.registration import OrientedCloud, registered, surface_of
 from stopgo.planner.scan_simulation.scan_network import network_of
 from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, pose_of, scanned
@@ -63,10 +66,13 @@ def verify(
     simulation: Simulation,
     coverage: Coverage | None,
     say: Say = lambda line: None,
+    *,
+    model: ModelSolids | None = None,
 ) -> PlanProof:
     """Scan a floor from every stop of a mission, and compare the scans with the plan's promised coverage.
 
-    `coverage` is the mission's own coverage.json; without it only the mission's counts are compared.
+    `coverage` is the mission's own coverage.json; without it only the mission's counts are compared. With the
+    solids of a `model` the rays are cast at these, and the plan's area is compared too.
 
     Raises
     ------
@@ -78,7 +84,7 @@ def verify(
     _check_libraries(simulation)
     if not mission.stops:
         raise NegativeResult(f"{mission.name}: no stops; nothing to verify")
-    site = _ScanSite.of(space, simulation)
+    site = _ScanSite.of(space, simulation, model)
     poses = [site.pose_of(stop, number) for number, stop in enumerate(mission.stops)]
     tally = _PointTally(site.strips, UnitRequirements.of(space.settings, site.strips), simulation)
     surfaces, clouds = _scans(mission, site, poses, tally, say)
@@ -90,7 +96,30 @@ def verify(
         pairs.append(pair)
         say(f"registering pairs of scans, {len(pairs)} done")
     promise = _PromisedCoverage.of(mission, space, coverage)
-    return _proof(mission, site, tally, promise, network_of(names, positions, pairs), clouds)
+    proof = _proof(mission, site, tally, promise, network_of(names, positions, pairs), clouds)
+    return proof if site.scene is None else replace(proof, areas=_areas(site, site.scene, tally, promise))
+
+
+def _areas(
+    site: _ScanSite, scene: ModelScene, tally: _PointTally, promise: _PromisedCoverage
+) -> tuple[ProvenArea, ...]:
+    """Area of the promised targets by kind: as the plan claims, and as the model's solids show."""
+    surface = None if promise.coverage is None else promise.coverage.surface
+    if surface is None or promise.units is None:
+        return ()
+    strips, targets = site.strips, site.space.targets
+    unit = strips.unit_of_cell
+    upright = np.abs(strips.normal[:, 2]) < 0.5
+    there = scene.existing(strips) & upright & promise.units[unit]
+    kind = np.array([item.kind for item in site.space.floor.elements])
+    of_cell = kind[targets.element[targets.unit_segment]][unit]
+    found = []
+    for name, claimed in surface.kinds.items():
+        own = there & (of_cell == name)
+        seen = float(strips.area[own & tally.hit].sum())
+        share = claimed.seen_m2 / claimed.total_m2 if claimed.total_m2 else 1.0
+        found.append(ProvenArea(name, claimed.total_m2, share, float(strips.area[own].sum()), seen))
+    return tuple(found)
 
 
 def _check_libraries(simulation: Simulation) -> None:
@@ -114,13 +143,22 @@ class _ScanSite:
     """Lines of the doors that are closed for the laser."""
     solids: ExtrudedFloor
     strips: Strips
+    scene: ModelScene | None = None
+    """The model's solids, if rays are cast at these."""
 
     @classmethod
-    def of(cls, space: NavigableSpace, simulation: Simulation) -> _ScanSite:
+    def of(cls, space: NavigableSpace, simulation: Simulation, model: ModelSolids | None) -> _ScanSite:
         doors = _closed_doors(space)
         solids = extruded(space.floor, doors, simulation.ceiling_m)
         strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
-        return cls(space, simulation, doors, solids, strips)
+        scene = None if model is None else ModelScene(model, solids.origin)
+        return cls(space, simulation, doors, solids, strips, scene)
+
+    def scanned(self, pose: ScannerPose) -> ScanCount:
+        """Simulate one scan, at the model's solids if they are known."""
+        if self.scene is None:
+            return scanned(self.solids, self.strips, pose, self.simulation)
+        return scanned_model(self.scene, self.strips, pose, self.simulation)
 
     def pose_of(self, stop: Stop, number: int) -> ScannerPose:
         """The scanner's pose at a stop."""
@@ -137,7 +175,7 @@ def _scans(
     ceiling, origin = site.simulation.ceiling_m, site.solids.origin
     for stop, pose in zip(mission.stops, poses, strict=True):
         say(f"scanning from {stop.id}, {len(clouds) + 1} of {len(poses)}")
-        scan = scanned(site.solids, site.strips, pose, site.simulation)
+        scan = site.scanned(pose)
         tally.take(scan, _sighted(site.space, site.solids, pose, ceiling))
         surfaces.append(surface_of(scan.cloud))
         clouds.append(ScanCloud(stop.id, _drawn(pose, scan, MOST_DRAWN // len(poses), ceiling, origin)))
@@ -227,6 +265,12 @@ class _PointTally:
         shown = self._asked.shown(scan)
         self.views += shown
         self.of_stop.append((int(sighted.sum()), int(shown.sum()), int(scan.points.sum())))
+
+    @property
+    def hit(self) -> BoolArray:
+        """True for cells with points (cells,)."""
+        found: BoolArray = self._points > 0
+        return found
 
     def quality(self) -> CloudQuality:
         area, hit = self._strips.area, self._points > 0

@@ -13,6 +13,7 @@ from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage, read_coverage
 from stopgo.mission.files.mission_json import read
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.proof.plan_proof import PlanProof, Simulation
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, planned_floor
 from stopgo.planner.scan_simulation.verification import verify
@@ -67,7 +68,19 @@ def verify_file(
             f"--scanner-height {simulation.height_m:g}: not below the ceiling at "
             f"{simulation.ceiling_m:g} m; lower the scanner or give --ceiling"
         )
-    return verify(mission, planned.space, simulation, _coverage(path, coverage, mission, warn), say), planned
+    model = _model(planned, floor, simulation)
+    found = _coverage(path, coverage, mission, warn)
+    return verify(mission, planned.space, simulation, found, say, model=model), planned
+
+
+def _model(planned: PlannedFloor, floor: Path, simulation: Simulation) -> ModelSolids | None:
+    """The model's solids, if rays are to be cast at these."""
+    if simulation.solids != "model":
+        return None
+    model = planned.model_solids
+    if model is None:
+        raise InputError(f"{floor}: is no building model and has no solids; leave --solids model out")
+    return model
 
 
 def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:

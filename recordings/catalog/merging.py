@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -48,13 +49,19 @@ def _plans_first(recordings: Sequence[Recording]) -> list[Recording]:
 def _sheet(recordings: Sequence[Recording]) -> Sheet:
     missions = missions_of(recordings)
     extents = (planned_extent(item) for item in recordings)
+    runs = tuple(dict.fromkeys(str(log.run_id) for item in recordings for log in item.logs))
     return Sheet(
-        recording_id=recordings[0].mission_id,
+        recording_id=entities.recording_id(recordings[0].mission_id, _together(runs)),
         name=missions[-1].name,
         origin=mission_origin(missions[0]),
         extent=next((item for item in extents if item is not None), mission_extent(missions[-1])),
-        runs=tuple(dict.fromkeys(str(log.run_id) for item in recordings for log in item.logs)),
+        runs=runs,
     )
+
+
+def _together(runs: Sequence[str]) -> str:
+    """Return a name for runs in one recording: that of the only one, else a digest of all."""
+    return runs[0] if len(runs) == 1 else hashlib.sha256(" ".join(runs).encode()).hexdigest()[:16]
 
 
 def _check_same_mission(recordings: Sequence[Recording], out: Path) -> None:

@@ -87,6 +87,8 @@ METRIC_CROSS_TRACK = "/metrics/cross_track"
 METRIC_DEVIATION = "/metrics/deviation"
 METRIC_BATTERY = "/metrics/battery"
 
+STOP_RESULTS = "/run/stops"
+"""Results of the stops as values: the same columns in every run."""
 LOG = "/log"
 LOG_PLAN = "/log/plan"
 LOG_FIELD = "/log/field"
@@ -241,3 +243,8 @@ def run_of_events(entity: str) -> str | None:
     """Return the run whose events the entity contains; None for other entities."""
     parts = entity.split("/")
     return parts[2] if len(parts) == 4 and entity == RunEntities(parts[2]).events else None
+
+
+def recording_id(mission_id: str, run_id: str = "") -> str:
+    """Return the id of a run's recording; without a run, that of the mission's plan."""
+    return f"{mission_id}-{run_id}" if run_id else mission_id

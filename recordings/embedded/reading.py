@@ -33,8 +33,12 @@ class Recording:
 
     @property
     def mission_id(self) -> str:
-        """Id of the mission, which is also the id of its plan and field recordings."""
-        return self.contents.recording_id
+        """Id of the mission; it is also the id of its plan's recording, and of a run's until version 0.2."""
+        for name in (entities.PROPERTY_RUN, entities.PROPERTY_PLAN):
+            found = self.contents.properties.get(name, {}).get("mission_id")
+            if found:
+                return str(found)
+        return self.missions[-1].id if self.missions else self.contents.recording_id
 
 
 def read_recording(path: Path) -> Recording:
@@ -66,11 +70,25 @@ def _read(path: Path) -> Recording:
     contents = check(path, take=values.take)
     if contents.application != entities.APPLICATION:
         raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
+    logs = logs_in(values, contents, path)
+    _refuse_former_runs(path, contents, logs)
     return Recording(
         path=path,
         contents=contents,
         values=values,
         missions=missions_in(values, str(path)),
         sights=sights_in(values, str(path)),
-        logs=logs_in(values, contents, path),
+        logs=logs,
     )
+
+
+def _refuse_former_runs(path: Path, contents: Contents, logs: Sequence[RunLog]) -> None:
+    """Refuse a recording that has the report of a run, but not its events as values."""
+    run = contents.properties.get(entities.PROPERTY_RUN, {}).get("run_id")
+    if run is None or logs:
+        return
+    if entities.RunEntities(str(run)).flat(entities.RUN_REPORT) in contents.rows:
+        raise InputError(
+            f"{path}: holds run {str(run)[:12]} as pictures only, as stopgo before 0.2 recorded it; "
+            "review it with the version that recorded it, or fetch the run with watch --run"
+        )

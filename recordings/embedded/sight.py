@@ -44,30 +44,30 @@ def sights_in(values: Values, name: str) -> tuple[Sight, ...]:
 
 
 def _values(sight: Sight) -> dict[str, Sized]:
-    targets, ledger = sight.targets, sight.ledger
+    targets, totals = sight.targets, sight.totals
     first = targets.first_unit[:-1]
-    asked = np.broadcast_to(ledger.asked, len(ledger.weight))
-    change = _changes(np.stack([ledger.room, ledger.visible, asked], axis=1))
+    asked = np.broadcast_to(totals.asked, len(totals.weight))
+    change = _changes(np.stack([totals.room, totals.visible, asked], axis=1))
     more = {"asked": asked[change].astype(np.int32)} if (asked > 1).any() else {}
-    shares = [ledger.required, _encoded_fraction(ledger.kind_required)]
+    shares = [totals.required, _encoded_fraction(totals.kind_required)]
     return {
-        "mission": [sight.mission_id, sight.digest, ledger.rule],
+        "mission": [sight.mission_id, sight.digest, totals.rule],
         "revision": np.array([sight.revision]),
         "shares": np.array(shares),
         "a": targets.a.ravel(),
         "b": targets.b.ravel(),
         "units": targets.units.astype(np.int32),
-        "weight": ledger.weight[first],
+        "weight": totals.weight[first],
         "element": targets.element.astype(np.int32),
-        "element_ids": [item.id for item in ledger.elements],
-        "element_kinds": [item.kind for item in ledger.elements],
+        "element_ids": [item.id for item in totals.elements],
+        "element_kinds": [item.kind for item in totals.elements],
         "change": change.astype(np.int32),
-        "room": ledger.room[change].astype(np.int32),
-        "visible": ledger.visible[change],
+        "room": totals.room[change].astype(np.int32),
+        "visible": totals.visible[change],
         **more,
-        "room_names": [group.name for group in ledger.rooms],
-        "room_why": [group.why for group in ledger.rooms],
-        "room_shares": np.array([_encoded_fraction(group.required) for group in ledger.rooms]),
+        "room_names": [group.name for group in totals.rooms],
+        "room_why": [group.why for group in totals.rooms],
+        "room_shares": np.array([_encoded_fraction(group.required) for group in totals.rooms]),
         "stop_ids": [stop.id for stop in sight.stops],
         "stop_xy": np.array([(stop.x, stop.y) for stop in sight.stops]).ravel(),
         "pointer": sight.pointer.astype(np.int32),
@@ -112,7 +112,7 @@ def _sight(row: Cells) -> Sight:
         revision=int(row["revision"][0]),
         digest=digest,
         targets=targets,
-        ledger=_coverage_totals(row, targets, "paper" if rule == "paper" else "length"),
+        totals=_coverage_totals(row, targets, "paper" if rule == "paper" else "length"),
         stops=tuple(SeenFrom(name, float(xy[0]), float(xy[1])) for name, xy in stops),
         pointer=pointer,
         first=first,

@@ -62,18 +62,18 @@ def _growth(comparison: Comparison) -> Iterator[str]:
     acquired = comparison.acquired
     if acquired is None:
         return
-    ledger, views = acquired.sight.ledger, np.zeros(len(acquired.seen), dtype=np.int64)
-    visible = ledger.amount(ledger.visible)
+    totals, views = acquired.sight.totals, np.zeros(len(acquired.seen), dtype=np.int64)
+    visible = totals.amount(totals.visible)
     times, percentages = [0.0], [0.0]
     for event in comparison.log.events:
         if isinstance(event, Scanned) and visible:
             views = views + acquired.sight.views_from([event.stop])
-            seen = ledger.enough(views) & acquired.seen
+            seen = totals.enough(views) & acquired.seen
             times.append(event.mission_time_s)
-            percentages.append(100 * ledger.amount(seen & ledger.visible) / visible)
+            percentages.append(100 * totals.amount(seen & totals.visible) / visible)
     if len(times) > 1:
         ends = np.array([0.0, times[-1]])
-        required = PlotLine(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
+        required = PlotLine(ends, np.full(2, 100 * totals.required), VERMILION, "4 3")
         acquired_line = PlotLine(np.array(times), np.array(percentages), BLUE, steps=True)
         yield _plot("coverage acquired, %; dashed: required", [required, acquired_line])
 

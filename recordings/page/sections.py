@@ -230,8 +230,8 @@ def _clock(seconds: float | None) -> str:
 def _coverage_tables(acquired: Acquired) -> Iterator[str]:
     yield section("Rooms, worst first", _share_grid(acquired.rooms, "room"))
     yield section("Kinds", _share_grid(acquired.kinds, "kind"))
-    ledger = acquired.sight.ledger
-    planned = {item.name: item for item in ledger.by_element(acquired.sight.all_seen)}
+    totals = acquired.sight.totals
+    planned = {item.name: item for item in totals.by_element(acquired.sight.all_seen)}
     pairs = [(planned[item.name], item) for item in acquired.elements if item.visible]
     worst = sorted(pairs, key=lambda pair: (pair[1].seen - pair[0].seen, pair[1].name))
     short = [pair for pair in worst if pair[1].seen < pair[0].seen]
@@ -298,8 +298,8 @@ def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
     first = next((item for item in known if item is not None), None)
     if first is None:
         return ""
-    names = [share.name for share in first.sight.ledger.rooms_seen(first.seen)]
-    columns = [[] if item is None else item.sight.ledger.rooms_seen(item.seen) for item in known]
+    names = [share.name for share in first.sight.totals.rooms_seen(first.seen)]
+    columns = [[] if item is None else item.sight.totals.rooms_seen(item.seen) for item in known]
     return grid(header, [
         row([shown(name), *(percent(column[k].coverage) if k < len(column) else "" for column in columns)])
         for k, name in enumerate(names)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, StateReport
+from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.runs.field import FieldRecording
 
@@ -14,9 +15,9 @@ STEP_M, STEP_RAD, STEP_S = 0.02, math.radians(2.0), 2.0
 """Limits below which a pose counts as equal to the one before and is left out."""
 
 
-def write_recording(replays: Sequence[Replay], path: Path) -> None:
-    """Draw every run; opened together with the plan's recording, they overlay."""
-    with FieldRecording(path, replays[0].mission) as recording:
+def write_recording(replays: Sequence[Replay], path: Path, plan: Recording | None = None) -> None:
+    """Draw every run, with the floor and visibility of the plan's recording if it is given."""
+    with FieldRecording(path, replays[0].mission, plan=plan) as recording:
         for replay in replays:
             for report in _reports(replay):
                 if isinstance(report, PoseReport):

@@ -161,7 +161,7 @@ def _measured_json(found: Measured) -> dict[str, Any]:
         "histogram_edges_m": found.edges_m.tolist(),
         "histograms": {
             item.id: counts.tolist()
-            for item, counts in zip(found.ledger.elements, found.histogram, strict=True)
+            for item, counts in zip(found.totals.elements, found.histogram, strict=True)
             if counts.any()
         },
         "unplanned": [

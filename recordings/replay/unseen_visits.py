@@ -106,12 +106,22 @@ def _in_a_gap(replay: Replay, stop: Stop, unsure_m: float) -> str:
         drive_m = sum(max(0.0, math.dist(point, (stop.x, stop.y)) - reach) for point in (begin, end))
         if seconds >= max(LEAST_GAP_S, least_stay_s(stop)) + drive_m / speed:
             longest = max(longest, seconds)
+    if math.isinf(longest):
+        return "the robot moved while it restarted; give another source of poses"
     return f"{longest:.0f} s without poses on the path; give another source of poses" if longest else ""
+
+
+MOVED_M = 0.5
+"""Distance from the last pose before a restart to the first one after it, from which on it was moved."""
 
 
 def _gaps(track: Track) -> Iterator[tuple[float, tuple[float, float], tuple[float, float]]]:
     """Yield each step between poses longer than LEAST_GAP_S: seconds, and both positions."""
     seconds = np.diff(track.ns) / 1e9
+    for restart_ns in track.restarts_ns:  # the time of a reboot is unknown, and the robot may have been moved
+        k = int(np.searchsorted(track.ns, restart_ns)) - 1
+        if 0 <= k < len(seconds) and math.dist(track.xy[k], track.xy[k + 1]) > MOVED_M:
+            seconds[k] = math.inf
     for k in np.flatnonzero(seconds > LEAST_GAP_S).tolist():
         (ax, ay), (bx, by) = track.xy[k].tolist(), track.xy[k + 1].tolist()
         yield float(seconds[k]), (ax, ay), (bx, by)

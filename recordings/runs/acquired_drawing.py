@@ -31,8 +31,8 @@ class AcquiredDrawing:
         self._sight = sight
         self._stops = {stop.id: stop for stop in sight.stops}
         self._remaining = set(sight.ids)
-        self._views = np.zeros(len(sight.ledger.weight), dtype=np.int64)
-        self._lost = np.zeros(len(sight.ledger.weight), dtype=bool)
+        self._views = np.zeros(len(sight.totals.weight), dtype=np.int64)
+        self._lost = np.zeros(len(sight.totals.weight), dtype=bool)
         self._styled = False
 
     def draw_event(self, event: AnyEvent, *, canvas: Canvas, names: entities.RunEntities, draw: Draw) -> None:
@@ -52,7 +52,7 @@ class AcquiredDrawing:
 
     def sentence(self) -> str:
         """Return the coverage acquired so far, in a sentence."""
-        now, planned = self._sight.ledger.shares(self._seen).whole, self._sight.planned.whole
+        now, planned = self._sight.totals.shares(self._seen).whole, self._sight.planned.whole
         required = "" if now.required is None else f"{percent(now.required)} required, "
         acquired, planned_percent = percent(now.coverage), percent(planned.coverage)
         return f"**{acquired}** of what is visible is scanned ({required}{planned_percent} planned)"
@@ -60,7 +60,7 @@ class AcquiredDrawing:
     @property
     def _seen(self) -> BoolArray:
         """Units covered so far, as a mask (n,)."""
-        return self._sight.ledger.enough(self._views)
+        return self._sight.totals.enough(self._views)
 
     def _give_up(
         self, stops: list[SeenFrom], canvas: Canvas, names: entities.RunEntities, draw: Draw
@@ -69,7 +69,7 @@ class AcquiredDrawing:
         self._remaining -= {stop.id for stop in stops}
         possible = self._views + self._sight.views_from(self._remaining)
         skipped_units = self._sight.views_from([stop.id for stop in stops]) > 0
-        lost = skipped_units & ~self._lost & ~self._sight.ledger.enough(possible)
+        lost = skipped_units & ~self._lost & ~self._sight.totals.enough(possible)
         self._lost |= lost
         self._draw(canvas, names.flat(entities.LOST), lost, draw)
         if stops:

@@ -215,6 +215,8 @@ class RunDrawing:
             "mission_name": self.mission.name,
             "revision": self.mission.revision,
             "digest": self.mission.digest,
+            "floor": self.mission.origin.floor,
+            "floor_digest": self.mission.origin.floor_digest,
             "planned_stops": len(self.mission.stops),
             "local_origin": list(self.canvas.origin),
         }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from secrets import token_hex
 from types import TracebackType
 from typing import Any
 
@@ -15,6 +16,7 @@ from stopgo.mission.files.atomic import must_be_writable
 from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
+    Event,
     Finished,
     Health,
     PoseReport,
@@ -23,6 +25,7 @@ from stopgo.mission.run.events import (
     ReportsMissing,
     StateReport,
 )
+from stopgo.recordings.drawing import entities
 from stopgo.recordings.drawing.canvas import Canvas, Sheet, mission_origin, open_canvas
 from stopgo.recordings.embedded.checking import embed_end
 from stopgo.recordings.embedded.missions import embed_mission
@@ -32,6 +35,7 @@ from stopgo.recordings.plan.mission import draw_mission, mission_extent
 from stopgo.recordings.rrd.compact import compact
 from stopgo.recordings.rrd.segment_file import SegmentFile
 from stopgo.recordings.runs.drawing import RunDrawing
+from stopgo.recordings.runs.stop_results import draw_stop_results
 
 DrawnReport = Report | Health | PosesMissing | ReportsMissing
 """Reports of a run that are drawn."""
@@ -51,9 +55,10 @@ class FieldRecording:
 
     With the recording of its plan, it also contains the floor and what the stops see.
 
-    Reports wait for the mission, which gives the recording id and the local origin. Reports without a run are
-    left out, as are all reports if no mission comes. Reports of a new revision wait for that revision: the
-    plan stays as it was drawn first, and each run shows the changes of a revision at their time.
+    Reports wait for the mission, which gives the local origin. The file begins with the first report of a
+    run, which gives the recording id; while a viewer follows, it begins with the mission. Reports without a
+    run are left out, as are all reports if no mission comes. Reports of a new revision wait for it: the plan
+    stays as it was drawn first, and each run shows the changes of a revision at their time.
     """
 
     def __init__(
@@ -68,10 +73,13 @@ class FieldRecording:
         self._say = say
         self._waiting: list[DrawnReport] = []
         self._poses: list[PoseReport] = []
+        self._events: dict[str, dict[int, AnyEvent]] = {}
+        """Events of each run by their number, until its results are written."""
         self._end_written = False
         self._runs: dict[str, RunDrawing] = {}
         self._first: Mission | None = None
         self._newest: Mission | None = None
+        self._revisions: dict[int, Mission] = {}
         self._canvas: Canvas | None = None
         self._segments: SegmentFile | None = None
         self._port: int | None = None
@@ -97,9 +105,11 @@ class FieldRecording:
             )
         if self._first is None:
             self._first = mission
-            self._begin(mission)
-        elif self._newest is not None and mission.revision != self._newest.revision:
-            embed_mission(self.canvas, mission)
+            if self._port is not None:
+                self._begin(mission, token_hex(6))
+        elif self._canvas is not None and self._newest and mission.revision != self._newest.revision:
+            embed_mission(self._canvas, mission)
+        self._revisions[mission.revision] = mission
         self._newest = mission
         waiting, self._waiting = self._waiting, []
         for report in waiting:
@@ -134,6 +144,7 @@ class FieldRecording:
         self._end_written = isinstance(event, Finished | Aborted) and not self._waiting
         if self._end_written and event.run_id in self._runs:
             self._runs[event.run_id].measure()
+            self._draw_results(event.run_id)
         if self._end_written:  # now, because the disk may be full when the file is closed
             embed_end(self.canvas)
         self._save()
@@ -146,12 +157,16 @@ class FieldRecording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._canvas is not None:
+        if self._first is not None:
             for report in self._waiting:
                 self._draw(report)
             self._draw_poses()
-            for run in self._runs.values():
+            if self._canvas is None:
+                self._begin(self._first)
+            assert self._canvas is not None
+            for run_id, run in self._runs.items():
                 run.measure()
+                self._draw_results(run_id)
             if not self._end_written:
                 embed_end(self._canvas)
             self._save()
@@ -183,17 +198,19 @@ class FieldRecording:
         if self._canvas is not None and self._segments is not None:
             self._segments.add(self._canvas.drain())
 
-    def _begin(self, mission: Mission) -> None:
+    def _begin(self, mission: Mission, run_id: str = "") -> None:
+        """Open the file; it has the id of its first run, so that a catalog holds the runs side by side."""
         self._segments = SegmentFile(_free_name(self.path), self._say)
         sheet = Sheet(
-            recording_id=mission.id,
+            recording_id=entities.recording_id(mission.id, run_id),
             name=mission.name,
             origin=mission_origin(mission),
             extent=planned_extent(self._plan) or mission_extent(mission),
         )
         self._canvas = self._open.enter_context(open_canvas(sheet, port=self._port))
         draw_mission(self._canvas, mission)
-        embed_mission(self._canvas, mission)
+        for revision in (self._revisions or {mission.revision: mission}).values():
+            embed_mission(self._canvas, revision)
         if self._plan is not None:
             embed_plan(self._canvas, self._plan, mission)
         self._save()
@@ -217,6 +234,8 @@ class FieldRecording:
                 self._draw_poses()
             return
         self._draw_poses()
+        if isinstance(report, Event):
+            self._events.setdefault(report.run_id, {})[report.number] = report
         if run.mission.revision < min(_revision(report), self._newest.revision):
             run.follow(self._newest, report)
         _DRAW[type(report)](run, report)
@@ -230,8 +249,17 @@ class FieldRecording:
             run.read_start_time(mine[-1])
             run.poses(track_of(mine), boot_id)
 
+    def _draw_results(self, run_id: str) -> None:
+        """Write the results of a run's stops once, when it has ended or the file is closed."""
+        events = self._events.pop(run_id, {})
+        if events:
+            ordered = [events[number] for number in sorted(events)]
+            draw_stop_results(self.canvas, ordered, list(self._revisions.values()))
+
     def _start(self, run_id: str) -> RunDrawing:
         assert self._first is not None
+        if self._canvas is None:
+            self._begin(self._first, run_id)
         sights = () if self._plan is None or self._plan.mission_id != self._first.id else self._plan.sights
         self._runs[run_id] = RunDrawing(self.canvas, run_id, self._first, sights)
         return self._runs[run_id]

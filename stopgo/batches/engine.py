@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 from stopgo.batches.content import computed_by
 from stopgo.batches.work import PlanOutcome, PlanTask, work
-from stopgo.mission.errors import InputError
+from stopgo.mission.errors import InputError, OutcomeUnknown
 
 TRIES = 2
 TICK_S = 0.5
@@ -101,6 +101,7 @@ class ClusterEngine:
     def __init__(self, address: str) -> None:
         from distributed import Client
 
+        self._address = address
         _must_answer(address)
         try:
             self._client: Any = Client(address, timeout="10s")
@@ -129,6 +130,8 @@ class ClusterEngine:
         self.slots = len(threads)
 
     def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
+        if self._client.status != "running":
+            raise OutcomeUnknown(f"--scheduler {self._address}: is gone; call the batch again to continue it")
         return self._executor.submit(work, task)
 
     def renew(self, slot: int) -> None:

@@ -38,7 +38,9 @@ def take_result(source: Path, result: Result, folder: Path, content: EntryConten
             if file_digest(path) != result.files[name][1]:
                 raise InputError(f"{source / name}: did not arrive whole; run the batch again")
     _set_aside_others(folder, set(names))
-    write_atomic(folder / ENTRY_FILE, msgspec.json.encode(content))
+    data = msgspec.json.encode(content)
+    if not (folder / ENTRY_FILE).is_file() or (folder / ENTRY_FILE).read_bytes() != data:
+        write_atomic(folder / ENTRY_FILE, data)
 
 
 def _has(path: Path, facts: tuple[int, str]) -> bool:

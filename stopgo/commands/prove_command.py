@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +17,14 @@ from stopgo.result_files import JsonOption, report_missing_rerun, result_folder
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
     from stopgo.mission.proof.plan_proof import PlanProof
+
+
+class SolidsOfProof(StrEnum):
+    """Solids that the rays of a proof are cast at."""
+
+    EXTRUDED = "extruded"
+    MODEL = "model"
+
 
 EXAMPLE = "Example: stopgo prove plan/mission.json --floor floor.dxf"
 
@@ -92,6 +101,13 @@ WithoutPosesOption = Annotated[
 SeedOption = Annotated[
     int, typer.Option(min=0, rich_help_panel="Simulation", help="Of noise and pose errors.")
 ]
+SolidsOption = Annotated[
+    SolidsOfProof,
+    typer.Option(
+        rich_help_panel="Simulation",
+        help="Solids that rays are cast at: the floor raised to its walls' height, or those of its model.",
+    ),
+]
 ProofStrictOption = Annotated[bool, typer.Option(help="Exit 1 also if the scans are not all connected.")]
 
 
@@ -111,6 +127,7 @@ def prove_command(
     height: HeightOption = None,
     blind_cone: BlindConeOption = None,
     ceiling: CeilingOption = None,
+    solids: SolidsOption = SolidsOfProof.EXTRUDED,
     slant: SlantOption = False,
     without_poses: WithoutPosesOption = False,
     seed: SeedOption = 1,
@@ -119,8 +136,9 @@ def prove_command(
 ) -> int:
     """Verify by simulation what a mission promises: scan the floor from its stops, measure, and register.
 
-    Casts the scanner's rays at the floor raised to its walls' height, counts the points on every target, and
-    registers the scans pair by pair. Writes proof.json, proof.rrd and proof.html.
+    Casts the scanner's rays at the floor raised to its walls' height, or with --solids model at the solids of
+    its building model. Counts the points on every target, and registers the scans pair by pair. Writes
+    proof.json, proof.rrd and proof.html.
 
     Exit code 1: the plan promises more than the simulated scans show; with --strict also if these are not
     all connected.
@@ -130,10 +148,9 @@ def prove_command(
     files = verification_files(mission.parent if out is None else result_folder(out), mission)
     for path in files.values():
         must_be_writable(path)
-    assumed: dict[str, Any] = {"noise_m": noise / 1000, "slant": slant}
-    assumed |= {"poses": not without_poses, "seed": seed}
     given = {"step_deg": step, "height_m": height, "cone_deg": blind_cone, "ceiling_m": ceiling}
-    assumed |= {key: value for key, value in given.items() if value is not None}
+    given |= {"noise_m": noise / 1000, "slant": slant, "seed": seed, "poses": not without_poses}
+    assumed = {key: value for key, value in {**given, "solids": solids.value}.items() if value is not None}
     proof, on_floor = _simulated(mission, floor, coverage, assumed)
     with running("writing the proof"):
         written = _write_proof(proof, on_floor, files)

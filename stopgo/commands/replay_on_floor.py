@@ -57,7 +57,7 @@ def follow_up_of(replays: list[Replay], planned: PlannedFloor, others: list[Miss
     for found in clouds:
         if found.placing_text:
             raise InputError(f"--clouds: {found.placing_text}; no follow-up mission can be planned")
-    done = np.any([found.hit | ~found.ledger.visible for found in clouds], axis=0) if clouds else None
+    done = np.any([found.hit | ~found.totals.visible for found in clouds], axis=0) if clouds else None
     return top_up(planned, scanned_from, obstacles=obstacles, evidence=evidence, measured=done, others=others)
 
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, ClassVar, cast
 
 import pytest
 
-from stopgo.batches.engine import BASE_BYTES, Running
+from stopgo.batches import engine
+from stopgo.batches.content import computed_by
+from stopgo.batches.engine import BASE_BYTES, ClusterEngine, Running
 from stopgo.batches.work import PlanOutcome, PlanTask
+from stopgo.mission.errors import InputError, OutcomeUnknown
 from stopgo.mission.settings import Settings
 from tests.batches.inline_engine import InlineEngine
 
@@ -87,3 +93,62 @@ def test_a_stopped_batch_begins_no_more(tmp_path: Path) -> None:
     engine = InlineEngine(1, done)
     assert list(Running(engine, tasks(tmp_path, "ab"), 1e12).outcomes(lambda: True)) == []
     assert not engine.begun
+
+
+class FakeClient:
+    """A dask client whose workers are as a test needs them."""
+
+    versions: ClassVar[dict[str, str]] = {}
+    threads: ClassVar[dict[str, int]] = {}
+    status = "running"
+
+    def __init__(self, address: str, timeout: str) -> None:
+        self.address = address
+
+    def run(self, function: Callable[[], str]) -> dict[str, str]:
+        return self.versions
+
+    def nthreads(self) -> dict[str, int]:
+        return self.threads
+
+    def get_executor(self, *, pure: bool) -> FakeClient:
+        return self
+
+    def shutdown(self, *, wait: bool) -> None: ...
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def cluster(monkeypatch: pytest.MonkeyPatch) -> type[FakeClient]:
+    monkeypatch.setitem(sys.modules, "distributed", cast("Any", SimpleNamespace(Client=FakeClient)))
+    monkeypatch.setattr(engine, "_must_answer", lambda address: None)
+    return FakeClient
+
+
+@pytest.mark.parametrize(
+    ("versions", "threads", "words"),
+    [
+        ({}, {}, "has no workers"),
+        ({"w1": "older"}, {"w1": 1}, "w1: has another stopgo (older) than this machine"),
+        ({"w1": computed_by()}, {"w1": 4}, "w1: has 4 threads; start it with --nthreads 1"),
+    ],
+)
+def test_a_worker_that_does_not_fit_is_refused(
+    cluster: type[FakeClient], versions: dict[str, str], threads: dict[str, int], words: str
+) -> None:
+    cluster.versions, cluster.threads = versions, threads
+    with pytest.raises(InputError) as refused:
+        ClusterEngine("tcp://127.0.0.1:8786")
+    assert words in str(refused.value)
+
+
+def test_a_scheduler_that_is_gone_ends_the_batch_as_unknown(
+    cluster: type[FakeClient], tmp_path: Path
+) -> None:
+    cluster.versions, cluster.threads = {"w1": computed_by()}, {"w1": 1}
+    made = ClusterEngine("tcp://127.0.0.1:8786")
+    assert made.slots == 1
+    made._client.status = "closed"
+    with pytest.raises(OutcomeUnknown, match="is gone; call the batch again"):
+        list(Running(made, tasks(tmp_path, "a"), 1e12).outcomes())

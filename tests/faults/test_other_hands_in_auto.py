@@ -20,25 +20,26 @@ from stopgo.bridge.mavlink.simulated.profiles import profile_named
 from stopgo.bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
 from stopgo.bridge.mavlink.transfer.upload import upload
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
-from stopgo.bridge.mavlink.vehicle_link.messages import set_current
+from stopgo.bridge.mavlink.vehicle_link.messages import position_setpoint, set_current
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.run.events import Held, Paused, Pose, Scanned, StateReport
+from stopgo.mission.run.events import Aborted, Failed, Held, Paused, Pose, Scanned, Skipped, StateReport
 from tests.bridge.mavlink.auto.site import KINDS, Site, real_tour
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
 from tests.faults.test_gateway import moment
 from tests.own_time import World, stepped_into
 
-SEEDS = range(size(short=4, full=200))
+SEEDS = range(size(short=4, full=240))
 OTHER = Who(255, 190)
 TRUE_M = 0.05
 """By how much an estimate may differ from the truth."""
 LONGEST_S = 1500.0
+TOLD_S = 3.0
 SCAN = Scan(profile="default", duration_s=6.0, timeout_s=40.0)
 FAILSAFES = 6
 
@@ -69,9 +70,9 @@ def another_list(hands: Hands, chance: random.Random) -> None:
     """Of the same length, with other stops or scans that are cut short; or of another length."""
     site = hands.site
     brief = Scan(profile="default", duration_s=0.2, timeout_s=20.0)
-    other = translate(
-        real_tour(**({"scan": brief} if chance.random() < 0.5 else {"settle_s": 4.0})), KINDS[site.profile]
-    )
+    details: dict[str, Any] = chance.choice([{"scan": brief}, {"settle_s": 4.0}, {"trigger": "none"}])
+    trigger = details.pop("trigger", "auto")
+    other = translate(real_tour(**details), KINDS[site.profile], trigger=trigger)
     hands.other(lambda peer: upload(peer, other, while_running=True))
 
 
@@ -79,6 +80,28 @@ def another_mode(hands: Hands, chance: random.Random) -> None:
     modes = profile_named(hands.site.profile).modes
     mode = chance.choice([modes.hold, modes.numbers["manual"]])
     hands.other(lambda peer: peer.order(dialect.MAV_CMD_DO_SET_MODE, *mode.params))
+
+
+def driven_by_set_points(hands: Hands, chance: random.Random) -> None:
+    """Another station takes the guided mode, and drives the vehicle off by half a metre."""
+    guided = profile_named(hands.site.profile).modes.guided
+
+    def drive(peer: Peer) -> None:
+        here = peer.ask(dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+        assert here is not None
+        angle = chance.uniform(0.0, math.tau)
+        point = (here.x + 0.5 * math.cos(angle), here.y + 0.5 * math.sin(angle))
+        for nth in range(30):
+            peer.send(position_setpoint(peer.who, point, down=0.0, now_ms=0))
+            if nth == 12:  # PX4 wants a stream of them first
+                peer.command(dialect.MAV_CMD_DO_SET_MODE, *guided.params)
+            hands.world.sleep(0.1)
+
+    hands.other(drive)
+
+
+def disarmed(hands: Hands, chance: random.Random) -> None:
+    hands.other(lambda peer: peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0))
 
 
 def jumped(hands: Hands, chance: random.Random) -> None:
@@ -92,12 +115,19 @@ def jumped(hands: Hands, chance: random.Random) -> None:
 
 def cut(hands: Hands, chance: random.Random) -> None:
     hands.line.roughness = Roughness(loss=1.0)
-    hands.world.sleep(chance.choice([1.0, 4.0, 15.0, 60.0]))
+    hands.world.sleep(chance.choice([1.0, 4.0, 15.0, 60.0, 120.0]))
     hands.line.roughness = Roughness()
 
 
+def stalled(hands: Hands, chance: random.Random) -> None:
+    """All that is sent meanwhile arrives at once."""
+    hands.line.stall(chance.choice([2.0, 8.0, 34.0]))
+
+
 def rough(hands: Hands, chance: random.Random) -> None:
-    hands.line.roughness = Roughness(delay_s=0.05, loss=0.2, doubled=0.05, overtaken=0.1)
+    hands.line.roughness = Roughness(
+        delay_s=0.05, loss=chance.choice([0.1, 0.2, 0.3]), doubled=0.05, overtaken=0.1
+    )
 
 
 def switched_off(hands: Hands, chance: random.Random) -> None:
@@ -111,7 +141,15 @@ def watch_restarted(hands: Hands, chance: random.Random) -> None:
     hands.world.sleep(chance.choice([0.0, 2.0, 20.0]))
 
 
-MISHAPS = (another_list, another_mode, jumped, cut, rough, switched_off, watch_restarted)
+def date_set(hands: Hands, chance: random.Random) -> None:
+    """On the station, between two of its processes or during one."""
+    hands.world.set_date(chance.choice([-3600.0, -5.0, 5.0, 3600.0]))
+
+
+FOREIGN = (another_list, another_mode, driven_by_set_points, disarmed, jumped)
+"""Told within `TOLD_S` to whoever watches."""
+MISHAPS = (*FOREIGN, cut, stalled, rough, switched_off, watch_restarted, date_set)
+TELLING = Paused | Held | Skipped | Failed | Aborted
 
 
 def followed(hands: Hands, befalls: list[Any], chance: random.Random) -> None:
@@ -129,7 +167,10 @@ def followed(hands: Hands, befalls: list[Any], chance: random.Random) -> None:
                 for report in station.reports():
                     in_time()
                     if befalls and befalls[0][0](report):
-                        befalls.pop(0)[1](hands, chance)
+                        mishap = befalls.pop(0)[1]
+                        mishap(hands, chance)
+                        if mishap in FOREIGN and not hands.line.roughness.loss:
+                            check_told(hands, mishap)
                         break
                     if isinstance(report, StateReport) and report.state in ("HELD", "PAUSED"):
                         go_on(hands, report.state)
@@ -138,12 +179,29 @@ def followed(hands: Hands, befalls: list[Any], chance: random.Random) -> None:
             hands.world.sleep(1.0)
 
 
+def check_told(hands: Hands, mishap: object) -> None:
+    """Whoever watches is told of a foreign hand in time; a jump to where it is, or at the end, is none."""
+    before = hands.site.events[-1].number
+    hands.world.sleep(TOLD_S)
+    events = [event for event in hands.site.events if event.number > before - 3]
+    unseen = mishap is jumped or hands.site.run.over
+    assert unseen or any(isinstance(event, TELLING) for event in events), (mishap, hands.site.run, events)
+
+
 def go_on(hands: Hands, state: str) -> None:
     """Give the vehicle its list again if it has another one, and order to go on."""
     site = hands.site
     if "changed the vehicle's mission" in site.run.reason:
         hands.other(lambda peer: upload(peer, site.sent, while_running=True))
-    site.order("retry" if state == "HELD" else "resume")
+    try:
+        site.order("retry" if state == "HELD" else "resume")
+    except NegativeResult as refused:
+        if "battery failsafe" in str(refused):  # a charged battery, and a new start
+            hands.life.close()
+            hands.on()
+        if "m off its route" in str(refused):
+            site.order("abort")
+        raise
 
 
 @dataclass(frozen=True)
@@ -184,7 +242,7 @@ def test_no_stop_counts_in_auto_that_was_not_scanned_in_place(
     tmp_path: Path, true_scans: list[TrueScan], world: World, seed: int
 ) -> None:
     chance = random.Random(2000 + seed)
-    profile = ("ardupilot", "px4")[seed // 8 % 2]
+    profile = ("ardupilot", "px4")[seed // (len(MISHAPS) + 1) % 2]
     first = seed % (len(MISHAPS) + 1)
     faults = (
         [f"failsafe@{chance.randrange(4, 30)}={chance.randrange(FAILSAFES)}"] if first == len(MISHAPS) else []

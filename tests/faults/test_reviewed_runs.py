@@ -71,7 +71,7 @@ class Story:
 
     def sees(self, stop: Stop) -> set[int]:
         """The visible units that a stop sees."""
-        visible = self.sights[-1].ledger.visible
+        visible = self.sights[-1].totals.visible
         units = self.sights[-1].views_from([stop.id])
         return set(np.flatnonzero(visible & (units > 0)).tolist())
 
@@ -81,11 +81,11 @@ class Story:
 
     def share(self, units: set[int], among: set[int] | None = None) -> float:
         """Of what is visible, or of those among it."""
-        ledger = self.sights[-1].ledger
-        visible = set(np.flatnonzero(ledger.visible).tolist())
+        totals = self.sights[-1].totals
+        visible = set(np.flatnonzero(totals.visible).tolist())
         asked = visible if among is None else visible & among
-        return sum(int(ledger.weight[unit]) for unit in units & asked) / sum(
-            int(ledger.weight[unit]) for unit in asked
+        return sum(int(totals.weight[unit]) for unit in units & asked) / sum(
+            int(totals.weight[unit]) for unit in asked
         )
 
 
@@ -116,14 +116,14 @@ def _sight(mission: Mission, seed: int) -> Sight:
     """Each stop sees one stretch of the small world's targets, the same in every revision."""
     known = planned()[1]
     chance = random.Random(seed)
-    runs = [sorted(chance.sample(range(len(known.ledger.weight)), 2)) for _ in range(5)]
+    runs = [sorted(chance.sample(range(len(known.totals.weight)), 2)) for _ in range(5)]
     runs = runs[: len(mission.stops)]
     return Sight(
         mission.id,
         mission.revision,
         mission.digest,
         known.targets,
-        known.ledger,
+        known.totals,
         tuple(SeenFrom(stop.id, stop.x, stop.y) for stop in mission.stops),
         frozen(np.arange(len(runs) + 1), np.int64),
         frozen([first for first, _ in runs], np.int64),
@@ -189,13 +189,13 @@ def _is_true_of_run(story: Story, run: dict[str, Any]) -> None:
 
 
 def _is_true_of_coverage(story: Story, told: dict[str, Any]) -> None:
-    ledger = story.sights[-1].ledger
+    totals = story.sights[-1].totals
     assert told["acquired"] == pytest.approx(story.share(story.seen))
     names = {
-        "rooms": [(group.name, ledger.room == k) for k, group in enumerate(ledger.rooms)],
+        "rooms": [(group.name, totals.room == k) for k, group in enumerate(totals.rooms)],
         "kinds": [
-            (kind, np.isin(ledger.element, [k for k, one in enumerate(ledger.elements) if one.kind == kind]))
-            for kind in {element.kind for element in ledger.elements}
+            (kind, np.isin(totals.element, [k for k, one in enumerate(totals.elements) if one.kind == kind]))
+            for kind in {element.kind for element in totals.elements}
         ],
     }
     for what, groups in names.items():

@@ -54,5 +54,7 @@ def test_the_tour_runs_from_plan_to_field_recording(folder: Path) -> None:
     status = json.loads(told.stdout)
     assert status["state"] == "FINISHED"
     assert status["done"] == [stop.id for stop in mission.stops]
-    assert check(folder / "field.rrd").recording_id == mission.id
+    field = check(folder / "field.rrd")
+    assert field.recording_id == f"{mission.id}-{status['run_id']}"
+    assert field.properties["run"]["run_id"] == status["run_id"]
     assert check(folder / "plan" / "plan.rrd").recording_id == mission.id

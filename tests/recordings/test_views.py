@@ -123,24 +123,15 @@ def picture_name(which: str, view: str) -> str:
     return "-".join([which, *re.findall(r"\w+", view.partition(" (")[0])])
 
 
-def test_what_was_lost_is_shown_whatever_is_opened_first(
-    sighted: Path, mission: Mission, tmp_path: Path
-) -> None:
-    """Opened together in any order, a plan and a run with a skip show the run's end, and the same.
-
-    The run lies over the floor.
-    """
+def test_what_was_lost_is_shown_over_the_floor(sighted: Path, mission: Mission, tmp_path: Path) -> None:
+    """A run with a skip that was recorded with its plan shows floor and loss, without the plan's own file."""
     field = tmp_path / "field.rrd"
     with FieldRecording(field, mission, plan=read_recording(sighted)) as recording:
         for report in run.reports_with_a_skip(mission, "S2"):
             hand_over(recording, report)
-    pictures = []
-    for files in ([sighted, field], [field, sighted]):
-        with viewer(files, size=SMALL) as client:
-            for colour in (palette.LOST, palette.KIND_COLOURS["walls"], palette.DRIVEN):
-                views = assert_shown(client, "Mission", {"Plan and run": colour}, tmp_path)
-            pictures.append(pixels(views["Plan and run"][1]).astype(int))
-    assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
+    with viewer([field], size=SMALL) as client:
+        for colour in (palette.LOST, palette.KIND_COLOURS["walls"], palette.DRIVEN):
+            assert_shown(client, "Mission", {"Plan and run": colour}, tmp_path)
 
 
 def test_a_viewer_follows_a_run_that_is_being_recorded(

@@ -38,7 +38,26 @@ class ExternalChanges:
         return (
             self._begun_elsewhere(run, listed, observed)
             or progress.taken_over(run, listed, observed, by=self._by(observed))
+            or self._set_back(run, listed, observed)
             or self._stalled(run, listed, observed)
+        )
+
+    def _set_back(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+        """Hold the run of a vehicle whose item somebody has set back, to a leg that lies behind the run's."""
+        if run.state != "RUNNING" or not observed.drives or run.at >= len(listed.stops):
+            return None
+        position = self._observer.position
+        if observed.place >= listed.stops[min(run.leg, run.at)].first or not position.went_back:
+            return None
+        if not self._guard.is_ours(listed, position.since_ns):
+            self._guard.want()  # another list, perhaps: that is said first
+            return None
+        stop = listed.sent.placed[observed.place].stop
+        to = f" (to {stop}, which is behind)" if stop else ""
+        return runs.held(
+            run,
+            f"{self._by(observed)} has set the vehicle's current item back to"
+            f" {listed.sequence(observed.place)}{to}; retry drives on to {listed.stops[run.at].stop}",
         )
 
     def _stalled(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:

@@ -1,7 +1,8 @@
 """Guard of the vehicle's list: it is read back and compared whenever somebody may have changed it.
 
 A comparison is due after an upload by another station was heard, when the vehicle reports another mission id,
-before a scan counts, and `CHECK_NS` after the last one.
+before a scan counts, and a while after the last one: the faster the link, the sooner. A vehicle that reports
+the mission id of a list that was found to be ours is not read again.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.run.states import Run
 
-CHECK_NS = 30 * 10**9
-"""Longest time between two comparisons."""
+SOONEST_CHECK_NS, CHECK_NS = 2 * 10**9, 30 * 10**9
+"""Shortest and longest time between two comparisons that nothing else calls for."""
+SHARE = 20
+"""Multiple of the time that a comparison takes after which the next is due: reading takes 5 % of the link."""
 AGAIN_NS = 10**9
-"""Shortest time between two comparisons: the list may be in use by another station."""
+"""Time after one that the vehicle refused, or that got no answer: another station may use the list."""
 SHOWN = 3
 """Number of differences in a report."""
 BY_VEHICLE = frozenset({"MISSION_ACK", "MISSION_REQUEST", "MISSION_REQUEST_INT"})
@@ -55,8 +58,9 @@ class ListGuard:
         self._observer = observer
         self._comparing = threading.Lock()
         self._last: ListComparison | None = None
-        self._tried_ns = 0
+        self._failed_ns = 0
         self._wanted = False
+        self._pause_ns = SOONEST_CHECK_NS
         self._uploader: tuple[Who, int] | None = None
         """Station whose upload was heard last, and when."""
 
@@ -73,10 +77,12 @@ class ListGuard:
     def is_due(self, run: Run) -> bool:
         """True if the list must be compared now."""
         now_ns, last = self._book.clock.now_ns(), self._last
-        if run.state in ("IDLE", "FINISHED", "ABORTED") or now_ns < self._tried_ns + AGAIN_NS:
+        if run.state in ("IDLE", "FINISHED", "ABORTED") or now_ns < self._failed_ns + AGAIN_NS:
             return False
-        late = last is None or now_ns > last.began_ns + CHECK_NS
-        return late or self._wanted or self._has_other_id
+        if last is None or self._wanted or self._has_other_id:
+            return True
+        known = last.mission_id != 0 and not last.differences
+        return now_ns > last.began_ns + (CHECK_NS if known else self._pause_ns)
 
     def compare(self) -> None:
         """Read the list back, unless no run is under way; the vehicle may refuse it for now."""
@@ -84,12 +90,14 @@ class ListGuard:
             listed, began_ns = self._book.listed, self._book.clock.now_ns()
             if listed is None or self._book.run.state in ("FINISHED", "ABORTED"):
                 return
-            self._tried_ns, self._wanted, number = began_ns, False, self._observer.position.mission_id
+            self._wanted, number = False, self._observer.position.mission_id
             try:
                 found = differences(listed.sent, download(self._peer))
             except (NegativeResult, RobotUnreachable):
-                self._wanted = True
+                self._wanted, self._failed_ns = True, began_ns
                 return
+            taken_ns = self._book.clock.now_ns() - began_ns
+            self._pause_ns = max(SOONEST_CHECK_NS, min(CHECK_NS, SHARE * taken_ns))
             number = number if number == self._observer.position.mission_id else 0
             self._last = ListComparison(listed, began_ns, found, number)
             if not found and self._uploader is not None and self._uploader[1] < began_ns:

@@ -44,6 +44,8 @@ from stopgo.mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
 """Longest time of one step of a command; after it, changes count as made by somebody else again."""
+PENDING_S = 1.0
+"""Time that a process may take to note that a pending command was carried out."""
 STOPS_KEPT = 1000
 """Answers to stops of this process that are kept in memory."""
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
@@ -106,6 +108,7 @@ class VehicleCommands:
         before = answered(self._book.journal, order, self._book.run)
         if before is not None:
             return before
+        self._await_pending()
         decision = self._conflict(order) or self._decided(order)
         if isinstance(decision, Refused):
             return self._stored(order, decision, None)
@@ -145,6 +148,14 @@ class VehicleCommands:
             if isinstance(decision, Refused):
                 return self._stored(order, Change(self._book.run), None)
             return self._stored(order, decision.change, decision.lease)
+
+    def _await_pending(self) -> None:
+        """Wait a while for the command that the run's progress requires: its HOLD must not follow our AUTO.
+
+        The process that watches sends it; without one it stays pending.
+        """
+        with self._commands.news:
+            self._commands.news.wait_for(lambda: self._book.pending is None, SHOWS_S + PENDING_S)
 
     def _conflict(self, order: RunCommand) -> Refused | None:
         """Refuse a second command at a time."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +29,8 @@ class AutopilotBody:
     insecure: bool = False
     patience_s: float = 30.0
     """Longest wait for the vehicle, and for its position."""
+    guards: bool = False
+    """A process of its own stops the vehicle if this program ends or hangs while it drives."""
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:
@@ -42,4 +44,5 @@ class AutopilotBody:
                 base.take(mission)
                 scanner.take(mission)
 
-            yield Body(base, scanner, take)
+            with autopilot.guarded() if self.guards else nullcontext():
+                yield Body(base, scanner, take)

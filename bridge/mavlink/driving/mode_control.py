@@ -6,6 +6,7 @@ mode than the guided one: so it also outlives a link that is cut.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -21,6 +22,8 @@ from stopgo.mission.mavlink.items import Command
 TICK_S = 0.1
 STOP_S = 2.5
 """Longest wait of `stop` for the vehicle to show hold; the command is repeated after that, too."""
+GUARD_S = 10.0
+"""A hold that shows within this time after the guard's stop is the guard's."""
 IN_FLIGHT_S = 0.3
 """A heartbeat that comes this soon after a command may have been sent before it."""
 
@@ -39,6 +42,7 @@ class ModeControl:
         self._lock = threading.Lock()
         """Keeps commands for hold and for the guided mode in order, never crossed."""
         self._guide_sent_s = 0.0
+        self._guard_stop_s = -math.inf
         self._stop_pending = threading.Event()
         self._stop_sent_s = 0.0
 
@@ -59,6 +63,15 @@ class ModeControl:
             self._peer.request(MessageId.HEARTBEAT)
             return False
         return self._kind.mode_of(beat) == self._modes.guided
+
+    @property
+    def is_in_guided_mode(self) -> bool:
+        """True if the last heartbeat shows the guided mode."""
+        return self.mode() == self._modes.guided
+
+    def note_guard_stop(self) -> None:
+        """Note that the guard has put the vehicle on hold, because this program hung."""
+        self._guard_stop_s = time.monotonic()
 
     @property
     def holds_by_failsafe(self) -> bool:
@@ -86,6 +99,8 @@ class ModeControl:
 
     def _author(self) -> str:
         """Who changed the mode: a failsafe, if the autopilot reports one, else somebody."""
+        if time.monotonic() - self._guard_stop_s < GUARD_S:
+            return "the gateway's own guard (its program did not run for a while)"
         failsafe = self._newest.recent_failsafe
         if failsafe is not None:
             return str(failsafe)

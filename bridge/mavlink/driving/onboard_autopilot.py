@@ -11,10 +11,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
+from stopgo.bridge.console import say
 from stopgo.bridge.mavlink.driving.autopilot_telemetry import ASK_S, POSE, AutopilotTelemetry, NewestMessages
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S
 from stopgo.bridge.mavlink.driving.mode_control import ModeControl
 from stopgo.bridge.mavlink.driving.setpoints import Setpoints
+from stopgo.bridge.mavlink.driving.stop_guard import StopGuard, is_available
 from stopgo.bridge.mavlink.vehicle_link.messages import on_board_beat, set_origin
 from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
@@ -29,6 +31,8 @@ from stopgo.mission.mavlink.local_frame import VehicleOrigin
 ON_BOARD = Who(253, Component.ONBOARD_COMPUTER)
 """Our own address: neither QGroundControl (255) nor a station of ours (254)."""
 TICK_S = 0.1
+ALONE_S = 0.5
+"""Longest time that a vehicle should drive on without us."""
 SOONEST_GIVEN_UP_S = 0.3
 """Least duration of a course, whatever a parameter says: an autopilot checks it at intervals."""
 
@@ -95,6 +99,23 @@ class OnboardAutopilot:
         self._closing.set()
         self._thread.join()
 
+    @contextmanager
+    def guarded(self) -> Iterator[None]:
+        """Have a process of its own stop the vehicle if this program ends or hangs while it drives."""
+        if not is_available():
+            say("no process guards the vehicle here: if this program is killed, it drives on by itself")
+            yield
+            return
+        guard = StopGuard(
+            self.peer,
+            lambda: self.setpoints.is_driving and self.control.is_in_guided_mode,
+            self.control.note_guard_stop,
+        )
+        try:
+            yield
+        finally:
+            guard.close()
+
     def await_pose(self, timeout_s: float) -> None:
         """Wait until the vehicle has reported its pose.
 
@@ -131,6 +152,12 @@ class OnboardAutopilot:
         given_up_s = values.get(name)
         if given_up_s is not None:
             self.gives_up_s = max(SOONEST_GIVEN_UP_S, given_up_s)
+        if self.gives_up_s > ALONE_S:
+            remedy = f"; set {name} to {ALONE_S:g}" if given_up_s is not None else ""
+            say(
+                f"{self.peer}: without this computer, or its link, it drives on for up to"
+                f" {self.gives_up_s:g} s{remedy}"
+            )
 
     def restore_origin(self, origin: VehicleOrigin) -> None:
         """Send back the origin that it had; its next report shows if it took it."""

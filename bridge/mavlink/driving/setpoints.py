@@ -13,6 +13,8 @@ from stopgo.bridge.mavlink.vehicle_link.messages import course_setpoint, positio
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.document import Point
 
+COURSE_S = 4.0
+"""Longest time for which an autopilot follows a course that is not sent again."""
 TURNING_M_S = 0.05
 """Least speed of a course for an autopilot that takes its heading from the velocity."""
 
@@ -25,6 +27,12 @@ class Setpoints:
         self._telemetry = telemetry
         self._by_vector = peer.autopilot.driving.courses == "vector"
         self._standing: Point | None = None
+        self._course_s = -math.inf
+
+    @property
+    def is_driving(self) -> bool:
+        """True if the vehicle may still follow a course that it was sent: a halt ends it."""
+        return time.monotonic() - self._course_s < COURSE_S
 
     def go_to(self, position: Point) -> None:
         """Drive to a position in a straight line."""
@@ -35,6 +43,7 @@ class Setpoints:
 
         The vehicle keeps a course for `OnboardAutopilot.gives_up_s` at most, unless it is sent again.
         """
+        self._course_s = time.monotonic()
         speed = max(speed, TURNING_M_S) if self._by_vector else speed
         velocity = (speed * math.cos(yaw), speed * math.sin(yaw)) if self._by_vector else (speed, 0.0)
         self._peer.send(course_setpoint(self._peer.who, velocity, yaw, **self._height_and_time))
@@ -45,9 +54,11 @@ class Setpoints:
             self.go_to(self._telemetry.position())
         else:
             self.keep_course(self._telemetry.yaw(), 0.0)
+        self._course_s = -math.inf
 
     def turn_to(self, yaw: float) -> None:
         """Turn on the spot."""
+        self._course_s = time.monotonic()
         self._peer.send(yaw_setpoint(self._peer.who, yaw, **self._height_and_time))
 
     @contextmanager

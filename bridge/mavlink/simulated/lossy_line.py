@@ -9,7 +9,7 @@ import threading
 import time
 
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaultKind, VehicleFaults
-from stopgo.bridge.mavlink.vehicle_link.transport import Address, Transport
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, End, Transport
 
 
 class LossyLine:
@@ -50,6 +50,9 @@ class LossyLine:
             for due in self._times(self._going):
                 heapq.heappush(self._leaving, (due, next(self._count), to, data))
         self._send_due()
+
+    def ends(self, to: Address | None = None) -> list[End]:
+        return self._transport.ends(to)
 
     def close(self) -> None:
         self._transport.close()

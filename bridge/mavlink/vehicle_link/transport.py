@@ -23,6 +23,8 @@ from stopgo.mission.errors import InputError, RobotUnreachable
 Address = Any
 """A sender: an IP address and port, or a serial port; hashable."""
 
+End = tuple[int, Address | None]
+"""A descriptor, and the address to send to; `None` if the descriptor itself leads there."""
 READ_BYTES = 65536
 BUFFER_BYTES = 4 * 1024 * 1024
 """Buffer requested from the system for datagrams: a burst of telemetry should not be lost here."""
@@ -43,6 +45,9 @@ class Transport(Protocol):
 
     def write(self, data: bytes, to: Address | None = None) -> None:
         """Send to one known sender, or to all of them."""
+
+    def ends(self, to: Address | None = None) -> list[End]:
+        """Descriptors by which another process may write to that sender, or to all of them."""
 
     def close(self) -> None: ...
 
@@ -96,6 +101,9 @@ class UdpOut:
         except OSError as error:
             self.disconnected = _why(error)
 
+    def ends(self, to: Address | None = None) -> list[End]:
+        return [(self._socket.fileno(), None)]
+
     def close(self) -> None:
         self._socket.close()
 
@@ -128,6 +136,9 @@ class UdpIn:
         for peer in list(self._peers) if to is None else [to]:
             with contextlib.suppress(OSError):
                 self._socket.sendto(data, peer)
+
+    def ends(self, to: Address | None = None) -> list[End]:
+        return [(self._socket.fileno(), peer) for peer in (list(self._peers) if to is None else [to])]
 
     def close(self) -> None:
         self._socket.close()
@@ -169,6 +180,10 @@ class TcpOut:
             except OSError as error:
                 self.disconnected = error.strerror or str(error)
                 _end(stream)
+
+    def ends(self, to: Address | None = None) -> list[End]:
+        stream = self._socket
+        return [] if stream is None or stream.fileno() < 0 else [(stream.fileno(), None)]
 
     def close(self) -> None:
         if self._socket is not None:
@@ -228,6 +243,10 @@ class TcpIn:
                     stream.sendall(data)
                 except OSError:
                     _end(stream)
+
+    def ends(self, to: Address | None = None) -> list[End]:
+        streams = [stream for peer, stream in list(self._streams.items()) if to in (None, peer)]
+        return [(stream.fileno(), None) for stream in streams if stream.fileno() >= 0]
 
     def close(self) -> None:
         for peer in list(self._streams):
@@ -301,6 +320,10 @@ class Serial:
         except (serial.SerialException, OSError, TypeError) as error:  # TypeError: it is being closed
             if port is self._port:
                 self._broken = str(error)
+
+    def ends(self, to: Address | None = None) -> list[End]:
+        port = self._port
+        return [] if port is None or self._broken else [(port.fileno(), None)]
 
     def close(self) -> None:
         if self._port is not None:

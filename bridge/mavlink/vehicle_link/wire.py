@@ -21,13 +21,15 @@ from typing import TypeVar
 
 from stopgo.bridge.console import say
 from stopgo.bridge.mavlink.vehicle_link.frames import UNREADABLE, Frames, dialect
-from stopgo.bridge.mavlink.vehicle_link.transport import Address, Transport, open_transport
+from stopgo.bridge.mavlink.vehicle_link.transport import Address, End, Transport, open_transport
 from stopgo.bridge.mavlink.vehicle_link.url import Url, check_guarded, read_url
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.telemetry import Message
 
 QUEUE_SIZE = 10_000
+APART_LINK = 1
+"""Link id of signatures on frames that another process sends; ours is 0."""
 READ_S = 0.1
 MAVLINK_EPOCH_S = 1_420_070_400
 """2015-01-01, from which signatures count in steps of 10 µs."""
@@ -143,6 +145,23 @@ class Wire:
             data = bytes(message.pack(self._sending))
             self._sending.seq = (self._sending.seq + 1) % 256
             self._transport.write(data, self._route(*target))
+
+    def packed_apart(self, message: Message, count: int) -> list[bytes]:
+        """Frames of a message that another process may send later, each as if it were new.
+
+        Signed, they belong to a stream of their own, whose times do not have to follow those of this one.
+        """
+        coder = self._mav()
+        coder.signing.link_id = APART_LINK
+        frames = []
+        for seq in range(count):
+            coder.seq = seq
+            frames.append(bytes(message.pack(coder)))
+        return frames
+
+    def ends(self, to: Who) -> list[End]:
+        """Descriptors by which another process may write to a receiver."""
+        return self._transport.ends(self._route(to.system, to.component))
 
     @contextmanager
     def waiting(self, *types: str, of: Who | None = None) -> Iterator[MessageQueue]:

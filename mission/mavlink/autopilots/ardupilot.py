@@ -102,7 +102,7 @@ MODES = Modes(
 
 # Source (Rover/mode_guided.cpp): it stays at its last place whatever becomes of us; set_desired_speed counts
 # only while it drives to a place, so that is sent first; a yaw alone is followed for 3 s and then stops it
-# (GUID_TIMEOUT is Copter's; up to 4.8-dev Rover has none).
+# (GUID_TIMEOUT: Copter's, and Rover's since late 4.8-dev; releases up to 4.7 have none).
 DRIVING = Driving(
     streams=False, gives_up_s=3.0, gives_up_parameter="GUID_TIMEOUT", turns=True, courses="heading",
     reposition_mode="guided",
@@ -174,6 +174,13 @@ PARAMETERS = (
         lambda v: 0 < v <= 60,
         "60 or less, skid steering only",
         "it turns on the spot at corners",
+        must=False,
+    ),
+    ParameterRule(
+        ("GUID_TIMEOUT",),
+        lambda v: v <= 0.5,
+        "0.5",
+        "a gateway's vehicle drives on for so long without its computer or link (none before 4.8: 3 s)",
         must=False,
     ),
     ParameterRule(

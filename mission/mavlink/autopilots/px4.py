@@ -117,6 +117,13 @@ PARAMETERS = (
     ParameterRule(("NAV_ACC_RAD",), lambda v: v <= 0.1, "0.05", "within it a stop counts as reached"),
     ParameterRule(("RO_SPEED_LIM",), lambda v: v > 0, "the mission's speed", "it drives no faster"),
     ParameterRule(
+        ("COM_OF_LOSS_T",),
+        lambda v: v <= 0.5,
+        "0.5",
+        "a gateway's vehicle drives on for so long without its computer or link",
+        must=False,
+    ),
+    ParameterRule(
         ("NAV_DLL_ACT",),
         lambda v: v == 0,
         "0",

@@ -45,6 +45,8 @@ class ListPosition:
         self._current: TimestampedMessage | None = None
         self._reached: Message | None = None
         self._work: Work | None = None
+        self.went_back = False
+        """True if the last change of the current item was to an earlier one."""
         self._jump: Jump | None = None
         """The last jump, as far as the vehicle has not gone back behind it."""
 
@@ -130,6 +132,7 @@ class ListPosition:
         """Note a jump: the item has changed before the waits between the two can have been over."""
         first = listed.end if before.complete else listed.place(before.sequence)
         place = self.place(listed)
+        self.went_back = place < first
         if self._jump is not None and (self._jump.listed is not listed or place < self._jump.end):
             self._jump = replace(self._jump, end=place) if self._jump.listed is listed else None
         if place <= first or not 0 < before.since_ms <= now.since_ms:

@@ -11,6 +11,8 @@ from stopgo.mission.run.events import Pose
 
 STALLED_S = 8.0
 """Standstill that no item explains: longer than a start takes, and told within 10 s."""
+RESTARTED_NS = 10**9
+"""A clock that goes back by more began again."""
 REACHED_M = 1.0
 """Distance from a waypoint that an autopilot may take as reached."""
 MOVED_M, TURNED_RAD = 0.1, math.radians(5.0)
@@ -28,9 +30,12 @@ class ProgressWatch:
     def take(
         self, pose: Pose, listed: ListedMission | None, place: int | None, now_ns: int, *, drives: bool
     ) -> None:
-        """Take a pose; `place` is the index of the current item, `drives` means in AUTO and armed."""
-        self._seen_ns = now_ns
-        if not drives or listed is None or place is None or place >= listed.end:
+        """Take a pose at a time of the vehicle's clock.
+
+        `place` is the index of the current item, `drives` means in AUTO and armed.
+        """
+        restarted, self._seen_ns = now_ns < self._seen_ns - RESTARTED_NS, now_ns
+        if restarted or not drives or listed is None or place is None or place >= listed.end:
             self._since = None
         elif self._since is None or self._since[2:] != (listed, place) or _moved(self._since[1], pose):
             self._since = (now_ns, pose, listed, place)

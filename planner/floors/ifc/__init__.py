@@ -8,9 +8,11 @@ from dataclasses import replace
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import bounds
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.ifc.class_kinds import IGNORED, with_given_kinds
+from stopgo.planner.floors.ifc.laser_solids import laser_solids
 from stopgo.planner.floors.ifc.levels import NEAR, Level, chosen_level, levels_of, standing_at, walked
 from stopgo.planner.floors.ifc.loading import load
 from stopgo.planner.floors.ifc.model import Model
@@ -45,11 +47,22 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
 
 def standing(file: FloorFile, options: FloorOptions) -> tuple[StandingBody, ...]:
     """Return the bodies of the model that reach into the robot's height on the storey that `read` reads."""
+    level, there = _chosen(file, options)
+    return tuple(standing_on(level, there, heights_of(options)))
+
+
+def laser(file: FloorFile, options: FloorOptions) -> ModelSolids:
+    """Return all of the model that stops the laser on the storey that `read` reads."""
+    return laser_solids(*_chosen(file, options))
+
+
+def _chosen(file: FloorFile, options: FloorOptions) -> tuple[Level, Model]:
+    """The level that the options choose, and the model as it stands on their day."""
     model = with_given_kinds(load(file), options, file.path)
     levels = with_uses(levels_of(model), model)
     level = chosen_level(levels, model=model, storey=options.storey, z=options.level, path=file.path)
     there, _, _ = as_on_day(model, level, options)
-    return tuple(standing_on(level, there, heights_of(options)))
+    return level, there
 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:

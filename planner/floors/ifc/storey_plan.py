@@ -15,6 +15,7 @@ from stopgo.mission.floor import Element, Finding, FloorPlan
 from stopgo.mission.geometry import frozen
 from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
+from stopgo.planner.floors.ifc.ceilings import without_hidden_beams
 from stopgo.planner.floors.ifc.class_kinds import furniture_findings
 from stopgo.planner.floors.ifc.doors import doors_on
 from stopgo.planner.floors.ifc.georeference import georeference_of
@@ -56,7 +57,7 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
         outline=parts.outline,
         rooms=parts.rooms,
         openings=parts.openings,
-        elements=tuple(_as_of(item, found, options) for item in parts.elements) if found else parts.elements,
+        elements=tuple(_as_of(_with_heights(item, there, level), found, options) for item in parts.elements),
         level=level.name,
         georeference=georeference,
         status=status,
@@ -78,11 +79,22 @@ def _statuses(model: Model, options: FloorOptions) -> tuple[Statuses | None, str
     return found, schedule.digest if schedule else ""
 
 
-def _as_of(item: Element, found: Statuses, options: FloorOptions) -> Element:
+def _with_heights(item: Element, model: Model, level: Level) -> Element:
+    """The element with the heights of its body above the floor."""
+    mesh = model.meshes.get(item.global_id or "")
+    if mesh is None:
+        return item
+    low, high = (round(z - level.z, 4) for z in mesh.z)
+    return replace(item, heights=(low, high))
+
+
+def _as_of(item: Element, found: Statuses | None, options: FloorOptions) -> Element:
     """An element as on the day: a target unless scanned before or, by default, under construction.
 
-    An element under construction is an obstacle and may occlude.
+    An element under construction is an obstacle and may occlude. Without a day it stays as it is.
     """
+    if found is None:
+        return item
     guid = item.global_id or ""
     begun = found.on.get(guid) == "in_progress" and options.in_progress != "target"
     if not begun and guid not in found.standing and not (found.since and guid in found.without_task):
@@ -152,7 +164,8 @@ def drawn_on(
             Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are inferred")
         )
     solids, odd_solids = _near_the_floor(solids, floor)
-    findings += [*odd_solids, *_unknown(solids)]
+    solids, hidden = without_hidden_beams(solids, model, level, heights)
+    findings += [*odd_solids, *_unknown(solids), *hidden]
     findings += furniture_findings(model, {item.product.global_id for item in solids})
     strokes = [
         *_rings("FLOOR", floor),

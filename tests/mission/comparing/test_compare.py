@@ -34,7 +34,7 @@ from stopgo.mission.run.events import (
 )
 from stopgo.mission.run.run_log import RunLog
 from stopgo.mission.stages import Route
-from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.figures import Figures, worst_first
 from stopgo.mission.stages.sight import Sight, sight_of
 from tests.mission.comparing.told import SCAN, at, told
@@ -55,7 +55,7 @@ def planned() -> tuple[Mission, Sight]:
 
 
 def figures(route: Route) -> Figures:
-    shares = ledger_of(route.visibility).shares(np.zeros(32, dtype=bool))
+    shares = totals_of_plan(route.visibility).shares(np.zeros(32, dtype=bool))
     return Figures("length", shares.whole, shares.rooms, worst_first(shares.kinds), 24.0, 24.0, (), ())
 
 

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files import plan_panel
 from stopgo.mission.files.plan_panel import coordinate_ticks
 from stopgo.mission.files.plan_svg import plan_svg
 from stopgo.mission.files.room_labels import Busy, inside, room_labels, wrapped
@@ -250,3 +251,10 @@ def test_room_names_cross_no_wall_and_no_other_name(wide: float) -> None:
 
 
 NOWHERE = PaperBox(0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("head", [plan_panel.STOP_HEAD, plan_panel.SHARE_HEAD])
+def test_headings_leave_room_between_them(head: plan_panel.Row) -> None:
+    """Bold letters are up to a tenth wider; `covered` and `covered %` once ran into each other."""
+    for (before, edge), cell in zip(pairwise(head.edges), head.cells[1:], strict=True):
+        assert 1.1 * text_width(cell, plan_panel.BODY) + 0.5 < edge - before, cell

@@ -65,7 +65,7 @@ def test_a_way_over_grids_is_in_the_clear_and_never_shorter_than_the_exact_one(f
     things = shapely.union_all(obstacles_of(floor))
     for a in range(5):
         for b in range(5):
-            line = ways.way(a, b)
+            line = ways.path(a, b)
             assert np.allclose(line[0], points[a]) and np.allclose(line[-1], points[b])
             assert np.isclose(np.hypot(*np.diff(line, axis=0).T).sum(), ways.lengths[a, b])
             shape = shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0])
@@ -84,7 +84,7 @@ def test_a_room_in_a_room_is_entered_by_its_own_door() -> None:
     points = np.array([(4.5, 4.5), (1.0, 4.5), (9.0, 7.0)])
     ways = grid_paths(space, points)
     assert np.isfinite(ways.lengths).all()
-    line = shapely.LineString(ways.way(0, 1))
+    line = shapely.LineString(ways.path(0, 1))
     assert line.intersects(shapely.LineString([(6.05, 4), (6.05, 5)]))
     assert ways.lengths[0, 1] > 1.6 + 3 + 6
 
@@ -94,7 +94,7 @@ def test_the_grid_is_refined_until_a_stop_has_a_node_near() -> None:
     for near in (0.7, 0.4, 0.1):
         space = navigable(floor, Settings(graph="grid", max_err_dist=near))
         ways = grid_paths(space, point)
-        first = ways.way(0, 1)[1]
+        first = ways.path(0, 1)[1]
         assert np.hypot(*(first - point[0])) <= near
 
 

@@ -15,8 +15,8 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.shapes import local_origin, snapped, to_shape
 from stopgo.planner.routing import roadmap
+from stopgo.planner.routing.paths import Paths
 from stopgo.planner.routing.roadmap import outward_corners, paths_between
-from stopgo.planner.routing.ways import Ways
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import PAPER, box, column, element, hall, shared, two_rooms, wall
 
@@ -67,7 +67,7 @@ def test_ways_are_as_short_as_over_every_corner(seed: int) -> None:
     assert np.allclose(found.lengths, shortest(space, points), atol=1e-4)  # slits below 2 µm apart
     for a in range(len(points)):
         for b in range(len(points)):
-            line = found.way(a, b)
+            line = found.path(a, b)
             assert np.allclose(line[[0, -1]], points[[a, b]])
             assert np.isclose(np.hypot(*np.diff(line, axis=0).T).sum(), found.lengths[a, b])
 
@@ -95,7 +95,7 @@ def test_a_way_bends_at_outward_corners_only() -> None:
     points = free_points(space, 6, 1)
     ways = paths_between(space, points)
     corners = {tuple(xy) for xy in (outward_corners(space).xy + local_origin(space.floor)).round(6)}
-    bends = np.concatenate([ways.way(a, b)[1:-1] for a in range(6) for b in range(6)])
+    bends = np.concatenate([ways.path(a, b)[1:-1] for a in range(6) for b in range(6)])
     assert len(bends)
     assert {tuple(xy) for xy in bends.round(6)} <= corners
 
@@ -128,7 +128,7 @@ def test_among_round_columns_few_pairs_are_looked_at(monkeypatch: pytest.MonkeyP
     assert looked_at < 0.15 * everywhere
 
 
-def counted(space: NavigableSpace, points: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> tuple[Ways, int]:
+def counted(space: NavigableSpace, points: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> tuple[Paths, int]:
     """The ways, and how many pairs of nodes were looked at."""
     pairs: list[int] = []
     tangent = roadmap._tangent

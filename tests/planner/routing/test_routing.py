@@ -78,7 +78,7 @@ def test_a_way_is_as_long_as_the_shortest(seed: int) -> None:
     longest = geodesics(floor, points, RADIUS * 1.0205)
     for a, b in combinations(range(len(points)), 2):
         assert shortest[a][b] - 1e-6 <= ways.lengths[a, b] <= longest[a][b] + 1e-3
-        line = ways.way(a, b)
+        line = ways.path(a, b)
         assert np.allclose(line[[0, -1]], points[[a, b]], atol=1e-9)
         assert np.isclose(np.hypot(*np.diff(line, axis=0).T).sum(), ways.lengths[a, b])
 
@@ -86,7 +86,7 @@ def test_a_way_is_as_long_as_the_shortest(seed: int) -> None:
 def test_a_way_in_the_open_is_straight() -> None:
     ways = paths_between(navigable(hall(6, 4), Settings()), np.array([(1.0, 1.0), (5.0, 3.0)]))
     assert ways.lengths[0, 1] == pytest.approx(np.hypot(4, 2))
-    assert len(ways.way(0, 1)) == 2
+    assert len(ways.path(0, 1)) == 2
 
 
 def test_a_way_round_one_corner_is_two_tangents_and_an_arc() -> None:
@@ -115,7 +115,7 @@ def test_a_point_twice_is_at_no_distance_from_itself() -> None:
     points = np.array([(1.0, 1.0), (1.0, 1.0), (5.0, 3.0)])
     ways = paths_between(navigable(hall(6, 4), Settings()), points)
     assert ways.lengths[0, 1] == pytest.approx(0, abs=1e-9)
-    assert len(ways.way(0, 1)) >= 1
+    assert len(ways.path(0, 1)) >= 1
 
 
 # ---- tours ----

@@ -69,8 +69,8 @@ def test_what_stops_see_comes_back_whole(tmp_path: Path) -> None:
     for name in ("mission_id", "revision", "digest", "stops"):
         assert getattr(back, name) == getattr(sight, name)
     for name in ("weight", "visible", "room", "element"):
-        assert np.array_equal(getattr(back.ledger, name), getattr(sight.ledger, name)), name
-    assert (back.ledger.rooms, back.ledger.elements) == (sight.ledger.rooms, sight.ledger.elements)
+        assert np.array_equal(getattr(back.totals, name), getattr(sight.totals, name)), name
+    assert (back.totals.rooms, back.totals.elements) == (sight.totals.rooms, sight.totals.elements)
     assert back.planned == sight.planned
     assert back.shares(["S1"]) == sight.shares(["S1"])
     assert np.array_equal(back.targets.unit_xy, sight.targets.unit_xy)
@@ -78,11 +78,11 @@ def test_what_stops_see_comes_back_whole(tmp_path: Path) -> None:
 
 def test_how_many_views_are_asked_for_travels(tmp_path: Path) -> None:
     _, sight = planned()
-    asked = np.ones(len(sight.ledger.weight), dtype=np.int64)
+    asked = np.ones(len(sight.totals.weight), dtype=np.int64)
     asked[::2] = 2
-    twice = replace(sight, ledger=replace(sight.ledger, asked=asked))
+    twice = replace(sight, totals=replace(sight.totals, asked=asked))
     (back,) = sights_in(embedded(twice, tmp_path / "sight.rrd"), "sight.rrd")
-    assert np.array_equal(back.ledger.asked, asked)
+    assert np.array_equal(back.totals.asked, asked)
     assert back.planned == twice.planned != sight.planned
 
 

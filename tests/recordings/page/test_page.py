@@ -120,7 +120,7 @@ def test_the_plan_has_a_scale_bar_and_true_north() -> None:
 
 def test_a_bar_marks_the_required_coverage() -> None:
     mission, sight = planned()
-    asked = replace(sight, ledger=replace(sight.ledger, kind_required=0.7))
+    asked = replace(sight, totals=replace(sight.totals, kind_required=0.7))
     page = report_html(ReportSubject((mission,), (), asked)).decode()
     assert '<i style="left:70.0%"></i>' in page
 
@@ -214,7 +214,9 @@ def test_recordings_of_two_missions_are_no_one_report(
 ) -> None:
     found = review([sighted])
     (item,) = found.recordings
-    contents = replace(item.recording.contents, recording_id="f" * 32)
+    known = item.recording.contents.properties
+    properties = known | {"plan": known["plan"] | {"mission_id": "f" * 32}}
+    contents = replace(item.recording.contents, properties=properties)
     other = replace(item, recording=replace(item.recording, contents=contents))
     with pytest.raises(Exception, match="needs recordings of one mission"):
         subject_of(replace(found, recordings=(item, other)))

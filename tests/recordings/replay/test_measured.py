@@ -15,7 +15,7 @@ import shapely
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import read
-from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, as_driven, planned_floor, top_up
 from stopgo.planner.pipeline.measuring import measured
 from stopgo.recordings.logs.field_log import FieldLog, Sweep
@@ -190,7 +190,7 @@ def test_clouds_that_do_not_lie_on_the_floor_tell_nothing(
 
 
 def test_a_wall_that_was_never_built_is_named(planned: PlannedFloor) -> None:
-    lengths = {item.name: item.seen for item in ledger_of(planned.seen).by_element(planned.seen.visible)}
+    lengths = {item.name: item.seen for item in totals_of_plan(planned.seen).by_element(planned.seen.visible)}
     least = min((name for name in lengths if lengths[name] >= 0.5), key=lambda name: lengths[name])
     assert f"No point lies on {least}," in judged(planned, wall_points(planned, without=least)).text
 

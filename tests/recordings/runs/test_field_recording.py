@@ -34,10 +34,16 @@ NS = 1_000_000_000
 RUN = f"/field/{run.RUN}"
 
 
-def test_it_has_the_id_of_the_plan_and_entities_under_the_run(plan: Path, field: Path) -> None:
+def test_it_has_the_id_of_its_run_and_names_mission_and_floor(
+    plan: Path, field: Path, mission: Mission
+) -> None:
     held = check(field)
-    assert held.recording_id == check(plan).recording_id
-    assert held.timelines == ("mission_time", "robot_time")
+    assert check(plan).recording_id == mission.id
+    assert held.recording_id == f"{mission.id}-{run.RUN}"
+    about = held.properties["run"]
+    assert (about["mission_id"], about["digest"]) == (mission.id, mission.digest)
+    assert (about["floor"], about["floor_digest"]) == (mission.origin.floor, mission.origin.floor_digest)
+    assert held.timelines == ("mission_time", "robot_time", "stop")
     assert held.properties["run"]["run_id"] == run.RUN
     names = ("robot", "driven", "arrived", "scanned", "state", "stop_state", "events", "report")
     assert {f"{RUN}/{name}" for name in names} <= set(held.rows)
@@ -297,6 +303,7 @@ def test_a_recording_whose_folder_went_away_is_told_of(tmp_path: Path, mission: 
         pytest.raises(InputError, match=r"field\.partial\.rrd: no such file"),
         FieldRecording(folder / "field.rrd", mission) as recording,
     ):
+        tell(recording, next(iter(run.reports(mission))))
         shutil.rmtree(folder)
         for report in run.reports(mission):
             tell(recording, report)

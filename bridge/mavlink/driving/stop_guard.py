@@ -1,0 +1,99 @@
+"""Guard of a vehicle that a program drives: a process of its own stops it when the program ends or hangs.
+
+An autopilot drives on for seconds with its last set point. The guard sends HOLD within half a second, also
+after a kill that no program can catch. It does not help where the computer itself or the link fails.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.resources import files
+
+from stopgo.bridge.console import say
+from stopgo.bridge.mavlink.vehicle_link.messages import command_long
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.mission.mavlink.items import Command
+
+PROGRAM = "stop_process.py"
+SIGN_S = 0.1
+FRESH_SIGNS = 50
+"""Number of signs of life after which new frames are made: signed ones must not be too old."""
+FRAMES = 40
+"""HOLD this often, for four seconds: the link may lose some."""
+END_S = 2.0
+
+
+class StopGuard:
+    """The process that guards one vehicle; `drives` says whether the vehicle has to be stopped if we end."""
+
+    def __init__(self, peer: Peer, drives: Callable[[], bool], stopped: Callable[[], None]) -> None:
+        """`stopped` is called when the process has stopped the vehicle because this program hung."""
+        self._peer = peer
+        self._drives = drives
+        self._stopped = stopped
+        self._signs = 0
+        self._frames: list[str] = []
+        self._closing = threading.Event()
+        self._line, self._process = _started()
+        self._thread = threading.Thread(target=self._show_life, name="stop guard", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the process: the vehicle needs no guard any more."""
+        self._closing.set()
+        self._thread.join()
+        self._line.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(END_S)
+
+    def _show_life(self) -> None:
+        while not self._closing.wait(SIGN_S):
+            try:
+                self._show_sign(drives=self._drives())
+                self._take_report()
+            except OSError:
+                say("the process that stops the vehicle if this program ends has ended; started again")
+                self._line.close()
+                self._closing.wait(END_S)
+                self._line, self._process = _started()
+        with suppress(OSError):
+            self._show_sign(drives=False)
+
+    def _show_sign(self, *, drives: bool) -> None:
+        """Send a sign of life, with the link's present descriptors and frames for a stop."""
+        if self._signs % FRESH_SIGNS == 0:
+            hold = command_long(self._peer.who, Command.DO_SET_MODE, *self._peer.autopilot.modes.hold.params)
+            self._frames = [frame.hex() for frame in self._peer.wire.packed_apart(hold, FRAMES)]
+        self._signs += 1
+        ends = self._peer.wire.ends(self._peer.who)
+        sign = {"drives": drives, "frames": self._frames, "to": [to for _, to in ends]}
+        socket.send_fds(self._line, [json.dumps(sign).encode()], [descriptor for descriptor, _ in ends])
+
+    def _take_report(self) -> None:
+        with suppress(BlockingIOError):
+            if self._line.recv(100, socket.MSG_DONTWAIT):
+                self._stopped()
+
+
+def _started() -> tuple[socket.socket, subprocess.Popen[bytes]]:
+    """Start the process, in a session of its own: no signal for this program's group ends it."""
+    source = files(__package__).joinpath(PROGRAM).read_text(encoding="utf-8")
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with its:
+        process = subprocess.Popen(
+            [sys.executable, "-I", "-S", "-c", source, str(its.fileno())],
+            pass_fds=(its.fileno(),), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )  # fmt: skip
+    return ours, process
+
+
+def is_available() -> bool:
+    """Return True where a process can be given descriptors over a socket, as on Linux."""
+    return hasattr(socket, "SOCK_SEQPACKET") and hasattr(socket, "send_fds") and sys.platform == "linux"

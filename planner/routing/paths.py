@@ -1,0 +1,60 @@
+"""Shortest paths between points over a graph of straight pieces, by Dijkstra's algorithm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.planner.geometry.shapes import SLACK
+
+CHUNK = 256
+"""Points whose distances to all nodes are in memory at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """Shortest paths between given points."""
+
+    xy: FloatArray
+    """Node positions in the drawing's coordinates; the points come first."""
+    lengths: FloatArray
+    """(points, points) in metres; infinite where there is no path."""
+    graph: csr_array
+    """(nodes, nodes): lengths of the straight pieces."""
+
+    def path(self, start: int, end: int) -> FloatArray:
+        """The polyline (n, 2) from one point to another, both included."""
+        limit = float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
+        before = dijkstra(self.graph, False, start, return_predecessors=True, limit=limit)[1]
+        nodes = [end]
+        while nodes[-1] != start:
+            if before[nodes[-1]] < 0:
+                raise ValueError(f"no path from point {start} to point {end}")
+            nodes.append(int(before[nodes[-1]]))
+        line = self.xy[nodes[::-1]]
+        if len(line) < 2 or np.all(line == line[0]):
+            return frozen(line[:1])
+        # a point on a straight piece would make the robot stop there
+        straightened = shapely.simplify(shapely.LineString(line - line[0]), SLACK, preserve_topology=False)
+        inner = shapely.get_coordinates(straightened)[1:-1] + line[0]
+        return frozen(np.concatenate([line[:1], inner, line[-1:]]))
+
+    way = path  # its name in 0.1; ends with 0.3
+
+
+def shortest_paths(xy: FloatArray, edges: IntArray, points: int) -> Paths:
+    """Shortest paths between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    key = np.unique(low[low < high] * len(xy) + high[low < high])
+    pair = np.stack([key // len(xy), key % len(xy)], axis=1)
+    length = np.hypot(*(xy[pair[:, 0]] - xy[pair[:, 1]]).T)
+    # a length of exactly 0 would mean "no edge" to the sparse solver
+    graph = csr_array((np.maximum(length, 1e-12), (pair[:, 0], pair[:, 1])), shape=(len(xy),) * 2)
+    chunks = [np.arange(points)[k : k + CHUNK] for k in range(0, points, CHUNK)]
+    lengths = [dijkstra(graph, directed=False, indices=chunk)[:, :points] for chunk in chunks]
+    return Paths(xy=frozen(xy), lengths=frozen(np.concatenate(lengths)), graph=graph)

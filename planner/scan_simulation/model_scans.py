@@ -1,0 +1,109 @@
+"""Stop + solids of a model -> scan: rays at the model's own triangles, furniture and ceilings included."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from stopgo.mission.floor.model_solids import ModelSolids
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.proof.plan_proof import Simulation
+from stopgo.planner.scan_simulation.casting import RayFan
+from stopgo.planner.scan_simulation.scanning import CLOUD_DEG, ScanCount, ScannerPose
+from stopgo.planner.scan_simulation.strips import Strips
+
+ON_SURFACE_M = 0.02
+"""A hit this far before or behind a cell's plane, along its normal, is on the cell."""
+PROBE_M = 0.05
+"""Distance from which a cell's surface is looked for."""
+NONE = -1
+
+
+class ModelScene:
+    """The triangles of a model in Embree, in metres from the floor's origin."""
+
+    def __init__(self, solids: ModelSolids, origin: FloatArray) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        corners = solids.triangles - (*origin, 0.0)
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(across, axis=1)
+        kept = size > 1e-9
+        self._a, self._normal = corners[kept, 0], across[kept] / size[kept, None]
+        self._scene = EmbreeScene()
+        TriangleMesh(self._scene, np.ascontiguousarray(corners[kept], dtype=np.float32))
+
+    def away(self, origins: FloatArray, directions: FloatArray) -> FloatArray:
+        """Distance to the first triangle along each ray (n,); infinite where there is none."""
+        met: IntArray = self._scene.run(
+            np.ascontiguousarray(origins, dtype=np.float32),
+            np.ascontiguousarray(directions, dtype=np.float32),
+        )
+        found = np.full(len(directions), np.inf)
+        hit = met != NONE
+        normal, a = self._normal[met[hit]], self._a[met[hit]]
+        offset = np.einsum("ij,ij->i", normal, a - origins[hit])
+        slope = np.einsum("ij,ij->i", normal, directions[hit])
+        found[hit] = offset / np.where(slope == 0, np.nan, slope)
+        return np.nan_to_num(found, nan=np.inf)
+
+    def existing(self, strips: Strips) -> BoolArray:
+        """True for cells that have a surface in the model (cells,): no opening of the wall is there."""
+        found = np.zeros(strips.cells, dtype=bool)
+        for side in (1.0, -1.0):
+            away = self.away(strips.middle + side * PROBE_M * strips.normal, -side * strips.normal)
+            found |= np.abs(away - PROBE_M) <= ON_SURFACE_M
+        return found
+
+
+def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:
+    """Simulate one scan: a ray to the centre of every cell in range, and a thinned cloud."""
+    towards = strips.middle - pose.position
+    far = np.linalg.norm(towards, axis=1)
+    directions = towards / np.maximum(far, 1e-9)[:, None]
+    cosine = np.abs(np.einsum("ij,ij->i", directions, strips.normal))
+    cell = np.flatnonzero(_within(towards, far, pose, simulation) & (cosine > 1e-3))
+    away = scene.away(np.broadcast_to(pose.position, (len(cell), 3)), directions[cell])
+    on = np.abs(away - far[cell]) * cosine[cell] <= ON_SURFACE_M
+    cell = cell[on]
+    spacing = far[cell] * math.radians(simulation.step_deg)
+    width = strips.area[cell] / np.minimum(strips.tall[strips.unit_of_cell[cell]], 0.1)
+    return ScanCount(
+        cell=frozen(cell, np.int64),
+        points=frozen(np.maximum(1, strips.area[cell] * cosine[cell] / spacing**2), np.int64),
+        columns=frozen(np.maximum(1, width * cosine[cell] / spacing), np.int64),
+        away=frozen(far[cell]),
+        incidence=frozen(np.arccos(np.clip(cosine[cell], 0.0, 1.0))),
+        cloud=frozen(_cloud(scene, pose, simulation)),
+    )
+
+
+def _within(towards: FloatArray, far: FloatArray, pose: ScannerPose, simulation: Simulation) -> BoolArray:
+    """True for cells in the scanner's range, field of view and above its blind cone."""
+    level = np.hypot(towards[:, 0], towards[:, 1])
+    reach = far if simulation.slant else level
+    aside = np.arctan2(towards[:, 1], towards[:, 0]) - pose.heading
+    turned = np.abs(np.remainder(aside + np.pi, 2 * np.pi) - np.pi)
+    steepest = math.radians(90 - simulation.cone_deg / 2)
+    good: BoolArray = (reach <= simulation.range_m) & (level >= simulation.near_m)
+    good &= turned <= math.radians(simulation.fov_deg) / 2 + 1e-9
+    good &= np.arctan2(towards[:, 2], np.maximum(level, 1e-9)) >= -steepest
+    return good
+
+
+def _cloud(scene: ModelScene, pose: ScannerPose, simulation: Simulation) -> FloatArray:
+    """Measured ends of rays, relative to the scanner (n, 3)."""
+    random = np.random.default_rng([simulation.seed, pose.number])
+    fan = RayFan.of(replace(simulation, step_deg=max(CLOUD_DEG, simulation.step_deg)), pose.heading)
+    found = []
+    for block in fan.blocks():
+        directions = fan.directions(block).reshape(-1, 3)
+        away = scene.away(np.broadcast_to(pose.position, directions.shape), directions)
+        level = 1.0 if simulation.slant else np.hypot(directions[:, 0], directions[:, 1])
+        near = (away > 0) & (away * level <= simulation.joining_m)
+        measured = away[near] + random.normal(0.0, simulation.noise_m, int(near.sum()))
+        found.append(measured[:, None] * directions[near])
+    return np.concatenate(found)

@@ -1,0 +1,120 @@
+"""Area that stops see by a model's solids: furniture, lintels and ceilings hide what lies behind them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stopgo.command_line import main
+from stopgo.planner.floors import FloorOptions, model_solids, read_floor
+from tests.planner.floors.ifc.conftest import Read
+from tests.planner.floors.ifc.house import House, two_rooms
+
+
+def planned(path: Path, *more: str) -> dict:
+    out = path.parent / "plan"
+    assert main(["plan", str(path), "--storey", "EG", "-o", str(out), "--range", "8", *more]) == 0
+    return json.loads((out / "coverage.json").read_text())["surface"]
+
+
+def share(surface: dict, kind: str = "walls") -> float:
+    area = surface["kinds"][kind]
+    return area["seen_m2"] / area["total_m2"]
+
+
+def with_box(house: House, name: str, box: tuple[float, ...], ifc_class: str = "IfcFurniture") -> House:
+    house.box(ifc_class, name, box, house.model.by_type("IfcBuildingStorey")[0])
+    return house
+
+
+def test_bare_rooms_are_seen_over_their_whole_height(read: Read, tmp_path: Path) -> None:
+    read(two_rooms())
+    assert share(planned(tmp_path / "house.ifc")) > 0.97
+
+
+def test_a_low_board_before_a_wall_hides_its_foot(read: Read, tmp_path: Path) -> None:
+    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
+    covered = share(planned(tmp_path / "house.ifc"))
+    assert 0.80 < covered < 0.97
+
+
+def test_a_hung_ceiling_hides_the_walls_above_it(read: Read, tmp_path: Path) -> None:
+    read(two_rooms())
+    bare = planned(tmp_path / "house.ifc")
+    read(with_box(two_rooms(), "ceiling", (0, 0, 2.0, 20, 20, 2.05), "IfcCovering"))
+    hung = planned(tmp_path / "house.ifc")
+    assert hung["kinds"]["walls"]["total_m2"] == pytest.approx(bare["kinds"]["walls"]["total_m2"], rel=0.05)
+    assert share(bare) - share(hung) > 0.15
+
+
+def test_beams_above_a_ceiling_are_no_targets(read: Read, tmp_path: Path) -> None:
+    house = with_box(two_rooms(), "beam", (1.0, 1.0, 2.3, 3.0, 1.2, 2.5), "IfcBeam")
+    read(house)
+    options = FloorOptions(storey="EG")
+    assert any(item.kind == "beams" for item in read_floor(tmp_path / "house.ifc", options).elements)
+    read(with_box(house, "ceiling", (0, 0, 2.1, 20, 20, 2.15), "IfcCovering"))
+    floor = read_floor(tmp_path / "house.ifc", options)
+    assert not any(item.kind == "beams" for item in floor.elements)
+    (told,) = [item.message for item in floor.findings if item.code == "hidden_beams"]
+    assert "of beams: they are no targets" in told
+
+
+def test_elements_have_the_heights_of_their_bodies(read: Read, tmp_path: Path) -> None:
+    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
+    floor = read_floor(tmp_path / "house.ifc", FloorOptions(storey="EG"))
+    heights = {item.heights for item in floor.elements if item.kind == "other"}
+    assert heights == {(0.0, 1.0)}
+
+
+def test_leaves_and_panes_stop_no_ray_of_a_model(read: Read, tmp_path: Path) -> None:
+    read(two_rooms())
+    solids = model_solids(tmp_path / "house.ifc", FloorOptions(storey="EG"))
+    assert solids is not None
+    assert np.isfinite(solids.triangles).all()
+    assert solids.triangles[..., 2].min() >= -3.0
+
+
+def test_a_drawing_has_no_solids(tmp_path: Path) -> None:
+    from floor_drawings import new_drawing, rectangle
+
+    drawing = new_drawing()
+    rectangle(drawing.modelspace(), "A-WALL", 0, 0, 6, 5)
+    drawing.saveas(tmp_path / "plan.dxf")
+    assert model_solids(tmp_path / "plan.dxf", FloorOptions()) is None
+
+
+def test_a_proof_at_the_models_solids_agrees_with_the_plan(
+    read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("embreex")
+    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
+    planned(tmp_path / "house.ifc")
+    capsys.readouterr()
+    mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
+    step = ["--angular-step", "0.5", "--json"]
+    main(["prove", mission, "--floor", floor, "--solids", "model", *step])
+    proof = json.loads(capsys.readouterr().out)
+    (walls,) = [item for item in proof["areas"] if item["kind"] == "walls"]
+    assert walls["claimed"] == pytest.approx(walls["shown"], abs=0.02)
+    assert proof["simulation"]["solids"] == "model"
+
+
+def test_a_plan_that_claims_more_than_the_model_shows_is_not_met(
+    read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("embreex")
+    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
+    surface = planned(tmp_path / "house.ifc")
+    seen = surface["kinds"]["walls"]["seen_m2"]
+    coverage = tmp_path / "plan" / "coverage.json"
+    text = coverage.read_text().replace(
+        f'"seen_m2":{seen}', f'"seen_m2":{surface["kinds"]["walls"]["total_m2"]}'
+    )
+    coverage.write_text(text)
+    capsys.readouterr()
+    mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
+    assert main(["prove", mission, "--floor", floor, "--solids", "model", "--angular-step", "0.5"]) == 1
+    assert "area of walls: 100.0 % claimed, the model's solids show" in capsys.readouterr().out
