@@ -2,7 +2,7 @@
 
 Offsets that point to one side at stops that follow each other are drift, or a frame that lies elsewhere.
 Both look the same as a robot that stood elsewhere each time, so that the common part is uncertain. Where the
-visits suffice, a fit of the drift tells both apart (`drift_model`).
+visits suffice, a fit of the drift separates both (`drift_model`).
 """
 
 from __future__ import annotations

@@ -143,7 +143,7 @@ BEGINS_LATE = "the log begins after the start of the mission; give an earlier lo
 def _over(replay: Replay) -> bool:
     """True if the log goes on until the robot is back at the end of the return, or has parked near it.
 
-    Without a return, the run is over when the robot has scanned at the last stop and halts nowhere else.
+    Without a return, the run is over when the robot has scanned at the last stop and stands nowhere else.
     """
     mission, end, track = replay.mission, (replay.mission.return_ or ())[-1:], replay.run.poses
     if end:
