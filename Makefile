@@ -42,10 +42,10 @@ test: lint
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
-	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/bridge/mavlink/driving/test_driving_processes.py
+	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/recordings/truth tests/bridge/mavlink/driving/test_driving_processes.py
 
 benchmarks: $(STAMP)
-	for name in paper models shares quality least_time proofs visibility tours growth logs bridge fleet mavlink campus; do $(BIN)/python -m benchmarks.$$name || exit 1; done
+	for name in paper models shares quality least_time proofs visibility tours growth logs verdicts bridge fleet mavlink campus; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # Builds what is published, and installs it with each extra in an environment of its own.
 wheels: $(STAMP)

@@ -30,7 +30,7 @@ from stopgo.planner.floors.strokes import Word, sketch
 from stopgo.planner.floors.units.unit_evidence import area_in
 
 ENOUGH = 2
-"""Evidence of this weight tells walls; one kind of it alone does not."""
+"""Evidence of this weight shows walls; one kind of it alone does not."""
 _MANY = 3
 """So many doors in gaps of walls are evidence of double weight."""
 _DOUBLE = 0.6

@@ -70,11 +70,25 @@ def _read(path: Path) -> Recording:
     contents = check(path, take=values.take)
     if contents.application != entities.APPLICATION:
         raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
+    logs = logs_in(values, contents, path)
+    _refuse_former_runs(path, contents, logs)
     return Recording(
         path=path,
         contents=contents,
         values=values,
         missions=missions_in(values, str(path)),
         sights=sights_in(values, str(path)),
-        logs=logs_in(values, contents, path),
+        logs=logs,
     )
+
+
+def _refuse_former_runs(path: Path, contents: Contents, logs: Sequence[RunLog]) -> None:
+    """Refuse a recording that has the report of a run, but not its events as values."""
+    run = contents.properties.get(entities.PROPERTY_RUN, {}).get("run_id")
+    if run is None or logs:
+        return
+    if entities.RunEntities(str(run)).flat(entities.RUN_REPORT) in contents.rows:
+        raise InputError(
+            f"{path}: holds run {str(run)[:12]} as pictures only, as stopgo before 0.2 recorded it; "
+            "review it with the version that recorded it, or fetch the run with watch --run"
+        )

@@ -21,6 +21,7 @@ from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.logs.field_log import FieldLog, Remark
 from stopgo.recordings.replay.followed import followed_events
 from stopgo.recordings.replay.inferred_events import events_of
+from stopgo.recordings.replay.joined_parts import joined
 from stopgo.recordings.replay.log_placing import PlacedLog, Placing, placed
 from stopgo.recordings.replay.matching import Match, matched, reaches
 from stopgo.recordings.replay.replayed import Replay
@@ -43,7 +44,35 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
     Undecided
         When `--align stops` finds no placing, or several.
     """
-    placed_log = placed(log, mission, placing)
+    return _compared(log, placed(log, mission, placing), mission, placing, sights)
+
+
+def replay_parts(
+    logs: Sequence[FieldLog], mission: Mission, placing: Placing, sights: Iterable[Sight] = ()
+) -> Replay:
+    """Compare the logs of one run with its mission, as one log; each is placed by itself.
+
+    Raises
+    ------
+    InputError
+        As `replay`, and when the logs are not of one robot, or would all begin at the start.
+    Undecided
+        As `replay`.
+    """
+    for log in logs:
+        if log.events:
+            raise InputError(f"{log.path}: is a log of stopgo's own; `stopgo review` joins those of one run")
+    if placing.align == "first" and len(logs) > 1:
+        raise InputError(
+            "--one-run, --align first: only one log begins at the start; give --map or --align stops"
+        )
+    log, placed_log = joined([(log, placed(log, mission, placing)) for log in logs])
+    return _compared(log, placed_log, mission, placing, sights)
+
+
+def _compared(
+    log: FieldLog, placed_log: PlacedLog, mission: Mission, placing: Placing, sights: Iterable[Sight]
+) -> Replay:
     offset = placed_log.alignment.time_offset_ns
     standstills = _standstills(placed_log, mission)
     events = _own_events(log, mission, offset) or followed_events(log, mission, placed_log, standstills)

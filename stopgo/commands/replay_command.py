@@ -38,6 +38,10 @@ ReplayMission = Annotated[
 ReplayOut = Annotated[
     Path | None, typer.Option("-o", "--out", rich_help_panel="Output", help="Recording to write (.rrd).")
 ]
+ReplayOneRun = Annotated[
+    bool,
+    typer.Option("--one-run", help="The logs are parts of one run, as after a reboot: judge them together."),
+]
 ReplayList = Annotated[bool, typer.Option("--list", help="Only list the content of each log.")]
 ReplayMap = Annotated[
     str | None,
@@ -125,6 +129,7 @@ def add_commands(app: typer.Typer) -> None:
 def replay(
     logs: ReplayLogs,
     mission: ReplayMission = None,
+    one_run: ReplayOneRun = False,
     out: ReplayOut = None,
     list_: ReplayList = False,
     map_: ReplayMap = None,
@@ -147,8 +152,7 @@ def replay(
 
     The log's frame is never guessed: its transform comes from the georeference, --map or --align.
 
-    Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log cannot be read, or is of
-    another mission.
+    Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log is unreadable or another's.
     """
     read = _read(logs, stamps, frame)
     if list_:
@@ -158,10 +162,9 @@ def replay(
     files.check()
     driven = _missions(mission or [], read)
     placing = replace(_placing(map_, align, time_offset, poses, robot_name), level_m=_height(floor_height))
-    plans = None if plan is None else _plans(plan, driven[0])
-    replays = files.compare_and_write(_replays(read, driven, placing, plans), plans, driven)
-    _print_replays(replays, as_json=json_)
-    return _exit_code(replays)
+    plans = _plans(plan, driven[0])
+    replays = files.compare_and_write(_replays(read, driven, placing, plans, one_run=one_run), plans, driven)
+    return _print_replays(replays, as_json=json_)
 
 
 @dataclass(frozen=True)
@@ -320,8 +323,10 @@ def _height(level: float | None) -> float | None:
     return level
 
 
-def _plans(path: Path, mission: Mission) -> Review:
-    """Return a plan's recording, if it is of the mission."""
+def _plans(path: Path | None, mission: Mission) -> Review | None:
+    """Return a plan's recording, if it is of the mission; None without one."""
+    if path is None:
+        return None
     from stopgo.recordings.page.reviewed import review as read
 
     found = read([path])
@@ -334,14 +339,19 @@ def _plans(path: Path, mission: Mission) -> Review:
 
 
 def _replays(
-    logs: list[FieldLog], missions: list[Mission], placing: Placing, plans: Review | None
+    logs: list[FieldLog], missions: list[Mission], placing: Placing, plans: Review | None, *, one_run: bool
 ) -> list[Replay]:
     """Compare each log with its mission, with the coverage that the plan's recording contains."""
     from stopgo.recordings.replay.replaying import replay as replay_of
+    from stopgo.recordings.replay.replaying import replay_parts
 
     items = () if plans is None else plans.recordings
     sights = tuple(sight for item in items for sight in item.recording.sights)
+    if one_run and len(missions) > 1:
+        raise InputError(f"--one-run: is of one mission, not {len(missions)}; give one --mission")
     with running("comparing with the mission"):
+        if one_run:
+            return [replay_parts(logs, missions[0], placing, sights)]
         own = [_mission_of(log, number, missions, len(logs)) for number, log in enumerate(logs)]
         return [replay_of(log, mission, placing, sights) for log, mission in zip(logs, own, strict=True)]
 
@@ -355,13 +365,15 @@ def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:
         typer.echo(printable_lines("\n".join(map(listing.as_text, logs))))
 
 
-def _print_replays(replays: list[Replay], *, as_json: bool) -> None:
+def _print_replays(replays: list[Replay], *, as_json: bool) -> int:
+    """Print the comparisons; return the exit code of all."""
     from stopgo.recordings.replay import replay_text
 
     if as_json:
         _print_json([replay_text.as_json(item) for item in replays], "replays")
     else:
         typer.echo("\n\n".join(map(replay_text.as_text, replays)))
+    return _exit_code(replays)
 
 
 def _print_json(items: list[dict[str, Any]], name: str) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
@@ -31,7 +32,7 @@ from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
 from tests.own_time import World, stepped_into
 
-SEEDS = range(size(short=2, full=70))
+SEEDS = range(size(short=2, full=112))
 ALL = ["s1", "s2", "s3", "s4", "s5"]
 WANDERS_M = 0.03
 """By how much an estimate may be beside the truth."""
@@ -78,6 +79,11 @@ def switched_off(site: Site, chance: random.Random) -> None:
     site.vehicle.on()
 
 
+def stalled(site: Site, chance: random.Random) -> None:
+    """All that is sent meanwhile arrives at once."""
+    site.line.stall(chance.choice([0.5, 3.0, 12.0]))
+
+
 def held(site: Site, chance: random.Random) -> None:
     site.operator.hold()
 
@@ -91,7 +97,12 @@ def disturbed(site: Site, chance: random.Random) -> None:
 
 
 Mishap = Callable[[Site, random.Random], None]
-MISHAPS: tuple[Mishap, ...] = (begun_again, cut, switched_off, held, taken_by_hand, disturbed)
+MISHAPS: tuple[Mishap, ...] = (
+    begun_again, cut, stalled, switched_off, held, taken_by_hand, disturbed,
+)  # fmt: skip
+FAILSAFES = (1, 2, 3, 5)
+"""Causes that are over after a while."""
+TOLD_S = 3.0
 BY_ITSELF = (switched_off, disturbed)
 """After these it goes on without anybody."""
 
@@ -138,11 +149,21 @@ def driven(site: Site, befalls: Befalls, chance: random.Random) -> list[Pose]:
             if isinstance(report, PoseReport):
                 poses.append(report.pose)
             if befalls and befalls[0][0](report):
-                befalls.pop(0)[1](site, chance)
+                mishap = befalls.pop(0)[1]
+                before = newest(site)
+                mishap(site, chance)
+                if mishap is taken_by_hand and not site.line.roughness.loss:
+                    site.wait(TOLD_S)
+                    assert newest(site) > before, "untold"
                 break
             if isinstance(report, StateReport) and report.state in ("HELD", "PAUSED"):
                 go_on(site, report.state)
     return poses
+
+
+def newest(site: Site) -> int:
+    """Number of the newest event that the robot reports."""
+    return site.station.status().last_event
 
 
 def go_on(site: Site, state: str) -> None:
@@ -192,11 +213,15 @@ def test_a_run_survives_what_befalls_gateway_line_and_vehicle(
     profile = ("ardupilot", "px4")[seed % 2]
     mission = cornered_mission(retries=3)
     befalls = [
-        (moment(chance, "s1", "s2"), MISHAPS[seed // 2 % len(MISHAPS)]),
+        (moment(chance, "s1", "s2"), MISHAPS[seed // 2 % (len(MISHAPS) + 1) % len(MISHAPS)]),
         (moment(chance, "s3", "s4", "s5"), chance.choice(MISHAPS)),
     ]
+    first = seed // 2 % (len(MISHAPS) + 1)
+    failsafe = VehicleFault("failsafe", chance.randrange(8, 40), float(chance.choice(FAILSAFES)))
+    faults = VehicleFaults((failsafe,) if first == len(MISHAPS) else ())
+    wheels = chassis(chance, profile)
     with (
-        rover(tmp_path, profile, seed=seed, changed=chassis(chance, profile)) as (vehicle, operator),
+        rover(tmp_path, profile, seed=seed, changed=wheels, faults=faults) as (vehicle, operator),
         Lossy(vehicle.url.number, Roughness(), seed=seed) as line,
     ):
         site = Site(tmp_path, vehicle, operator, line, world)

@@ -180,12 +180,12 @@ def followed(hands: Hands, befalls: list[Any], chance: random.Random) -> None:
 
 
 def check_told(hands: Hands, mishap: object) -> None:
-    """Whoever watches is told of a foreign hand in time; a jump to where the vehicle is anyway is none."""
+    """Whoever watches is told of a foreign hand in time; a jump to where it is, or at the end, is none."""
     before = hands.site.events[-1].number
     hands.world.sleep(TOLD_S)
     events = [event for event in hands.site.events if event.number > before - 3]
-    on_its_leg = mishap is jumped
-    assert on_its_leg or any(isinstance(event, TELLING) for event in events), (mishap, hands.site.run, events)
+    unseen = mishap is jumped or hands.site.run.over
+    assert unseen or any(isinstance(event, TELLING) for event in events), (mishap, hands.site.run, events)
 
 
 def go_on(hands: Hands, state: str) -> None:

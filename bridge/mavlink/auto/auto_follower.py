@@ -154,7 +154,7 @@ class AutoFollower:
         if self._looks_only:
             self._book.boots.boot_ms = boot_ms
             return
-        verdict = self._book.boots.take(clock.ns, boot_ms)
+        verdict = self._book.boots.take(clock.ns, boot_ms, armed=self._observer.status.armed)
         self._in_doubt = verdict == "in doubt"
         if verdict != "restarted":
             return

@@ -1,8 +1,9 @@
-"""Boots of a vehicle, told from its own clock: a restart, a link that delivers late, or neither.
+"""Boots of a vehicle, found by its own clock: a restart, a link that delivers late, or neither.
 
 A clock that went back was restarted. A report that seems to come from a later boot may also be one that the
 link has delayed. It is a delayed one if the vehicle's clock has run for longer than nobody listened.
-Otherwise the next reports decide: after a delay they catch up at once, after a restart they do not.
+Otherwise the next reports decide: after a delay they catch up at once, after a restart they do not. An armed
+vehicle was not restarted, as autopilots boot disarmed: the station's date may have been set.
 """
 
 from __future__ import annotations
@@ -69,17 +70,19 @@ class VehicleBoots:
             return 0.0
         return (self._seen.seen_ns - self._seen.seen_ms * 10**6 - self._earliest_ns) / 1e9
 
-    def take(self, now_ns: int, boot_ms: int) -> BootVerdict:
-        """Take a report, and tell whether the vehicle was restarted since the last one."""
+    def take(self, now_ns: int, boot_ms: int, *, armed: bool = False) -> BootVerdict:
+        """Take a report, and return whether the vehicle was restarted since the last one."""
         with self._lock:
-            return self._take(now_ns, boot_ms)
+            return self._take(now_ns, boot_ms, armed=armed)
 
-    def _take(self, now_ns: int, boot_ms: int) -> BootVerdict:
+    def _take(self, now_ns: int, boot_ms: int, *, armed: bool) -> BootVerdict:
         self.boot_ms, began_ns = boot_ms, now_ns - boot_ms * 10**6
         now = Boot(boot_id=_new_id(), began_ns=began_ns, seen_ns=now_ns, seen_ms=boot_ms)
         boot = self._boot or self._first(now)
         last = self._seen if self._seen is not None and self._seen.boot_id == boot.boot_id else boot
         verdict = self._verdict(boot, last, now_ns, boot_ms)
+        if verdict == "in doubt" and armed:
+            verdict = "same"
         if verdict == "in doubt":
             return verdict
         self._doubt = None

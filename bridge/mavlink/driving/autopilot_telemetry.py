@@ -37,7 +37,10 @@ SOONEST_LOST_S = 20.0
 FORGETS = 0.998
 """Fraction of the longest pause that is remembered from one position to the next."""
 POSE = ("LOCAL_POSITION_NED", "ATTITUDE")
+HEARTBEAT_HZ = 4
+"""Rate of the mode's reports, so that the vehicle is let go at once when somebody else takes it."""
 STREAMS = {
+    "HEARTBEAT": (MessageId.HEARTBEAT, HEARTBEAT_HZ),
     "LOCAL_POSITION_NED": (MessageId.LOCAL_POSITION_NED, POSE_HZ),
     "ATTITUDE": (MessageId.ATTITUDE, POSE_HZ),
     "BATTERY_STATUS": (MessageId.BATTERY_STATUS, 1),

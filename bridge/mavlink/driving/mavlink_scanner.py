@@ -7,6 +7,8 @@ the scanner reports: another station may have driven it.
 
 from __future__ import annotations
 
+import math
+import time
 from threading import Event
 from typing import Literal
 
@@ -35,6 +37,8 @@ TRIGGERS: tuple[ScanTrigger, ...] = ("camera", "script")
 
 TOLERANCE_M = 0.05
 """Tolerance of a position during the scan of a stop that no mission has."""
+BOOT_SHOWS_S = 1.0
+"""Time within which a restart, which also changes the mode, shows in the autopilot's clock."""
 LOOK_S = 0.2
 """Interval at which interruption and motion are checked."""
 AGAIN_S = 3.0
@@ -56,12 +60,20 @@ class StandstillWatch:
         self._autopilot = autopilot
         self._motion = ScanMotion(tolerance_m)
         self._boots = autopilot.peer.boots
+        self._was_taken = bool(autopilot.control.other_control())
+        """True if it was in such a mode before: a restarted autopilot may be scanned from as it is."""
+        self._taken_s: float | None = None
+        """Time since when a mode is reported in which somebody else drives, or that a restart brought."""
         self._look()
 
     def why(self) -> str:
         """Look at the vehicle once more."""
         if self._autopilot.peer.boots != self._boots:
             return "the autopilot was restarted during the scan"
+        taken = "" if self._was_taken else self._autopilot.control.other_control()
+        self._taken_s = (self._taken_s or time.monotonic()) if taken else None
+        if taken and time.monotonic() - (self._taken_s or math.inf) >= BOOT_SHOWS_S:
+            return f"somebody took the vehicle during the scan: {taken}"
         self._look()
         return self._motion.why
 

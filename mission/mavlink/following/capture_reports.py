@@ -32,12 +32,22 @@ class CaptureReports:
 
     def __init__(self) -> None:
         self._reports: deque[CaptureReport] = deque(maxlen=CAPTURES_KEPT)
+        self._ignored: set[Picture] = set()
         self.counted: frozenset[ScanFile] = frozenset()
         """Files of scans that have counted for a stop: none counts twice, whatever its camera calls it."""
 
+    def is_new(self, capture: Capture) -> bool:
+        """Return True if it was not reported before."""
+        names = (known.capture.name for known in self._reports)
+        return capture.name not in self._ignored and capture.name not in names
+
+    def ignore(self, capture: Capture) -> None:
+        """Let a report count for no stop, however often it is repeated."""
+        self._ignored.add(capture.name)
+
     def take(self, capture: Capture, pose: Pose | None, now_ns: int, *, at_stop: bool) -> None:
         """Store a new report, with the vehicle's own pose if it agrees with the camera's position."""
-        if any(capture.name == known.capture.name for known in self._reports):
+        if not self.is_new(capture):
             return
         there = at_stop if capture.pose is None else _agree(capture.pose, pose)
         self._reports.append(CaptureReport(capture, pose if there else None, now_ns))

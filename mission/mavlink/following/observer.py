@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from stopgo.mission.mavlink.autopilots.kind import AUTO, Autopilot
 from stopgo.mission.mavlink.captures import Capture, Picture, capture_of
-from stopgo.mission.mavlink.following.capture_reports import CaptureReports, scan_pose
+from stopgo.mission.mavlink.following.capture_reports import CaptureReport, CaptureReports, scan_pose
 from stopgo.mission.mavlink.following.list_position import ListPosition
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.progress_watch import ProgressWatch
@@ -57,14 +57,21 @@ class Observer:
         elif name == "CAMERA_IMAGE_CAPTURED":
             capture = capture_of(message, None if listed is None else listed.sent)
             at_stop = self.position.is_at_stop(listed)
+            if self.captures.is_new(capture) and not self._scan_watch.take_report(now_ns):
+                return self._ignored(capture, name)
             self.captures.take(capture, self.poses.pose(now_ns), now_ns, at_stop=at_stop)
+        return name
+
+    def _ignored(self, capture: Capture, name: str) -> str:
+        """Ignore the report of an older scan, also when it is repeated."""
+        self.captures.ignore(capture)
         return name
 
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         boot_ms = self.status.boot_ms
         same = self.position.take_current(message, listed, boot_ms=boot_ms, now_ns=now_ns)
         if listed is not None:
-            self._scan_watch.take_item(listed, self.position.place(listed), same=same)
+            self._scan_watch.take_item(listed, self.position.place(listed), now_ns, same=same)
 
     def _note_progress(self, pose: Pose, listed: ListedMission | None) -> None:
         """Note a pose at the vehicle's own time: a link may deliver it late."""
@@ -98,7 +105,7 @@ class Observer:
             return None
         newest = self.poses.fix
         fix = newest if newest is not None and newest.ns > self.position.since_ns else None
-        report = self.captures.of_stop(run, listed, arrived, after)
+        report = self._report(run, listed, arrived, after)
         return Observation(
             mode=self.status.mode, armed=self.status.armed, place=self.position.place(listed),
             pose=None if fix is None else fix.pose,
@@ -117,5 +124,15 @@ class Observer:
         self, run: Run, listed: ListedMission, arrived: Arrived | None, after: Picture
     ) -> Capture | None:
         """Return the last report of a scan at the current stop."""
-        report = self.captures.of_stop(run, listed, arrived, after)
+        report = self._report(run, listed, arrived, after)
         return None if report is None else report.capture
+
+    def _report(
+        self, run: Run, listed: ListedMission, arrived: Arrived | None, after: Picture
+    ) -> CaptureReport | None:
+        """Return the report of the current stop's scan; none from before its trigger."""
+        report = self.captures.of_stop(run, listed, arrived, after)
+        if report is None or self.position.place(listed) >= listed.stops[run.at].after:
+            return report
+        stop = listed.stops[run.at].stop
+        return report if self._scan_watch.is_after_trigger(listed, stop, report.ns) else None

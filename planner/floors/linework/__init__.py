@@ -49,7 +49,7 @@ PATTERN = 150
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Traits of a building in line work, by which it is told from other lines."""
+    """Traits of a building in line work, by which it is distinguished from other lines."""
 
     double: float = 0.0
     """Fraction of the walls' lines that run in pairs and bound a solid."""

@@ -9,6 +9,7 @@ import pytest
 
 from tests.faults.sizes import size
 from tests.recordings.truth.bench import answered, cases
+from tests.recordings.truth.own_runs import own_answers
 
 PARTS = 4
 """The cases are dealt out among so many tests, which run side by side."""
@@ -27,3 +28,9 @@ def test_no_verdict_on_a_log_is_false(part: int, tmp_path: Path) -> None:
     assert [(item.case.name, item.kind, item.text) for item in found if item.kind.startswith("false")] == []
     counts = Counter(item.kind for item in found)
     assert counts["untold"] <= MOST_UNTOLD * (counts["untold"] + counts["right"])
+
+
+def test_no_verdict_on_a_run_of_our_own_robot_is_false() -> None:
+    found = [answer for seed in range(1, 1 + size(short=1, full=10)) for answer in own_answers(seed)]
+    assert [(item.name, item.text) for item in found if item.kind not in ("right", "open")] == []
+    assert {item.answer for item in found} == {"yes", "no", "unknown"}

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
+from stopgo.bridge.mavlink.simulated import vehicle_scanner
 from stopgo.bridge.mavlink.vehicle_link.messages import set_current
 from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.mission.document import Scan
-from stopgo.mission.run.events import Skipped
+from stopgo.mission.run.events import Scanned, Skipped
 from tests.bridge.mavlink.auto.site import Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 
@@ -43,6 +45,22 @@ def test_several_stops_that_are_jumped_over_at_once_are_all_skipped(tmp_path: Pa
         until(site, lambda events, run: run.at == 2)
         site.order("abort")
     assert site.run.skipped == ("S1", "S2") and site.run.done == ()
+
+
+def test_a_scan_that_goes_on_while_the_vehicle_is_jumped_to_the_next_stop_counts_for_neither(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its scanner notices no motion, and ends where the next stop is."""
+    monkeypatch.setattr(vehicle_scanner, "MOVED_M", math.inf)
+    monkeypatch.setattr(vehicle_scanner, "TURNED_RAD", math.inf)
+    site = Site(tmp_path, "ardupilot", mission=real_tour(scan=LONG), speed_up=1.0)
+    with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
+        site.order("start")
+        until(site, lambda events, run: run.at == 1 and run.stop_state == "SCANNING")
+        peer.send(set_current(peer.who, site_sequence(site, "S3")))
+    files = {event.stop: event.file for event in site.events if isinstance(event, Scanned)}
+    assert set(files) <= {"S1", "S3"} and not files.get("S3", "").endswith("-2.e57")
+    assert site.run.skipped == ("S2",) and site.run.state == "FINISHED"
 
 
 @pytest.mark.parametrize("profile", ["ardupilot", "px4"])

@@ -74,6 +74,14 @@ def test_a_restart_during_a_long_silence_is_told_once_the_next_reports_do_not_ca
     assert station.boots.late_s < 0.5
 
 
+def test_a_date_that_is_set_while_nobody_listens_is_no_restart_of_an_armed_vehicle() -> None:
+    first = Listener()
+    first.hear(60.0, 60.0)
+    second = Listener(first.journal)
+    told = [second.boots.take(round((4660.0 + t) * SECOND), 62_000 + t * 1000, armed=True) for t in range(5)]
+    assert set(told) == {"same"} and second.boots.late_s < 0.5
+
+
 def test_each_restart_is_told_by_one_of_the_processes_that_listen() -> None:
     one = Listener()
     other = Listener(one.journal)

@@ -46,7 +46,7 @@ class Camera:
         self.boots, self.is_late = 0, False
         self.poses: list[tuple[float, float, float, float]] = [(0.0, 0.0, 0.0, 0.0)]
         """North, east, yaw and speed at each look; the last one stays."""
-        self.switched, self.stops = "", 0
+        self.switched, self.taken, self.stops = "", "", 0
         self.orders: list[tuple[int, tuple[float, ...]]] = []
         self.asked: list[Message] = []
         self.answers: Callable[[Message], Message | None] = lambda request: None
@@ -95,6 +95,9 @@ class Camera:
 
     def mode_change(self) -> str:
         return self.switched
+
+    def other_control(self) -> str:
+        return self.taken
 
     def stop(self) -> None:
         self.stops += 1
@@ -214,6 +217,22 @@ def test_an_operator_who_has_switched_the_mode_keeps_the_vehicle_after_a_spoilt_
     camera = Camera(captured(4), taken=4)
     camera.poses, camera.switched = [(0.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)], "to MANUAL"
     assert isinstance(scan(camera), ScanFailed) and camera.stops == 0
+
+
+def test_a_scan_during_which_somebody_takes_the_vehicle_has_failed_at_once() -> None:
+    camera = Camera(taken=4)
+    began = camera.command
+
+    def taken(*order: float, **details: Any) -> Ack:
+        camera.switched = camera.taken = "the autopilot is in MANUAL: somebody else drives it"
+        return began(*order, **details)  # type: ignore[arg-type]
+
+    camera.command = taken  # type: ignore[method-assign]
+    slow = Scan(profile="default", duration_s=2.0, timeout_s=3000.0)
+    scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
+    failed = scanner.scan("run-s2-1", slow, interrupt=Event())
+    assert isinstance(failed, ScanFailed) and "somebody took the vehicle during the scan" in failed.reason
+    assert camera.stops == 0
 
 
 def test_a_position_that_wanders_within_the_tolerance_and_one_fast_report_are_noise() -> None:
