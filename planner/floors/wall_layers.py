@@ -37,7 +37,9 @@ _DOUBLE = 0.6
 """Walls are drawn as two lines if this fraction of the lines bounds a solid."""
 _LEAST_SHARE = 0.08
 """A layer with less than this fraction of the unknown lines holds no walls."""
-_MOST_LAYERS = 4
+_MOST_LAYERS, _MOST_OF_LARGE = 4, 2
+"""Layers that are tried, and those of a drawing with more than _LARGE shapes, where each trial takes long."""
+_LARGE = 4000
 _ALIKE = 0.05
 """A written area is true of a room if it differs by less than this fraction …"""
 _ROUNDED = 0.3
@@ -146,9 +148,11 @@ def _candidates(shapes: Sequence[Shape]) -> list[tuple[str, ...]]:
     for layer, length in _lengths(shapes):
         lengths[layer] = lengths.get(layer, 0.0) + length
     whole = sum(lengths.values())
-    names = sorted(lengths, key=lambda name: (-lengths[name], name))[:_MOST_LAYERS]
+    is_large = len(shapes) > _LARGE
+    names = sorted(lengths, key=lambda name: (-lengths[name], name))
+    names = names[: _MOST_OF_LARGE if is_large else _MOST_LAYERS]
     names = [name for name in names if lengths[name] >= _LEAST_SHARE * whole]
-    together = [tuple(sorted(names))] if len(names) > 1 else []
+    together = [tuple(sorted(names))] if len(names) > 1 and not is_large else []
     return [*((name,) for name in names), *together]
 
 
