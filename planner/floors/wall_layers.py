@@ -35,6 +35,8 @@ _MANY = 3
 """So many doors in gaps of walls are evidence of double weight."""
 _DOUBLE = 0.6
 """Walls are drawn as two lines if this fraction of the lines bounds a solid."""
+_CONNECTED = 15.0
+"""Passages lie between walls if connected ones have an outline of this mean length, in metres."""
 _LEAST_SHARE = 0.08
 """A layer with less than this fraction of the unknown lines holds no walls."""
 _MOST_LAYERS, _MOST_OF_LARGE = 4, 2
@@ -192,7 +194,7 @@ def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLay
         told.append((1, f"{shown.double:.0%} of the lines are walls of two lines"))
     if named > 1:
         told.append((1, f"{named} rooms have a name in them"))
-    if shown.passages > 1 and shown.double >= _DOUBLE:
+    if shown.passages > 1 and shown.double >= _DOUBLE and shown.component >= _CONNECTED:
         told.append((1, f"{shown.passages} passages lie between facing ends of walls"))
     weight = sum(item for item, _ in told)
     is_doubted = false > true or _is_no_storey(made, words)
