@@ -19,6 +19,8 @@ from stopgo.root_help import root_help
 
 LONGEST = 30
 """Options of a command whose `--help` describes them all; of more, it only names those of the groups."""
+JOINING = "\u2011"
+"""Stands for a hyphen while lines are made: no line is broken at it."""
 NARROW = 70
 """Below this many columns the options get a smaller part of the width."""
 
@@ -134,10 +136,13 @@ OWN = "Options"
 
 
 def _write_records(title: str, params: list[Any], ctx: Any, formatter: Any) -> None:
-    records = [record for param in params if (record := param.get_help_record(ctx)) is not None]
+    found = [record for param in params if (record := param.get_help_record(ctx)) is not None]
+    records = [(name, text.replace("-", JOINING)) for name, text in found]
     if records:
         with formatter.section(title):
+            before = len(formatter.buffer)
             formatter.write_dl(records, col_max=30 if formatter.width >= NARROW - 2 else 20)
+            formatter.buffer[before:] = [part.replace(JOINING, "-") for part in formatter.buffer[before:]]
 
 
 def _write_paragraphs(text: str | None, formatter: Any) -> None:

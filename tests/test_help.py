@@ -118,3 +118,9 @@ def test_a_wrong_word_names_the_right_one(
     assert line in told.err
     assert told.err.count("\n") == 1
     assert told.out == ""
+
+
+def test_a_default_names_another_parameter_as_its_option(capsys: pytest.CaptureFixture[str]) -> None:
+    text = " ".join(printed(capsys, "plan", "--help-all").split())
+    assert "half of --min-door-width" in text
+    assert [key for key in PARAMETERS if "_" in key and f" {key}]" in text] == []

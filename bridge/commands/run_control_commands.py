@@ -137,7 +137,9 @@ def order_of(verb: Verb) -> Callable[..., None]:
         at_once = verb in FREE_VERBS
         with refusals_printed(as_json=json_), in_time(driving, at_once=at_once) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
-        report_answer(answer, station.keys.robot, json_)
+            report_answer(
+                answer, station.keys.robot, json_
+            )  # before the link is closed, which may take a moment
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
     return with_connection(without=NO_EFFECT[verb])(command)

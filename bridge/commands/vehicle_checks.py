@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Mapping
 
 from stopgo.bridge.commands.checks import Check
+from stopgo.bridge.commands.vehicle_abilities import abilities
 from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.accuracy import LEAVES_LEGS
@@ -43,6 +44,8 @@ def vehicle_checks(peer: Peer, *, any_origin: bool) -> Iterator[Check]:
     values = read_parameters(peer, names | set(kind.steering.parameters)) if names else {}
     yield from steering_check(kind, values)
     yield from parameter_checks(kind, values, any_origin=any_origin)
+    alone = kind.driving.gives_up_parameter
+    yield from abilities(peer, values if alone in values else {**values, **read_parameters(peer, [alone])})
 
 
 def steering_check(kind: Autopilot, values: Mapping[str, float]) -> Iterator[Check]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stopgo.bridge.commands.vehicle_abilities import camera_note
 from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
 from stopgo.bridge.mavlink.auto.logbook import forget, logbook, remember
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
@@ -110,9 +111,10 @@ def push_mission(
         with Bar("pushing", ITEMS) as bar:
             done = upload(peer, sent, while_running=consent.while_running, progress=bar.show, report=say)
         _store_sent(url, peer, mission, sent, state, done)
-        for note in sent.notes:
+        found = (*sent.notes, camera_note(peer, sent))
+        for note in filter(None, found):
             say(f"note: {note}")
-        notes = (deviation, *sent.notes) if deviation else sent.notes
+        notes = tuple(filter(None, (deviation, *found)))
         _report_push(peer, mission, replace(sent, notes=notes), done, origin, as_json)
 
 

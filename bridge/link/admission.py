@@ -8,7 +8,8 @@ certificate is valid and not revoked. A connection is
 silent      until something arrives: at most `SILENT`, each for `SILENT_S`,
 new         during its TLS handshake: at most `HANDSHAKES`, each for `HANDSHAKE_S`,
 admitted    until either end closes it, or its certificate is no longer valid: at most `EACH_HOLDER` of one
-            certificate. A further one replaces the oldest.
+            certificate. A further one replaces the oldest. One that carries a single question
+            (`direct_question`) is answered here.
 
 Where there are too many, one is closed: strangers' before those at an address of an admitted holder, of the
 address with the most connections, the oldest first. So a flood closes its own connections.
@@ -33,14 +34,18 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from stopgo.bridge.link.direct_question import PROTOCOL, answer_directly
 from stopgo.bridge.link.keys import Certificates, HeldKeys, Holder, Untrusted, now_utc
 from stopgo.bridge.link.relay_end import RelayEnd
+from stopgo.bridge.link.seals import SealedAnswering
 from stopgo.mission.console.ports import free_port
 from stopgo.mission.errors import InputError
 
 SILENT, SILENT_S = 256, 5.0
 HANDSHAKES, HANDSHAKE_S = 256, 10.0
 EACH_HOLDER = 32
+DIRECT = 32
+"""Most questions that are answered at a time on connections of their own."""
 NEWCOMERS, ACCEPTED = 4, 32
 """Most steps of handshakes, and most accepted connections, before admitted connections have their turn."""
 ADDRESSES = 1024
@@ -138,6 +143,8 @@ class Admission:
     inner: InnerEndpoints
     refused: Callable[[str], None]
     state: Path | None = None
+    answers: dict[str, SealedAnswering] = field(default_factory=dict)
+    """Answers to questions on connections of their own, by key (`direct_question`)."""
     failed: Callable[[Exception], None] = lambda error: None
     """Called with an error that ended the relay."""
     _connections: dict[RelayedConnection, None] = field(default_factory=dict)
@@ -150,6 +157,8 @@ class Admission:
         self._outer_tls = _context(self.held, ssl.PROTOCOL_TLS_SERVER)
         self._inner_tls = _context(self.held, ssl.PROTOCOL_TLS_CLIENT)
         self._selector = selectors.DefaultSelector()
+        self._outer_tls.set_alpn_protocols([PROTOCOL])
+        self._free = threading.BoundedSemaphore(DIRECT)
         self._closing = threading.Event()
         self._looked_s = time.monotonic()
         self._unfinished: set[RelayedConnection] = set()
@@ -249,9 +258,27 @@ class Admission:
         connection.certificate = outer.socket.getpeercert(binary_form=True) or b""
         holder, _ = self._certificates.holder(connection.certificate)
         self._remember(connection.address)
+        if outer.socket.selected_alpn_protocol() == PROTOCOL:
+            self._answer_directly(connection, outer.socket)
+            return False
         self._replace_oldest_of(connection.certificate)
         connection.inner = RelayEnd(self._to_zenoh(holder))
         return True
+
+    def _answer_directly(self, connection: RelayedConnection, line: ssl.SSLSocket) -> None:
+        """Hand a connection to a thread that answers its question: an answer may wait for a disk."""
+        if not self._free.acquire(blocking=False):
+            raise ConnectionResetError
+        del self._connections[connection]
+        self._watch(connection, connection.outer, reads=False, writes=False)
+
+        def answer() -> None:
+            try:
+                answer_directly(line, self.answers)
+            finally:
+                self._free.release()
+
+        threading.Thread(target=answer, name="direct answer", daemon=True).start()
 
     def _to_zenoh(self, holder: Holder) -> socket.socket:
         """Return a connection to zenoh for a holder; with the robot's own keys it is the Unix socket's."""

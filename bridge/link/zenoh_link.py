@@ -236,6 +236,8 @@ class ZenohLink:
 
     def serve(self, key: str, answer: Answering) -> None:
         sealed = self._seals.seal_answers(answer)
+        if self.admission is not None and "*" not in key:
+            self.admission.answers[key] = sealed
 
         def answered(query: zenoh.Query) -> None:
             with query:

@@ -23,6 +23,7 @@ import msgspec
 
 from stopgo.bridge.console import Progress
 from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.link.direct_question import DirectQuestion, can_ask_directly
 from stopgo.bridge.link.keys import HeldKeys, now_utc, read_keys
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import (
@@ -97,13 +98,11 @@ def connect(
         raise InputError(f"--as {who}: the keys in {keys} belong to {held.holder.name}; leave --as out")
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
         station = Station(
-            link,
-            KeyExpressions(robot, site),
-            commander=who,
-            timeout_s=timeout_s,
-            patience_s=patience_s,
+            link, KeyExpressions(robot, site), commander=who, timeout_s=timeout_s, patience_s=patience_s,
             held=held,
-        )
+        )  # fmt: skip
+        if at_once and held is not None and can_ask_directly(endpoint):
+            station.direct = partial(DirectQuestion, endpoint, held)
         begin = station.look_for if at_once else station.reach
         begin(endpoint, why=lambda: why_no_link(endpoint, held))
         yield station
@@ -133,6 +132,8 @@ class Station:
         """Capabilities that the robot reported last."""
         self.asked_at = time.monotonic()
         """Time of the last query for the robot's state: its answer is no older than that."""
+        self.direct: Callable[..., DirectQuestion] | None = None
+        """Asks a question on a connection of its own; `None` if that is not to be tried."""
         self.keys = keys
         self.commander = commander
         self.timeout_s = timeout_s
@@ -372,7 +373,11 @@ class Station:
     def give(self, order: RunCommand, *, within_s: float | None = None) -> Answer:
         """Send a command that was made before; sent twice, it still takes effect once."""
         within_s = self.timeout_s if within_s is None else within_s
-        reply = self._ask_repeatedly(self.keys.command(order.verb), encode(order), within_s)
+        key, payload = self.keys.command(order.verb), encode(order)
+        direct = None
+        if self.direct is not None and order.verb in FREE_VERBS:
+            direct = self.direct(key, payload, timeout_s=within_s)
+        reply = self._ask_repeatedly(key, payload, within_s, beside=direct)
         if reply is None and self._not_found is not None and not (self._seen.is_set() or self._may_be_sent):
             raise self._not_found()
         if reply is None and order.verb not in FREE_VERBS and within_s >= order.valid_for_s:
@@ -452,7 +457,9 @@ class Station:
         try_s, within_s = BULK_TRY_S if bulk else TRY_S, self.patience_s
         if step == "commit":
             try_s, within_s = try_s + manifest.size / COMMIT_BYTES_PER_S, self._commit_s(manifest)
-        reply = self._ask_repeatedly(key, payload, within_s, try_s=try_s, bulk=bulk, **parameters)
+        reply = self._ask_repeatedly(
+            key, payload, within_s, try_s=try_s, bulk=bulk, beside=None, **parameters
+        )
         return self._decoded(reply, kind, f"push ({step})")
 
     def _ask_repeatedly(
@@ -463,11 +470,16 @@ class Station:
         *,
         try_s: float = TRY_S,
         bulk: bool = False,
+        beside: DirectQuestion | None = None,
         **parameters: str,
     ) -> bytes | None:
-        """Repeat a query until it is answered or the time is up."""
+        """Repeat a query until it is answered, there or `beside` it, or the time is up."""
         deadline = time.monotonic() + within_s
         while (left := deadline - time.monotonic()) > 0:
+            if beside is not None:
+                self._may_be_sent = self._may_be_sent or beside.may_be_sent
+                if beside.reply is not None:
+                    return beside.reply
             began, wait_s = time.monotonic(), min(try_s, left)
             reply = self.link.ask(key, payload, timeout_s=wait_s, parameters=parameters, bulk=bulk)
             if reply is not None:

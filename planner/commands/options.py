@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import re
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any, cast
 
@@ -11,6 +12,9 @@ import typer
 
 from stopgo.mission.settings import PARAMETERS
 from stopgo.mission.settings.parameter import Parameter
+
+KEY = re.compile(r"[a-z]+(_[a-z]+)+")
+"""Name of a parameter as plan.toml has it; on the command line it is an option."""
 
 
 def with_options(command: Callable[..., int], names: Iterable[str] = PARAMETERS) -> Callable[..., int]:
@@ -91,7 +95,7 @@ def _help(parameter: Parameter) -> str:
 def _default(parameter: Parameter) -> str:
     value = parameter.default
     if value in (None, ()):
-        return parameter.undecided
+        return KEY.sub(lambda key: "--" + key[0].replace("_", "-"), parameter.undecided)
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -27,7 +27,11 @@ IGNORE_X_Y, IGNORE_VELOCITY, IGNORE_YAW = 0b11, 0b11000, 1 << 10
 LOCAL_NED, LOCAL_OFFSET_NED = MavFrame.LOCAL_NED, MavFrame.LOCAL_OFFSET_NED
 NORTHMOST = 89.0
 """Degrees; at the poles there is no east."""
-OF_CAMERA = (MessageId.CAMERA_IMAGE_CAPTURED, MessageId.CAMERA_CAPTURE_STATUS)
+OF_CAMERA = (
+    MessageId.CAMERA_IMAGE_CAPTURED, MessageId.CAMERA_CAPTURE_STATUS, MessageId.CAMERA_INFORMATION,
+)  # fmt: skip
+ONLY_OF_CAMERA = (MessageId.CAMERA_IMAGE_CAPTURED, MessageId.CAMERA_INFORMATION)
+"""Messages that an autopilot does not have whose scanner is a component of its own."""
 CHANGE_MODE = 1
 """MAV_DO_REPOSITION_FLAGS."""
 
@@ -107,9 +111,10 @@ def _answer_as_camera(vehicle: Vehicle, who: Who, command: ReceivedCommand) -> b
     asked = command.command == Command.REQUEST_MESSAGE and command.whole(0) in OF_CAMERA
     if asked and (for_camera or all_of):
         _send_requested(vehicle, command.whole(0), command.whole(1))
-    if asked and not for_camera and command.whole(0) == MessageId.CAMERA_IMAGE_CAPTURED:
+    not_its_own = asked and command.whole(0) in ONLY_OF_CAMERA
+    if not_its_own and not for_camera:
         _acknowledge(vehicle, who, command.command, UNSUPPORTED)
-    return for_camera or (asked and command.whole(0) == MessageId.CAMERA_IMAGE_CAPTURED)
+    return for_camera or not_its_own
 
 
 def _send_requested(vehicle: Vehicle, number: int, index: int) -> None:

@@ -169,6 +169,15 @@ def capture_status(vehicle: Vehicle) -> Message:
     return dialect.MAVLink_camera_capture_status_message(vehicle.time.boot_ms, scans, 0, 0.0, 0, 0.0, count)
 
 
+def camera_information(vehicle: Vehicle) -> Message:
+    """Description of the scanner as a camera."""
+    vendor, model = (list(text.ljust(32, "\0").encode()) for text in ("stopgo", "simulated scanner"))
+    flags = dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
+    return dialect.MAVLink_camera_information_message(
+        vehicle.time.boot_ms, vendor, model, 0, 0.0, 0.0, 0.0, 0, 0, 0, flags, 0, b""
+    )
+
+
 def autopilot_version(vehicle: Vehicle) -> Message:
     release = (4 << 24) | (7 << 16) | dialect.FIRMWARE_VERSION_TYPE_OFFICIAL
     empty = [0] * 8
@@ -192,6 +201,7 @@ MAKERS: dict[int, Maker] = {
     MessageId.AUTOPILOT_VERSION: autopilot_version,
     MessageId.HOME_POSITION: home,
     MessageId.EXTENDED_SYS_STATE: extended_state,
+    MessageId.CAMERA_INFORMATION: camera_information,
     MessageId.CAMERA_CAPTURE_STATUS: capture_status,
     MessageId.CAMERA_IMAGE_CAPTURED: image_captured,
 }

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from stopgo.bridge.commands.vehicle_abilities import alone_text, script_check
 from stopgo.bridge.commands.vehicle_checks import has_position, parameter_checks
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
@@ -156,3 +157,40 @@ def test_one_that_steers_like_a_car_is_wrong_for_a_mission(capsys: pytest.Captur
         assert main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}"]) == 1
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("WRONG  steering")]
     assert "CA_AIRFRAME is 5, Ackermann" in line and "two driven sides" in line
+
+
+@pytest.mark.parametrize(
+    ("profile", "faults", "expected"),
+    [
+        (
+            "ardupilot",
+            (),
+            ["read back every 2 s", "the autopilot has a camera", "SCR_ENABLE is not reported"],
+        ),
+        ("ardupilot", (VehicleFault("camera", 1),), ["component 100 has a camera"]),
+        ("px4", (), ["by its id", "px4 has none", "drives on for 1 s (COM_OF_LOSS_T)"]),
+        (
+            "px4",
+            (VehicleFault("failsafe", 900, 3.0),),
+            ["position estimate, geofence; unknown: remote control"],
+        ),
+        ("strict", (), ["not with autopilots of kind generic"]),
+    ],
+)
+def test_it_prints_what_the_vehicle_can_do(
+    profile: str, faults: tuple[VehicleFault, ...], expected: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    port = free_port()
+    origin = SiteOrigin(lat=47.0, lon=8.0, alt=400.0, heading_deg=0.0)
+    setup = VehicleSetup(PROFILES[profile], origin=origin, faults=VehicleFaults(faults))
+    with vehicle_on(Url("udpin", "127.0.0.1", port), setup):
+        main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}"])
+    can = [line for line in capsys.readouterr().out.splitlines() if line.startswith("ok     can")]
+    assert len(can) == 5
+    assert [words for words in expected if words not in "\n".join(can)] == []
+
+
+def test_a_vehicle_without_script_engine_or_timeout_is_told_so() -> None:
+    assert script_check(ARDUPILOT, {"SCR_ENABLE": 0.0}).action == "for it set SCR_ENABLE to 1, and restart"
+    assert "is not reported" in script_check(ARDUPILOT, {}).result
+    assert "for 3 s, which is fixed" in alone_text(ARDUPILOT, {})

@@ -15,13 +15,16 @@ import pytest
 from stopgo.bridge.link import admission as admissions
 from stopgo.bridge.link.admission import Admission, inner_endpoints, listening_socket
 from stopgo.bridge.link.authority import init_site, issue, revoke
+from stopgo.bridge.link.direct_question import PROTOCOL, DirectQuestion
 from stopgo.bridge.link.keys import now_utc, read_keys
+from stopgo.bridge.link.link import Request
 from stopgo.bridge.link.protocol import KeyExpressions
-from stopgo.bridge.link.zenoh_link import Guard, admitting
+from stopgo.bridge.link.seals import KeySeals
+from stopgo.bridge.link.zenoh_link import Guard, ZenohLink, admitting
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.station.station import connect
 from stopgo.mission.errors import InputError, NegativeResult
-from tests.bridge.world import Field
+from tests.bridge.world import Field, corridor
 from tests.ports import free_port
 
 NET_S = 30.0
@@ -299,10 +302,106 @@ def test_an_address_that_is_taken_is_named(robot: Robot) -> None:
         listening_socket(f"tls/127.0.0.1:{robot.port}")
 
 
+# Questions on connections of their own
+
+
+def asked(robot: Robot, key: str, name: str = "alice") -> DirectQuestion:
+    """A question after its thread has ended."""
+    held = read_keys(robot.site / "site" / name, now=now_utc())
+    question = DirectQuestion(f"tls/127.0.0.1:{robot.port}", held, key, b"why", timeout_s=NET_S)
+    question.thread.join(NET_S)
+    return question
+
+
+def answering(robot: Robot) -> list[Request]:
+    """The questions that the robot's end has answered."""
+    requests: list[Request] = []
+
+    def answer(request: Request) -> bytes:
+        requests.append(request)
+        return b"because"
+
+    held = read_keys(robot.site / "site" / "r1", now=now_utc())
+    robot.admission.answers["sx/1/r1/info"] = KeySeals(held, boot_id="b1").seal_answers(answer)
+    return requests
+
+
+def test_a_direct_question_is_answered_without_zenoh(robot: Robot) -> None:
+    requests = answering(robot)
+    question = asked(robot, "sx/1/r1/info")
+    assert (question.reply, question.may_be_sent) == (b"because", True)
+    assert [(one.key, one.payload, one.holder and one.holder.name) for one in requests] == [
+        ("sx/1/r1/info", b"why", "alice")
+    ]
+    assert asked(robot, "sx/1/r1/cmd/start").reply is None
+    assert (robot.zenoh.met, len(requests)) == (0, 1)
+
+
+def test_an_answer_that_another_end_has_signed_is_not_taken(robot: Robot) -> None:
+    held = read_keys(robot.site / "site" / "bob", now=now_utc())
+    robot.admission.answers["sx/1/r1/info"] = KeySeals(held, boot_id="b1").seal_answers(lambda request: b"no")
+    assert asked(robot, "sx/1/r1/info").reply is None
+
+
+@pytest.mark.parametrize("said", [b"nonsense\n", b"{}\n", b"x" * 100_000, b'{"key":1}\n'])
+def test_a_direct_question_that_is_none_is_closed(robot: Robot, said: bytes) -> None:
+    requests = answering(robot)
+    context = tls(robot.site / "site" / "alice")
+    context.set_alpn_protocols([PROTOCOL])
+    with context.wrap_socket(robot.plain()) as line:
+        with suppress(OSError):
+            line.sendall(said)
+        assert closed(line)
+    assert requests == []
+    assert asked(robot, "sx/1/r1/info").reply == b"because"
+
+
+def test_more_direct_questions_than_are_answered_at_a_time_are_closed(robot: Robot) -> None:
+    requests = answering(robot)
+    context = tls(robot.site / "site" / "alice")
+    context.set_alpn_protocols([PROTOCOL])
+    with ExitStack() as opened:
+        for _ in range(admissions.DIRECT):
+            opened.enter_context(context.wrap_socket(robot.plain()))
+        while asked(robot, "sx/1/r1/info").reply is not None:  # until all of them have a thread
+            pass
+        with robot.reached() as line:
+            assert answered(line)
+    while asked(robot, "sx/1/r1/info").reply is None:
+        pass
+    assert requests
+
+
+def test_an_end_that_knows_no_direct_questions_is_not_sent_any(robot: Robot) -> None:
+    held = read_keys(robot.site / "site" / "alice", now=now_utc())
+    port = robot.zenoh.listener.getsockname()[1]
+    question = DirectQuestion(f"tls/127.0.0.1:{port}", held, "sx/1/r1/info", b"", timeout_s=NET_S)
+    question.thread.join(NET_S)
+    assert (question.reply, question.may_be_sent) == (None, False)
+
+
+@pytest.mark.parametrize("zenoh_answers", [False, True])
+def test_a_stop_is_carried_out_once_by_whichever_connection(
+    site: Path, tmp_path: Path, zenoh_answers: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not zenoh_answers:
+        monkeypatch.setattr(ZenohLink, "ask", lambda self, *question, **options: None)
+    with robot_of(site, tmp_path) as (field, endpoint):
+        field.station().push(corridor())
+        field.order("start")
+        with connect(
+            endpoint, robot="r1", keys=site / "site" / "alice", timeout_s=NET_S, at_once=True
+        ) as station:
+            assert station.command("pause").state == "PAUSED"
+            assert station.command("abort").state == "ABORTED"
+        assert field.told() == ["Started", "Paused", "Aborted"]
+
+
 @contextmanager
 def robot_of(site: Path, state: Path) -> Iterator[tuple[Field, str]]:
-    """A robot with keys at an endpoint."""
+    """A robot with keys at an endpoint; it does not work by itself."""
     field, endpoint = Field(), f"tls/127.0.0.1:{free_port()}"
+    field.controller.works = ()
     held = read_keys(site / "site" / "r1", now=now_utc())
     guard = Guard(held, boot_id=field.controller.boot_id, state=state)
     with admitting(endpoint, guard) as link:

@@ -387,6 +387,10 @@ FAILURES: dict[str, Callable[[], Exception]] = {
     "I/O error": lambda: sqlite3.OperationalError("disk I/O error"),
     "malformed": lambda: sqlite3.DatabaseError("database disk image is malformed"),
     "EIO": lambda: OSError(errno.EIO, "Input/output error"),
+    "no space": lambda: sqlite3.OperationalError("database or disk is full"),
+    "ENOSPC": lambda: OSError(errno.ENOSPC, "No space left on device"),
+    "remounted read-only": lambda: sqlite3.OperationalError("attempt to write a readonly database"),
+    "EROFS": lambda: OSError(errno.EROFS, "Read-only file system"),
 }
 
 
@@ -431,15 +435,21 @@ def test_work_on_a_broken_disk_holds_the_robot(
     assert (field.controller.run.state, field.base.speed()) == ("HELD", 0.0)
 
 
-@pytest.mark.parametrize("reads", [False, True])
+READS_AND_WRITES = [(failure, False) for failure in FAILURES] + [
+    (failure, True) for failure, made in FAILURES.items() if isinstance(made(), sqlite3.Error)
+]
+"""Failures of writes, and of reads too, which are SQLite's alone."""
+
+
+@pytest.mark.parametrize(("failure", "reads"), READS_AND_WRITES)
 @pytest.mark.parametrize("state", [state for state in STATES if state != "ABORTED"])
 def test_a_robot_whose_disk_is_broken_obeys_stops_alone(
-    state: str, reads: bool, monkeypatch: pytest.MonkeyPatch
+    state: str, reads: bool, failure: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     field = started("hold")
     STATES[state](field)
     station = field.station(commander="test")
-    break_disk(field, monkeypatch, reads=reads)
+    break_disk(field, monkeypatch, failure, reads=reads)
     for verb in ("resume", "retry", "skip", "home", "start"):
         answer = field.order(verb)
         assert answer.outcome == "refused"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -16,7 +17,7 @@ from stopgo.bridge.station.follow import Followed, Silence
 from stopgo.bridge.station.freshness import LATE_S, Freshness
 from stopgo.bridge.station.watch import EventLines, EventObjects, RunTable, watch_with
 from stopgo.mission.errors import OutcomeUnknown
-from stopgo.mission.run.events import ReportsMissing, StateReport
+from stopgo.mission.run.events import Aborted, Paused, ReportsMissing, Resumed, Started, StateReport
 from tests.bridge.guarded import Router
 from tests.bridge.world import Field, corridor
 
@@ -72,8 +73,8 @@ class Watched:
             self.link.publisher(keys.state)(encode(self.field.agent._state()))
 
     def reports(self, seconds: float) -> list[tuple[float, Followed]]:
-        """What the station is told in that time, and when."""
-        told: list[tuple[float, Followed]] = []
+        """What the station is told in that time, and when; `told` has it also if that ends by an error."""
+        self.told = told = list[tuple[float, Followed]]()
         for report in self.station.reports():
             told.append((self.monotonic(), report))
             if self.monotonic() >= seconds:
@@ -167,6 +168,40 @@ def test_old_states_are_not_shown_as_new_ones(kind: str, monkeypatch: pytest.Mon
     assert [at for at, report in shown if report.state == "RUNNING"][-1] <= 5.0 + LATE_S
     if kind != "reorder":
         assert any("tel/state" in gap.words for _, gap in gaps(told))
+
+
+@pytest.mark.parametrize("topic", ["tel/state", "tel/pose", "tel/event", "/log"])
+@pytest.mark.parametrize("kind", ["drop", "repeat", "delay", "reorder"])
+def test_whatever_becomes_of_one_topic_nothing_old_is_shown_as_new(
+    kind: str, topic: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Events are told once and in order, states never go back, and none says RUNNING after the abort."""
+    watched = Watched(monkeypatch)
+    router = {
+        "drop": dropping(topic),
+        "repeat": repeating(topic),
+        "delay": delaying(watched, topic, 6.0),
+        "reorder": reordering(watched, topic),
+    }[kind]
+    watched.at(3.0, lambda: setattr(watched.router, "meddle", router))
+    watched.at(5.0, lambda: watched.field.order("pause"))
+    watched.at(7.0, lambda: watched.field.order("resume"))
+    watched.at(9.0, lambda: watched.field.order("abort"))
+    ended = True
+    with suppress(OutcomeUnknown):
+        watched.reports(25.0)
+        ended = False
+    told = watched.told
+    numbers = [
+        report.number for _, report in told if isinstance(report, Started | Paused | Resumed | Aborted)
+    ]
+    assert numbers == sorted(set(numbers))
+    states = [(at, report) for at, report in told if isinstance(report, StateReport)]
+    assert [report.seq for _, report in states] == sorted(report.seq for _, report in states)
+    assert max(at for at, report in states if report.state == "RUNNING") <= 9.0 + LATE_S
+    shown = [(at, gap.state) for at, gap in gaps(told) if gap.state is not None]
+    assert all(state.state != "RUNNING" for at, state in shown if at > 9.0 + LATE_S)
+    assert ended or "ABORTED" in (states[-1][1].state, shown[-1][1].state if shown else "")
 
 
 def test_a_whole_link_reports_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
