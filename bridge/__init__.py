@@ -1,4 +1,4 @@
-"""Carries a mission to a robot and brings back what became of it.
+"""Carries a mission to a robot and brings back its outcome.
 
 `station` is this end: push, command, status, follow. `robot` is the other: an agent keeps every word in a
 journal and lets the controller drive stop by stop through two small interfaces, `base.Base` and

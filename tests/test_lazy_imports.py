@@ -20,6 +20,10 @@ REASONS = {
     "stopgo.mission": "the version is looked up when it is asked for",
     "stopgo.mission.plan": "a plan is drawn where a notebook shows it",
     "stopgo.planner.candidates.triangulation": "scipy.spatial takes 0.4 s, and few plans triangulate",
+    "stopgo.planner.floors.linework.walls": "as candidates.triangulation: few drawings are loose linework",
+    "stopgo.planner.floors.linework.swings": "as candidates.triangulation",
+    "stopgo.planner.floors.rings": "as candidates.triangulation",
+    "stopgo.planner.routing.grid_graph": "as candidates.triangulation: few plans use grids",
     "stopgo.planner.pipeline": "`import stopgo.planner` loads no stage",
     "stopgo.recordings.viewing.importer": "Rerun asks of every file; most are not ours",
 }

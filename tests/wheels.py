@@ -1,4 +1,7 @@
-"""Builds the wheel and the source archive, and installs the wheel in fresh environments, one per extra.
+"""Builds the wheels and the source archive, and installs them in fresh environments, one per extra.
+
+There are two wheels: one for this platform and Python, with the planner's kernels compiled, and one for every
+machine without them, as robots need it. The former serves the extras that plan.
 
     python -m tests.wheels [PYTHON ...]
 
@@ -8,6 +11,7 @@ Each environment must plan, tell what is missing, or record, as its extra promis
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -45,20 +49,29 @@ EXTRAS: dict[str, Sequence[tuple[int, str, tuple[str, ...]]]] = {
 def main(pythons: Sequence[str]) -> int:
     """Build once, install everywhere; the number of environments that do not do what they promise."""
     with tempfile.TemporaryDirectory() as folder:
-        wheel = built(Path(folder))
+        compiled, pure = built(Path(folder))
         bad = [
             f"{python} [{extra}]: {problem}"
             for python in pythons
             for extra in EXTRAS
-            for problem in problems(wheel, python, extra, Path(folder))
+            for problem in problems(
+                compiled if extra in PLANS and python == sys.executable else pure, python, extra, Path(folder)
+            )
         ]
     for line in bad:
         print(line)
     return len(bad)
 
 
-def built(folder: Path) -> Path:
-    """The wheel, built from the source archive, once both hold what they must; of a tree without links."""
+PLANS = ("plan", "prove", "all")
+"""Extras that get the wheel with compiled kernels, where it is of the environment's Python."""
+
+
+def built(folder: Path) -> tuple[Path, Path]:
+    """The platform's wheel and the one for every machine, once all hold what they must.
+
+    Both are built from the source archive, of a tree without links.
+    """
     tree = folder / "tree"
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     files = {name for name in listed.splitlines() if not (ROOT / name).is_symlink()}
@@ -67,19 +80,30 @@ def built(folder: Path) -> Path:
         shutil.copy(ROOT / name, tree / name)
     run(sys.executable, "-m", "venv", str(folder / "builder"))
     run(str(folder / "builder" / "bin" / "pip"), "install", "-q", "build")
-    run(str(folder / "builder" / "bin" / "python"), "-m", "build", "--outdir", str(folder), str(tree))
+    build = (str(folder / "builder" / "bin" / "python"), "-m", "build", "--outdir")
+    run(*build, str(folder), str(tree))
     (archive,) = folder.glob("*.tar.gz")
+    shutil.unpack_archive(archive, folder / "source")
+    (source,) = (folder / "source").iterdir()
+    run(*build, str(folder / "pure"), "--wheel", str(source), STOPGO_PURE="yes")
     with tarfile.open(archive) as opened:
         held = {name.partition("/")[2] for name in opened.getnames()}
     assert files - {".gitignore"} <= held, files - held
-    (wheel,) = folder.glob("*.whl")
+    (wheel,), (pure,) = folder.glob("*.whl"), (folder / "pure").glob("*.whl")
+    assert pure.name.endswith("-py3-none-any.whl"), pure.name
+    held_by_pure = set(zipfile.ZipFile(pure).namelist())
     names = zipfile.ZipFile(wheel).namelist()
+    machine_code = {name for name in names if "_compiled." in name and not name.endswith(".pxd")}
+    assert len(machine_code) == len(list((ROOT / "planner").rglob("*_compiled.pxd"))), machine_code
+    assert not [
+        name for name in set(names) - held_by_pure if ".dist-info/" not in name and name not in machine_code
+    ]
     top = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
     assert top == {"stopgo"}, top
     for needed in (*REFERENCE, "recordings/samples/office.dxf", *TYPED):
         assert f"stopgo/{needed}" in names, needed
     print(f"{archive.name}: {len(held)} files; {wheel.name}: {len(names)} files", flush=True)
-    return wheel
+    return wheel, pure
 
 
 REFERENCE = (
@@ -124,8 +148,8 @@ def sample_mission() -> bytes:
     return encode(corridor())
 
 
-def run(*command: str) -> None:
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+def run(*command: str, **environment: str) -> None:
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env={**os.environ, **environment})
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ def answered(journal: Journal, order: RunCommand, run: Run) -> Answer | None:
 
 
 def answer_to(order: RunCommand, refused: Refused | None, run: Run, note: str = "") -> Answer:
-    """Return the answer to a command, with the state of the run after it; `note` is told if it was done."""
+    """Return the answer to a command, with the state of the run after it; `note` is added if it was done."""
     return Answer(
         cmd_id=order.cmd_id, verb=order.verb, outcome="refused" if refused else "ok",
         reason=refused.reason if refused else None, message=refused.message if refused else note,

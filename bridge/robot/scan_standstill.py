@@ -40,6 +40,6 @@ class ScanStandstill:
 
     @property
     def why(self) -> str:
-        """Motion of the base during the last scan, in words; empty if it stood, as far as its poses tell."""
+        """Motion of the base during the last scan, in words; empty if it stood, as far as its poses show."""
         with self._lock:
             return "" if self._motion is None else self._motion.why

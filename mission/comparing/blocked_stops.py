@@ -49,7 +49,7 @@ def held_reasons(log: RunLog, stops: Sequence[str]) -> dict[str, str]:
 
 
 def _with_place(held: Held, log: RunLog) -> str:
-    """Return the reason, with the robot's position if it does not name one and a pose tells it."""
+    """Return the reason, with the robot's position if it does not name one and a pose shows it."""
     index = log.poses.last_until(held.robot_ns)
     if _PLACE.search(held.reason) or index is None or not log.poses.is_known(index, held.robot_ns):
         return held.reason

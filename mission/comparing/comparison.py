@@ -75,7 +75,7 @@ class StopComparison:
 
     @property
     def is_doubtful(self) -> bool:
-        """True if nothing tells for certain that it was scanned, or that it was not."""
+        """True if nothing shows for certain that it was scanned, or that it was not."""
         return self.outcome == "unconfirmed" or self.disputed_m is not None or self.is_open
 
     @property
@@ -150,7 +150,7 @@ class CrossTrack:
     route: FloatArray
     """Distance along all legs since the start (n,); NaN on the way back."""
     route_end: float = math.nan
-    """The same where the driven path ended, by the events; NaN if they do not tell it."""
+    """The same where the driven path ended, by the events; NaN if they do not show it."""
 
     @property
     def greatest(self) -> int | None:

@@ -102,7 +102,7 @@ class PathFollower:
         self.begin_m = 0.0
         """Distance along all legs where the measured path begins; NaN on the way back."""
         self.end_m = 0.0
-        """Distance along all legs of the last leg's end that the events tell; NaN on the way back."""
+        """Distance along all legs of the last leg's end that the events report; NaN on the way back."""
 
     def take(self, event: AnyEvent, revised: Mission | None = None) -> None:
         """Take an event; for a `RevisionTaken`, `revised` is the new mission."""

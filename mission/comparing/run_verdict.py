@@ -38,7 +38,7 @@ class Judgement:
 
 
 def exit_code_of(judgements: Iterable[Judgement]) -> int:
-    """Return the exit code of several runs together: one `no` decides, then what cannot be told."""
+    """Return the exit code of several runs together: one `no` decides, then what is undecided."""
     codes = {judgement.exit_code for judgement in judgements}
     return next((code for code in (EXIT_CODES["no"], EXIT_CODES["unknown"]) if code in codes), 0)
 
@@ -81,7 +81,7 @@ def _sentences(comparison: Comparison) -> Iterator[str]:
 
 
 def _missing_evidence(comparison: Comparison) -> Iterator[str]:
-    """Yield what the evidence lacks, and what would tell it."""
+    """Yield what the evidence lacks, and what would supply it."""
     for item in comparison.asked:
         if item.disputed_m is not None:
             yield f"{item.stop} is undecided: {item.disputed_text}; check the scan's cloud."

@@ -22,7 +22,7 @@ STILL_M = 0.1
 def sighted_path(log: RunLog, mission: Mission, cross_track: CrossTrack) -> SightedPath:
     """Return the seen part of the path from the run's start to its end.
 
-    `mission` is the revision of the start, and `cross_track` tells where on the legs each pose is. A log
+    `mission` is the revision of the start, and `cross_track` states where on the legs each pose is. A log
     without any pose has no path. While its events say that the robot is at a stop, no path is missing.
     """
     poses = log.poses.between(log.began_ns or 0, log.ended_ns or 0)

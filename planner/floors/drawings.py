@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import FloatArray, polyline_length
 from stopgo.planner.floors.linework.swings import swings_of
@@ -97,8 +97,9 @@ def _groups(strokes: Sequence[Stroke]) -> list[list[int]]:
     if not strokes:
         return []
     cells, owner = _cells(strokes)
-    pairs = cKDTree(cells).query_pairs(APART, p=np.inf, output_type="ndarray")
-    label = _connected(len(cells), pairs)
+    around = shapely.box(*(cells - APART).T, *(cells + APART).T)
+    pairs = shapely.STRtree(shapely.points(cells)).query(around)
+    label = _connected(len(cells), pairs.T)
     label = _overlapping(label, cells)
     group = np.empty(len(strokes), dtype=np.int64)
     group[owner[:, 0]] = label[owner[:, 1]]

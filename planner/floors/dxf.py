@@ -52,7 +52,7 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
 
 
 def _sheet(drawing: Drawing, options: FloorOptions, path: Path) -> tuple[DxfSheet, WallLayers | None]:
-    """The drawing as interpreted; and layers that may hold its walls, where nothing tells for certain."""
+    """The drawing as interpreted; and layers that may hold its walls, where nothing shows it for certain."""
 
     def derive(sheet: DxfSheet) -> Derived:
         return _derived(sheet, path)

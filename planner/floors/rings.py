@@ -13,7 +13,6 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, Polygon, frozen, ring_area
@@ -196,6 +195,8 @@ def _bridges(
     ends = _free_ends(lines)
     if len(ends) < 2:
         return [], []
+    from scipy.spatial import cKDTree
+
     apart, nearest = cKDTree(ends).query(ends, k=[2])
     nearest = nearest[:, 0]
     mutual = np.flatnonzero((nearest[nearest] == np.arange(len(ends))) & (apart[:, 0] <= gap))

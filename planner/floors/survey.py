@@ -29,9 +29,9 @@ class FloorChoice:
     notes: tuple[str, ...] = ()
     """Notes for a person, such as `foundation` or `2 duplicates merged`."""
     aside: bool = False
-    """True if it is not planned unasked: a foundation, a roof, or a level without a floor."""
+    """True if it is not planned by default: a foundation, a roof, or a level without a floor."""
     reason: str = ""
-    """Reason why it is not planned unasked."""
+    """Reason why it is not planned by default."""
     has_rooms: bool = False
     """True if the model has doors or several rooms on it."""
     chosen: bool = False

@@ -30,14 +30,18 @@ from stopgo.planner.floors.strokes import Word, sketch
 from stopgo.planner.floors.units.unit_evidence import area_in
 
 ENOUGH = 2
-"""Evidence of this weight tells walls; one kind of it alone does not."""
+"""Evidence of this weight shows walls; one kind of it alone does not."""
 _MANY = 3
 """So many doors in gaps of walls are evidence of double weight."""
 _DOUBLE = 0.6
 """Walls are drawn as two lines if this fraction of the lines bounds a solid."""
+_CONNECTED = 15.0
+"""Passages lie between walls if connected ones have an outline of this mean length, in metres."""
 _LEAST_SHARE = 0.08
 """A layer with less than this fraction of the unknown lines holds no walls."""
-_MOST_LAYERS = 4
+_MOST_LAYERS, _MOST_OF_LARGE = 4, 2
+"""Layers that are tried, and those of a drawing with more than _LARGE shapes, where each trial takes long."""
+_LARGE = 4000
 _ALIKE = 0.05
 """A written area is true of a room if it differs by less than this fraction …"""
 _ROUNDED = 0.3
@@ -146,9 +150,11 @@ def _candidates(shapes: Sequence[Shape]) -> list[tuple[str, ...]]:
     for layer, length in _lengths(shapes):
         lengths[layer] = lengths.get(layer, 0.0) + length
     whole = sum(lengths.values())
-    names = sorted(lengths, key=lambda name: (-lengths[name], name))[:_MOST_LAYERS]
+    is_large = len(shapes) > _LARGE
+    names = sorted(lengths, key=lambda name: (-lengths[name], name))
+    names = names[: _MOST_OF_LARGE if is_large else _MOST_LAYERS]
     names = [name for name in names if lengths[name] >= _LEAST_SHARE * whole]
-    together = [tuple(sorted(names))] if len(names) > 1 else []
+    together = [tuple(sorted(names))] if len(names) > 1 and not is_large else []
     return [*((name,) for name in names), *together]
 
 
@@ -188,7 +194,7 @@ def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLay
         told.append((1, f"{shown.double:.0%} of the lines are walls of two lines"))
     if named > 1:
         told.append((1, f"{named} rooms have a name in them"))
-    if shown.passages > 1 and shown.double >= _DOUBLE:
+    if shown.passages > 1 and shown.double >= _DOUBLE and shown.component >= _CONNECTED:
         told.append((1, f"{shown.passages} passages lie between facing ends of walls"))
     weight = sum(item for item, _ in told)
     is_doubted = false > true or _is_no_storey(made, words)

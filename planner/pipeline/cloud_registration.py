@@ -12,7 +12,7 @@ from stopgo.mission.geometry import FloatArray
 SAMPLE = 2_000
 """Number of points that are examined of each cloud."""
 LEAST_POINTS = 50
-"""Fewer points of a cloud tell nothing."""
+"""Fewer points of a cloud show nothing."""
 FARTHEST_M, STEP_M = 0.5, 0.1
 """Range and step of the shifts that are tried, in x and y."""
 BETTER = 1.2

@@ -20,7 +20,6 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.errors import NegativeResult
@@ -252,6 +251,8 @@ def _across(here: FloatArray, there: FloatArray, room: BaseGeometry, free: BaseG
 
 def _visible_pairs(xy: FloatArray, free: BaseGeometry) -> IntArray:
     """Pairs (m, 2) of points that a short straight line joins: pockets between gaps may contain no node."""
+    from scipy.spatial import KDTree
+
     pairs = KDTree(xy).query_pairs(ACROSS, output_type="ndarray") if len(xy) else np.empty((0, 2), np.int64)
     lines = shapely.linestrings(xy[pairs]) if len(pairs) else np.empty(0, dtype=object)
     return pairs[shapely.covers(free, lines)].astype(np.int64)
@@ -259,6 +260,8 @@ def _visible_pairs(xy: FloatArray, free: BaseGeometry) -> IntArray:
 
 def nearest_seen(xy: FloatArray, nodes: FloatArray, free: BaseGeometry) -> tuple[IntArray, FloatArray]:
     """The nearest node that a straight line reaches: pairs (k, 2) of point and node, and the distance."""
+    from scipy.spatial import KDTree
+
     if not len(xy) or not len(nodes):
         return np.empty((0, 2), dtype=np.int64), np.empty(0)
     away, node = KDTree(nodes).query(xy, k=np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))

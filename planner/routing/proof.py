@@ -9,7 +9,6 @@ from __future__ import annotations
 import heapq
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
@@ -120,6 +119,8 @@ def _fixed(low: IntArray, high: IntArray, edge: int, times: int) -> tuple[IntArr
 
 def _better(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
     """The tour made of `edges`, if they form a tour that is shorter than the best one known."""
+    import networkx as nx
+
     graph = nx.Graph(edges.tolist())
     ring = nx.is_connected(graph) and len(graph) == len(cost) and all(d == 2 for _, d in graph.degree)
     if not ring:

@@ -7,16 +7,23 @@ one-tree's value is exact, however its weights were found.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from stopgo.mission.geometry import BoolArray, IntArray
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.routing.one_tree_kernel import grow
 
 STEPS = 300
-"""One-trees computed; a count, so that the bound does not depend on speed."""
-MANY = 300
-"""Points above which fewer one-trees are computed, since each takes longer."""
+"""One-trees computed for few points; a count, so that the bound does not depend on speed."""
+FEW = 120
+"""Points up to which branch and bound goes on from the bound."""
+WORK = 300_000_000
+"""Edges examined in all one-trees of more points, so that those of long tours are fewer."""
+MOST_STEPS = 3_000
+"""One-trees of more points."""
 PATIENCE = 12
 """One-trees without a higher bound after which steps are halved."""
 MEMORY = 0.3
@@ -46,21 +53,45 @@ def one_tree_bound(cost: IntArray, *, best: int) -> OneTree:
     The weight of a point rises if a one-tree uses the point too often, and falls if too seldom. Every tour
     changes by the same amount, so that the value less that amount remains a bound.
     """
-    weight, direction = np.zeros(len(cost)), np.zeros(len(cost))
-    highest = tree = one_tree(cost, weight.astype(np.int64))
-    scale, waited = 1.0, 0
-    for _ in range(STEPS * MANY // max(MANY, len(cost))):
-        off = (tree.degree - 2).astype(float)
-        if not off.any() or highest.value >= best:
+    n = len(cost)
+    weight, direction = np.zeros(n), np.zeros(n)
+    highest = weight.astype(np.int64)
+    tree_at = _growing(cost)
+    value, degree = tree_at(highest)
+    most, scale, waited = value, 1.0, 0
+    for _ in range(STEPS if n <= FEW else min(MOST_STEPS, WORK // n**2)):
+        off = (degree - 2).astype(float)
+        if not off.any() or most >= best:
             break
         direction = off + MEMORY * direction
-        weight += scale * max(best - tree.value, 1) / float(off @ off) * direction
-        tree = one_tree(cost, np.rint(weight).astype(np.int64))
-        waited = 0 if tree.value > highest.value else waited + 1
-        highest = tree if tree.value > highest.value else highest
+        weight += scale * max(best - value, 1) / float(off @ off) * direction
+        rounded = np.rint(weight).astype(np.int64)
+        value, degree = tree_at(rounded)
+        waited = 0 if value > most else waited + 1
+        if value > most:
+            most, highest = value, rounded
         if waited == PATIENCE:
             scale, waited = scale / 2, 0
-    return highest
+    return one_tree(cost, highest)
+
+
+def _growing(cost: IntArray) -> Callable[[IntArray], tuple[int, IntArray]]:
+    """The value of the smallest one-tree at given weights, and the degrees of its points (n,)."""
+    n = len(cost)
+    kernel = compiled(grow, large=n > FEW)
+    if kernel is None:
+        return lambda weight: _told(one_tree(cost, weight))
+    flat, scratch = np.ascontiguousarray(cost).ravel(), np.zeros((2, n), dtype=np.int64)
+
+    def grown(weight: IntArray) -> tuple[int, IntArray]:
+        degree = np.empty(n, dtype=np.int64)
+        return kernel(flat, weight, scratch[0], scratch[1], degree), degree
+
+    return grown
+
+
+def _told(tree: OneTree) -> tuple[int, IntArray]:
+    return tree.value, tree.degree
 
 
 def one_tree(cost: IntArray, weight: IntArray) -> OneTree:

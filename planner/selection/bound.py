@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.linear_programme import minimised
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes 1 s at this size."""
@@ -116,20 +116,16 @@ def relaxation_bound(cover: Cover) -> int:
 def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:
     """Dual prices of the columns (columns,) and of the demands; None if the solver fails."""
     rows, columns = cover.rows, cover.columns
-    seen = hstack([-cover.sees.T, diags_array(cover.asks.astype(float))], format="csr")
+    seen = hstack([cover.sees.T, diags_array(-cover.asks.astype(float))])
     worth, needed, scale = scaled(cover)
-    demand = hstack([csr_array((len(needed), rows)), -worth], format="csr")
-    solution = linprog(
+    demand = hstack([csr_array((len(needed), rows)), worth])
+    solution = minimised(
         np.concatenate([np.ones(rows), np.zeros(columns)]),
-        A_ub=vstack([seen, demand], format="csr"),
-        b_ub=np.concatenate([np.zeros(columns), -needed]),
-        bounds=[(0, None if cover.once else 1)] * rows + [(0, 1)] * columns,
-        method="highs",
+        vstack([seen, demand]),
+        np.concatenate([np.zeros(columns), needed]),
+        np.concatenate([np.full(rows, np.inf if cover.once else 1.0), np.ones(columns)]),
     )
-    if solution.status != 0:
-        return None
-    duals = np.maximum(-np.asarray(solution.ineqlin.marginals), 0.0)
-    return duals[:columns], duals[columns:] / scale
+    return None if solution is None else (solution.prices[:columns], solution.prices[columns:] / scale)
 
 
 def scaled(cover: Cover) -> tuple[csr_array, FloatArray, float]:

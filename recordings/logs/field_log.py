@@ -77,7 +77,7 @@ class Poses:
     height: FloatArray | None = None
     """Heights (n,), metres upwards from any level; None where the source has none."""
     restarts_ns: tuple[int, ...] = ()
-    """Times of the first data after each restart of the robot, where the log tells it."""
+    """Times of the first data after each restart of the robot, where the log reports it."""
 
     @property
     def seconds(self) -> float:

@@ -27,6 +27,10 @@ MOST_LABELS = 300
 """Number of stops above which only stops that need attention are named."""
 FOOT = 0.035
 """Height of the strip with scale bar and north arrow, as a fraction of the floor's size."""
+LEAST_PX, LEAST_MM = 11.0, 2.5
+"""Smallest text on a screen, where a narrow one scrolls, and on paper."""
+PAPER_MM = 170.0
+"""Greatest width and height of the plan on paper, as in the page's style."""
 BARS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """Lengths of the scale bar."""
 SLACK_M = 0.5
@@ -53,7 +57,11 @@ def plan_picture(
         *_scale_bar(frame),
         *_north(mission, frame),
     ]
-    return tag("svg", *layers, class_="plan", viewBox=frame.view, role="img", aria_label="plan of the floor")
+    picture = tag(
+        "svg", *layers, class_="plan", viewBox=frame.view, role="img", aria_label="plan of the floor",
+        style=f"min-width:{LEAST_PX * frame.width / frame.least:.0f}px",
+    )  # fmt: skip
+    return tag("div", picture, class_="scroll")
 
 
 @dataclass(frozen=True)
@@ -83,7 +91,7 @@ class PictureFrame:
     @property
     def least(self) -> float:
         """Smallest readable text size, metres; a name that would be smaller is left out."""
-        return 0.0055 * max(self.width, self.height)
+        return LEAST_MM / PAPER_MM * max(self.width, self.height)
 
     @property
     def view(self) -> str:
@@ -112,7 +120,7 @@ def is_closed(line: FloatArray) -> bool:
 def _scale_bar(frame: PictureFrame) -> Iterator[str]:
     """Yield a bar of a round length, below the floor."""
     length = max((m for m in BARS_M if m <= frame.width / 3), default=BARS_M[0])
-    size, x, y = 2.5 * frame.least, 0.02 * frame.width, frame.height - 0.01 * frame.width
+    size, x, y = frame.least, 0.02 * frame.width, frame.height - 0.01 * frame.width
     yield stroke(f"M{x:.3f} {y - size / 2:.3f}V{y:.3f}H{x + length:.3f}V{y - size / 2:.3f}", INK, 1.5)
     yield tag(
         "text", f"{length:g} m", x=f"{x + length + size / 2:.3f}", y=f"{y:.3f}", font_size=f"{size:.3f}"
@@ -163,7 +171,7 @@ def _floor(subject: ReportSubject, frame: PictureFrame) -> Iterator[str]:
     for name, x, y in floor.names:
         px, py = frame.to_picture(x, y)
         fitting = _room_width(floor.rooms, x, y) / max(text_width(name, 1.0), 1.0)
-        size = min(0.011 * max(frame.width, frame.height), fitting)
+        size = min(frame.least, fitting)
         if size < frame.least:
             continue
         at = {"x": f"{px:.3f}", "y": f"{py + 1.6 * size:.3f}", "font_size": f"{size:.3f}"}
@@ -223,7 +231,11 @@ def _gaps(comparison: Comparison, frame: PictureFrame) -> Iterator[str]:
         if gap in named:
             x, y = np.mean([frame.to_picture(*gap.begin), frame.to_picture(*gap.end)], axis=0).tolist()
             label = f"{duration(gap.seconds)}, {gap.metres:.1f} m unseen"
-            size = {"font_size": f"{1.1 * frame.mark:.3f}", "text_anchor": "middle", "fill": "#6b2a55"}
+            size = {
+                "font_size": f"{max(1.1 * frame.mark, frame.least):.3f}",
+                "text_anchor": "middle",
+                "fill": "#6b2a55",
+            }
             halo = {"stroke": "#fff", "stroke_width": f"{0.25 * frame.mark:.3f}", "paint_order": "stroke"}
             yield tag("text", shown(label), x=f"{x:.3f}", y=f"{y:.3f}", **size, **halo)
 
@@ -273,14 +285,20 @@ def _cross(stop: Stop, label: str, frame: PictureFrame, *, over: bool) -> str:
     at = {"x": f"{x - r:.3f}", "y": f"{y - r:.3f}", "width": f"{2 * r:.3f}", "height": f"{2 * r:.3f}"}
     square = tag("rect", tag("title", shown(label)), fill=VERMILION if over else "#fff", **at, **OUTLINE)
     strokes = (f"M{x - k:.3f} {y + side * k:.3f}L{x + k:.3f} {y - side * k:.3f}" for side in (1, -1))
-    label_position = {"x": f"{x + 1.5 * r:.3f}", "y": f"{y + 0.4 * r:.3f}", "font_size": f"{1.3 * r:.3f}"}
+    label_position = {
+        "x": f"{x + 1.5 * r:.3f}",
+        "y": f"{y + 0.4 * r:.3f}",
+        "font_size": f"{max(1.3 * r, frame.least):.3f}",
+    }
     halo = {"stroke": "#fff", "stroke_width": f"{0.25 * r:.3f}", "paint_order": "stroke"}
     text = tag("text", shown(label), font_weight="bold", fill="#8a3000", **label_position, **halo)
     return square + stroke("".join(strokes), "#fff" if over else INK, 2) + text
 
 
 def _letter(x: float, y: float, content: str, frame: PictureFrame) -> str:
-    size = frame.mark * (1.15 if len(content) < 3 else 0.85)
+    size = max(frame.mark * (1.15 if len(content) < 3 else 0.85), frame.least)
+    if text_width(content, size) > 2.6 * frame.mark:  # stops are too close together for readable numbers
+        return ""
     return tag("text", shown(content), x=f"{x:.3f}", y=f"{y + 0.36 * size:.3f}", font_size=f"{size:.3f}",
                font_weight="bold", text_anchor="middle")  # fmt: skip
 

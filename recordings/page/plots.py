@@ -94,7 +94,9 @@ def _plot(title: str, curves: Sequence[PlotLine]) -> str:
     x = np.concatenate([curve.x for curve in curves])
     y = np.concatenate([curve.y for curve in curves])
     low, high = min(0.0, float(y.min())), max(0.0, float(y.max()))
-    scale = _Scale(float(x.min()), max(float(x.max()), float(x.min()) + 1e-9), low, max(high, low + 1e-9))
+    scale = _Scale(
+        float(x.min()), max(float(x.max()), float(x.min()) + 1e-9), low, high if high > low else low + 1.0
+    )
     lines = [*_axes(scale), *(_curve(curve, scale) for curve in curves)]
     picture = tag("svg", *lines, width=WIDTH, height=HEIGHT, viewBox=f"0 0 {WIDTH} {HEIGHT}")
     return tag("figure", picture, tag("figcaption", shown(title)))

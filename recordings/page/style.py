@@ -33,7 +33,7 @@ h1 small { font-weight: normal; color: #5a5e66; font-size: 13px; }
 .states div { overflow: hidden; white-space: nowrap; padding: 1px 3px; border-right: 1px solid #fff; }
 .legend { font-size: 12px; color: #333; margin: 6px 0 10px; }
 .legend svg { vertical-align: -2px; margin: 0 4px 0 12px; }
-svg.plan { width: 100%; max-height: 720px; display: block; }
+svg.plan { width: 100%; max-height: 760px; display: block; }
 table { border-collapse: collapse; font-size: 13px; }
 th { text-align: left; border-bottom: 1.5px solid #888; } td { border-bottom: 1px solid #dcdee2; }
 th, td { padding: 3px 8px; vertical-align: top; } .number { text-align: right; white-space: nowrap; }
@@ -42,16 +42,20 @@ tr.missing td { background: #fde8dc; font-weight: 600; }
 .bar { width: 130px; height: 9px; background: #e8e9ec; position: relative; margin-top: 5px; }
 .bar div { height: 100%; }
 .bar i { position: absolute; top: -2px; bottom: -2px; width: 2px; background: #111; }
-.scroll { overflow-x: auto; } .plots { display: flex; flex-wrap: wrap; gap: 16px; }
+.scroll { overflow-x: auto; }
+.plots figure, .columns section { max-width: 100%; overflow-x: auto; }
+.plots { display: flex; flex-wrap: wrap; gap: 16px; }
 figure { margin: 0; } figcaption { font-size: 12px; color: #333; }
 ul { margin: 0; padding-left: 20px; } code { font-size: 12px; word-break: break-all; }
-@page { size: A4; margin: 12mm; }
+@page { size: A4; margin: 12mm 12mm 15mm;
+  @bottom-right { content: counter(page) " / " counter(pages); font: 10px sans-serif; } }
 @media print { body { max-width: none; padding: 0; font-size: 10.5px; } table { font-size: 9.5px; }
   h2 { break-after: avoid; } tr, .tile, .band, figure, svg.plan { break-inside: avoid; }
   thead { display: table-header-group; }
   .run { break-before: page; } .run:first-of-type { break-before: auto; }
-  svg.plan { max-height: 170mm; } .scroll { overflow: visible; } code { font-size: 9.5px; }
+  svg.plan { max-height: 170mm; min-width: 0 !important; } small { font-size: 9.6px !important; }
+  .scroll, .columns section { overflow: visible; } code { font-size: 9.5px; }
   .band { font-size: 13px; padding: 8px 12px; } .tile { min-width: 0; padding: 4px 8px; }
-  .tile b { font-size: 14px; } .plots svg { width: 58mm; height: auto; } .plots { gap: 3mm; }
+  .tile b { font-size: 14px; } .plots svg { width: 88mm; height: auto; } .plots { gap: 3mm; }
   .columns { gap: 0 8mm; } .bar { width: 90px; } h2 { font-size: 13px; margin: 12px 0 4px; } }
 """

@@ -3,7 +3,7 @@
 Wheels that are a little larger than assumed, and a gyroscope with an offset, bend and stretch a path in the
 same way all the time. Six numbers describe that: shift and turn of the whole, scale, and turns per metre and
 per second. They are fitted to the offsets of all visits. Each stop is then judged by the fit without it, so
-that a robot that stood elsewhere at one stop is told apart from drift. Without enough visits, or with offsets
+that a position error at one stop is distinguished from drift. Without enough visits, or with offsets
 that such a drift does not explain, there is no answer.
 """
 

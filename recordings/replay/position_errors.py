@@ -2,7 +2,7 @@
 
 Offsets that point to one side at stops that follow each other are drift, or a frame that lies elsewhere.
 Both look the same as a robot that stood elsewhere each time, so that the common part is uncertain. Where the
-visits suffice, a fit of the drift tells both apart (`drift_model`).
+visits suffice, a fit of the drift separates both (`drift_model`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from stopgo.recordings.replay.matching import Match
 from stopgo.recordings.replay.path_and_time import smoothed_track
 from stopgo.recordings.replay.replayed import Replay
 
+PARKED = 2
+"""Standstills at no stop that every run has: before its start, and at the end."""
 NEIGHBOURS = 4
 """Number of visits around a stop whose common offset is its uncertainty."""
 COHERENT = 0.5
@@ -45,6 +47,11 @@ class PositionErrors:
     visits: tuple[int, ...]
     """Indices of the visited stops, in the order of `drift`."""
 
+    @property
+    def drifts(self) -> bool:
+        """True if the offsets of the visits are drift, or may be."""
+        return self.drift is not None or bool(np.isinf(self.most_m).any())
+
     def without_drift(self, stop: int) -> tuple[float, float] | None:
         """Return the position error at a stop without the fitted drift, and its uncertainty."""
         if self.drift is None or stop not in self.visits:
@@ -66,7 +73,8 @@ def position_errors(replay: Replay) -> PositionErrors:
     left, least = _left_of(offsets, common), min(stop.tolerance_m for stop in replay.mission.stops)
     drift = _drift(replay, visits, stops, least) if np.hypot(*offsets.T).max() > least / 2 else None
     if is_tied(replay) and drift is None and (len(visits) < NEIGHBOURS or left >= COHERENT):
-        return PositionErrors(sure, sure, None, indices)
+        scattered = np.median(np.hypot(*offsets.T)) <= least or len(replay.extra) <= PARKED
+        return PositionErrors(sure, sure if scattered else np.full(len(stops), np.inf), None, indices)
     by_stop = dict(zip(indices, np.hypot(*common.T).tolist(), strict=True))
     everywhere = float(np.hypot(*np.median(offsets, axis=0)))
     unsure = np.maximum([by_stop.get(k, everywhere) for k in range(len(stops))], _residual(replay, offsets))

@@ -162,7 +162,7 @@ def _blind(occupied: IntArray, xy: FloatArray, step_s: float, reach: float) -> B
 def _noise(values: FloatArray, occupied: IntArray) -> FloatArray:
     """Return the standard deviation of each column (n, 3), from the median of second differences.
 
-    Of poses farther apart than DENSE_S, a difference is the robot's manoeuvre, and tells nothing of noise.
+    Of poses farther apart than DENSE_S, a difference is the robot's manoeuvre, and shows nothing of noise.
     """
     dense = occupied[2:] - occupied[:-2] <= 2 * DENSE_S / BIN_S
     if dense.sum() < 3:

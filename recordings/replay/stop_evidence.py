@@ -46,7 +46,7 @@ def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
 def _evidence(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
     unsure_m = float(errors.unsure_m[number])
     if item.outcome not in DONE:
-        why = why_unseen(replay, number, unsure_m) if replay.inferred else ""
+        why = why_unseen(replay, number, unsure_m, drifts=errors.drifts) if replay.inferred else ""
         return StopEvidence(item, "unknown" if why else "no", why)
     if item.deviation_m is None:
         return StopEvidence(item, "unknown", "no pose in the log; the robot's own log may have it")
@@ -57,7 +57,7 @@ def _evidence(replay: Replay, number: int, item: StopComparison, errors: Positio
     if where:
         return StopEvidence(item, "unknown", where)
     if within == "no" and replay.inferred:
-        why = why_unseen(replay, number, unsure_m, halted=True)
+        why = why_unseen(replay, number, unsure_m, halted=True, drifts=errors.drifts)
         return StopEvidence(item, "unknown" if why else "no", why)
     return StopEvidence(item, within)
 

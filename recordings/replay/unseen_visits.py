@@ -10,6 +10,7 @@ import numpy as np
 
 from stopgo.mission.document import Stop
 from stopgo.mission.run.run_log import Track
+from stopgo.recordings.replay.fitting import STRETCH
 from stopgo.recordings.replay.matching import REACH_M, Match, least_stay_s, long_enough
 from stopgo.recordings.replay.position_errors import lasting_jump
 from stopgo.recordings.replay.replayed import Replay
@@ -22,12 +23,14 @@ FASTER = 1.5
 """Speed in a gap, as a multiple of the mission's, up to which a robot may have driven to a stop and back."""
 
 
-def why_unseen(replay: Replay, number: int, unsure_m: float, *, halted: bool = False) -> str:
+def why_unseen(
+    replay: Replay, number: int, unsure_m: float, *, halted: bool = False, drifts: bool = False
+) -> str:
     """Return why a good visit of a stop may have happened unseen; empty if the poses exclude one.
 
     Stops may be visited in any order, so that every gap counts that is long enough to drive there, scan and
     drive on. `unsure_m` is the uncertainty of positions. `halted`: the robot halted near it for long enough,
-    so that only its shorter halts within tolerance count.
+    so that only its shorter halts within tolerance count. `drifts`: a halt at no stop may have been there.
     """
     stop, track = replay.mission.stops[number], replay.run.poses
     if not len(track):
@@ -43,7 +46,7 @@ def why_unseen(replay: Replay, number: int, unsure_m: float, *, halted: bool = F
         _in_a_gap(replay, stop, unsure_m),
         _before_or_after(replay),
         _after_a_jump(track),
-        _elsewhere_by_drift(replay, stop, unsure_m),
+        _elsewhere_by_drift(replay, stop, unsure_m, drifts=drifts),
     )
     return next((reason for reason in reasons if reason), "")
 
@@ -140,7 +143,7 @@ BEGINS_LATE = "the log begins after the start of the mission; give an earlier lo
 def _over(replay: Replay) -> bool:
     """True if the log goes on until the robot is back at the end of the return, or has parked near it.
 
-    Without a return, the run is over when the robot has scanned at the last stop and halts nowhere else.
+    Without a return, the run is over when the robot has scanned at the last stop and stands nowhere else.
     """
     mission, end, track = replay.mission, (replay.mission.return_ or ())[-1:], replay.run.poses
     if end:
@@ -171,10 +174,12 @@ def _after_a_jump(track: Track) -> str:
     return f"the poses jump by {jump[1]:.1f} m and do not come back; give poses matched to a map"
 
 
-def _elsewhere_by_drift(replay: Replay, stop: Stop, unsure_m: float) -> str:
+def _elsewhere_by_drift(replay: Replay, stop: Stop, unsure_m: float, *, drifts: bool) -> str:
     """Return whether a long standstill at no stop may have been at this one, by unsure poses."""
-    reach = stop.tolerance_m + 2 * unsure_m
+    track = replay.run.poses
     for match in replay.matches:
+        path_m = track.between(int(track.ns[0]), match.standstill.begin_ns).length_m if drifts else 0.0
+        reach = stop.tolerance_m + 2 * unsure_m + STRETCH * path_m
         away = math.dist(match.standstill.xy, (stop.x, stop.y))
         if match.stop is None and away <= reach and long_enough(match.standstill, stop):
             return DRIFTS

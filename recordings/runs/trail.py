@@ -19,7 +19,7 @@ POINT_DISTANCE_M = 0.05
 STRIP_S = 1.0
 """Duration of one strip of the path."""
 MOST_STEPS = 1000
-"""Number of last steps that tell the robot's usual one."""
+"""Number of last steps that show the robot's usual one."""
 
 
 class Thinner:

@@ -17,7 +17,7 @@ import numpy as np
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings, recorded_values
 
-LIBRARIES = ("numpy", "scipy", "shapely", "highspy", "networkx", "numba", "ezdxf", "ifcopenshell", "pyvrp")
+LIBRARIES = ("numpy", "scipy", "shapely", "highspy", "networkx", "ezdxf", "ifcopenshell", "pyvrp")
 """Libraries whose version may change a plan."""
 CODE = ("mission", "planner", "recordings")
 """Folders of stopgo that make a plan's files."""

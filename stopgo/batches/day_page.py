@@ -17,7 +17,7 @@ from stopgo.mission.files.file_name import file_name
 from stopgo.recordings.page import whole_page
 from stopgo.recordings.page.words import grid, row, section, shown, tag
 
-COLUMNS = ("begins", "ends", "plan", "stops", "way before", "driving and scanning", "files")
+COLUMNS = ("begins", "ends", "plan", "stops", "path before", "driving and scanning", "files")
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,7 @@ def read_ways(path: Path | None) -> dict[tuple[str, str], float]:
 
 
 def _text(path: Path) -> str:
-    return bytes_of(path, "give the ways as CSV: from, to, minutes").decode("utf-8-sig", errors="replace")
+    return bytes_of(path, "give the paths as CSV: from, to, minutes").decode("utf-8-sig", errors="replace")
 
 
 def plan_day(

@@ -26,7 +26,7 @@ class ModelStorey:
     planned: bool
     """True if `plan --all-storeys` plans it."""
     reason: str = ""
-    """Reason why it is not planned unasked."""
+    """Reason why it is not planned by default."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Expansion:
     entries: tuple[Entry, ...]
     problems: tuple[EntryFault, ...]
     left_out: tuple[str, ...]
-    """Storeys that no pattern names and that are not planned unasked, one sentence each."""
+    """Storeys that no pattern names and that are not planned by default, one sentence each."""
 
 
 def files_of(group: FloorGroup) -> list[Path]:
@@ -151,7 +151,7 @@ def _entry(group: FloorGroup, floor: Path, axes: Mapping[str, str], variant: Map
 def _chosen(
     group: FloorGroup, floor: Path, storeys: Sequence[ModelStorey], left_out: dict[str, None]
 ) -> list[str | None]:
-    """Names of the storeys that the group's patterns choose; without a pattern those planned unasked.
+    """Names of the storeys that the group's patterns choose; without a pattern those planned by default.
 
     Raises
     ------

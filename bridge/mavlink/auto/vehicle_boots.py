@@ -1,4 +1,4 @@
-"""Boots of a vehicle, told from its own clock: a restart, a link that delivers late, or neither.
+"""Boots of a vehicle, found by its own clock: a restart, a link that delivers late, or neither.
 
 A clock that went back was restarted. A report that seems to come from a later boot may also be one that the
 link has delayed. It is a delayed one if the vehicle's clock has run for longer than nobody listened.
@@ -71,7 +71,7 @@ class VehicleBoots:
         return (self._seen.seen_ns - self._seen.seen_ms * 10**6 - self._earliest_ns) / 1e9
 
     def take(self, now_ns: int, boot_ms: int, *, armed: bool = False) -> BootVerdict:
-        """Take a report, and tell whether the vehicle was restarted since the last one."""
+        """Take a report, and return whether the vehicle was restarted since the last one."""
         with self._lock:
             return self._take(now_ns, boot_ms, armed=armed)
 

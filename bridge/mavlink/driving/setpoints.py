@@ -31,7 +31,7 @@ class Setpoints:
 
     @property
     def is_driving(self) -> bool:
-        """True if the vehicle may still follow a course that it was sent: a halt ends it."""
+        """True if the vehicle may still follow a course that it was sent: a standstill ends it."""
         return time.monotonic() - self._course_s < COURSE_S
 
     def go_to(self, position: Point) -> None:

@@ -34,7 +34,7 @@ def read_stretches(path: Path, mission: Mission) -> Stretches:
     Raises
     ------
     InputError
-        When the file cannot be read, or tells the coverage of another mission.
+        When the file cannot be read, or has the coverage of another mission.
     """
     coverage = read_coverage(path, mission)
     segments = [

@@ -99,7 +99,7 @@ def _node(waypoint: Waypoint, name: str, sequence: int, mission: Mission, editio
     return {
         "nodeId": name,
         "sequenceId": sequence,
-        f"node{edition.told}": "passed on the way" if stop is None else "scan stop",
+        f"node{edition.told}": "passed on the route" if stop is None else "scan stop",
         "released": True,
         "nodePosition": {
             **{"x": round(waypoint.x, 6), "y": round(waypoint.y, 6)},

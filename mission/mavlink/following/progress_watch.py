@@ -10,7 +10,7 @@ from stopgo.mission.mavlink.read_back import point_at
 from stopgo.mission.run.events import Pose
 
 STALLED_S = 8.0
-"""Standstill that no item explains: longer than a start takes, and told within 10 s."""
+"""Standstill that no item explains: longer than a start takes, and reported within 10 s."""
 RESTARTED_NS = 10**9
 """A clock that goes back by more began again."""
 REACHED_M = 1.0

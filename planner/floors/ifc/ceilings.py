@@ -18,6 +18,8 @@ THICK = 0.5
 """A ceiling is thinner than this, metres."""
 LEAST_PART = 0.02
 """Square metres from which a part of a beam counts."""
+BARE = 0.1
+"""A beam of which less than this fraction is outside of walls lies in them; the bearings of others count."""
 REVEAL = 0.02
 """A beam that hangs lower than a ceiling by more than this is seen below it, metres."""
 
@@ -35,7 +37,9 @@ def without_hidden_beams(
             continue
         underside, top = model.meshes[item.product.global_id].z
         below = [region for z, region in ceilings if z < underside + REVEAL]
-        left = _left(item.region, [*below, *_around(item, model, (underside + top) / 2 + OFF_LEVEL)])
+        left = _left(item.region, below)
+        if _left(left, _around(item, model, (underside + top) / 2 + OFF_LEVEL)).area <= BARE * left.area:
+            left = NOTHING
         whole += item.region.length
         hidden += item.region.length - left.length if left.area < item.region.area else 0.0
         if not left.is_empty:
@@ -48,6 +52,8 @@ def without_hidden_beams(
 
 def _around(beam: Solid, model: Model, z: float) -> list[Region]:
     """Sections, at a beam's middle height, of what it lies in."""
+    if beam.region.is_empty:
+        return []
     x0, y0, x1, y1 = beam.region.bounds
     found = []
     for _, mesh in model.of_role(*AROUND):

@@ -48,7 +48,7 @@ class Level:
     """GlobalIds of those storeys."""
     notes: tuple[str, ...] = ()
     reason: str = ""
-    """Reason not to plan it unasked, such as a roof; empty if people walk there."""
+    """Reason not to plan it by default, such as a roof; empty if people walk there."""
     lively: bool = False
     """True if it has doors or several rooms."""
 

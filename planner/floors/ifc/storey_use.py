@@ -1,4 +1,4 @@
-"""Use of each storey: the floor with head room, what covers it, and the reason not to plan it unasked."""
+"""Use of each storey: the floor with head room, what covers it, and the reason not to plan it by default."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ PATTERN = 150
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Traits of a building in line work, by which it is told from other lines."""
+    """Traits of a building in line work, by which it is distinguished from other lines."""
 
     double: float = 0.0
     """Fraction of the walls' lines that run in pairs and bound a solid."""
@@ -61,6 +61,8 @@ class Shown:
     """In the drawing's frame, metres."""
     closed_over: float = 0.0
     """The widest gap of the outer walls that was closed, metres."""
+    component: float = 0.0
+    """Mean outline in metres of walls that are connected: tables and shelves are many short ones."""
     stray: float = 0.0
     """Fraction of the walls' lines that lie off the floor."""
 
@@ -187,8 +189,15 @@ def _shown(
         passages=sum(gap.kind == "passage" and gap.depth > _LABEL_CUT for gap in gaps),
         rooms=tuple(shapely.transform(list(found), lambda xy: xy + site.origin)),
         closed_over=spaces.closed_over or 0.0,
+        component=_component(walls),
         stray=_stray(walls, spaces.floor),
     )
+
+
+def _component(walls: SolidWalls) -> float:
+    """Mean length of the outlines of connected solid walls."""
+    parts = polygons_of(shapely.union_all(list(walls.solids))) if walls.solids else []
+    return sum(part.length for part in parts) / len(parts) if parts else 0.0
 
 
 def _stray(walls: SolidWalls, floor: Region) -> float:

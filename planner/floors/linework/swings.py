@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import FloatArray
 
@@ -82,6 +81,8 @@ class _RoundLines:
     """Asks what is drawn at the centre and the ends of arcs."""
 
     def __init__(self, lines: Sequence[FloatArray], swings: Sequence[Swing]) -> None:
+        from scipy.spatial import cKDTree
+
         pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
         segments = np.concatenate(pieces)
         self._ends = np.concatenate([segments, segments[:, ::-1]])

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import BoolArray, FloatArray
 from stopgo.planner.floors.rings import Region, polygons_of
@@ -157,6 +156,8 @@ def _to_lines(ends: FloatArray, drawn: FloatArray) -> tuple[BoolArray, FloatArra
 
 def _caps(ends: FloatArray, direction: FloatArray) -> FloatArray:
     """Segments that close double lines which simply end, side by side, such as at a door."""
+    from scipy.spatial import cKDTree
+
     if len(ends) < 2:
         return np.empty((0, 2, 2))
     pairs = cKDTree(ends).query_pairs(THICK, output_type="ndarray")

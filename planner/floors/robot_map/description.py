@@ -17,7 +17,7 @@ _KNOWN = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_th
 _WRITTEN_UNKNOWN: dict[str, tuple[int, ...]] = {"trinary": (205,), "scale": (127, 128, 205), "raw": ()}
 """Grey values that map savers write for unknown cells, by mode.
 
-Thresholds cannot tell them: 205 is a probability of 0.196, which the free_thresh of 0.25 of older maps
+Thresholds do not show them: 205 is a probability of 0.196, which the free_thresh of 0.25 of older maps
 takes for free. Trinary maps have it for nothing else, and no whole percent gives it in scale. A scale map
 saved as PGM loses its transparency, and leaves half grey. Raw values above 100 are unknown in any case.
 """

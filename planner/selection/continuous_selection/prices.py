@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
 from scipy.sparse import coo_array, csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.selection.linear_programme import minimised
 from stopgo.planner.visibility.unit_ranges import ranges
 
 
@@ -61,26 +61,24 @@ def prices_of(asked: WantedUnits, row: IntArray, first: IntArray, last: IntArray
     entries = np.tile(asked.weight[inside] / scale, len(which))[belongs.ravel()]
     places = (which[belongs], np.tile(group[inside], (len(which), 1))[belongs])
     worth = coo_array((entries, places), shape=(len(asked.needed), groups)).tocsr()
-    solution = linprog(
+    solution = minimised(
         np.concatenate([np.ones(rows), np.zeros(groups)]),
-        A_ub=vstack(
+        vstack(
             [
-                hstack([-sees.T, diags_array(np.ones(groups))]),
-                hstack([csr_array((len(asked.needed), rows)), -worth]),
-            ],
-            format="csr",
+                hstack([sees.T, diags_array(-np.ones(groups))]),
+                hstack([csr_array((len(asked.needed), rows)), worth]),
+            ]
         ),
-        b_ub=np.concatenate([np.zeros(groups), -asked.needed / scale]),
-        bounds=[(0, None)] * rows + [(0, 1)] * groups,
-        method="highs",
+        np.concatenate([np.zeros(groups), asked.needed / scale]),
+        np.concatenate([np.full(rows, np.inf), np.ones(groups)]),
     )
-    if solution.status != 0:
+    if solution is None:
         return None
-    duals = np.maximum(-np.asarray(solution.ineqlin.marginals), 0.0)
+    duals = solution.prices
     weight = np.bincount(group[inside], asked.weight[inside], groups)
     unit = np.zeros(len(asked.weight))
     unit[inside] = (duals[:groups] / weight)[group[inside]] * asked.weight[inside]
-    return Prices.of(asked, unit, duals[groups:] / scale, solution.x[:rows])
+    return Prices.of(asked, unit, duals[groups:] / scale, solution.values[:rows])
 
 
 def _groups(

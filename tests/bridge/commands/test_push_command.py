@@ -223,7 +223,7 @@ def test_a_key_is_needed_where_the_vehicle_has_one(run: Run, mission: Mission, t
         (("push", "MISSION", "--robot", "r1", "--set-origin"), "--set-origin has no meaning with --robot"),
         (
             ("push", "MISSION", "--mavlink", "udpout:127.0.0.1:9", "--autopilot", "ardu"),
-            "'ardu': unknown",
+            "--autopilot ardu: one of",
         ),
         (("push", "MISSION", "--mavlink", "udpout:127.0.0.1:9", "--trigger", "horn"), "--trigger horn"),
         (("push", "MISSION", "--mavlink", "udpout:127.0.0.1:9", "--timeout", "0.3"), "nothing was sent"),

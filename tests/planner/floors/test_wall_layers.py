@@ -98,6 +98,17 @@ def test_a_title_of_another_view_tells_against_walls(title: str, tmp_path: Path)
         read([double_walls, swing, names, lambda model: text(model, title, 2, -1)], tmp_path)
 
 
+def test_rows_of_tables_are_no_walls_with_passages(tmp_path: Path) -> None:
+    def hall(model: Modelspace) -> None:
+        rectangle(model, "Tent", 0, 0, 20, 12)
+        for k in range(9):
+            rectangle(model, "Tent", 1 + 2 * k, 0.5, 1.5 + 2 * k, 5.3)
+            rectangle(model, "Tent", 1 + 2 * k, 6.7, 1.5 + 2 * k, 11.5)
+
+    with pytest.raises(InputError, match="no layer that shows walls"):
+        read([hall], tmp_path)
+
+
 def test_lines_that_lie_about_tell_against_walls(tmp_path: Path) -> None:
     def strays(model: Modelspace) -> None:
         for k in range(9):

@@ -1,0 +1,18 @@
+# Types of one_tree_kernel.py where it is compiled (setup.py).
+
+cimport cython
+
+ctypedef long long whole
+
+@cython.locals(
+    _=whole, apart=whole, inside=whole, last=whole, least=whole, n=whole, nearest=whole, point=whole,
+    row=whole, total=whole
+)
+cpdef whole grow(
+    const whole[::1] cost, const whole[::1] weight, whole[::1] away, whole[::1] parent, whole[::1] degree
+) noexcept nogil
+
+@cython.locals(
+    apart=whole, first=whole, last=whole, n=whole, point=whole, row=whole, second=whole, total=whole
+)
+cdef whole close(const whole[::1] cost, const whole[::1] weight, whole[::1] degree) noexcept nogil
