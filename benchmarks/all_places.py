@@ -10,9 +10,8 @@ from benchmarks.table import put, table, versions
 from stopgo.mission.settings import Settings
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
-from stopgo.planner.selection import select
-from stopgo.planner.selection.continuous_selection import SELECTOR, anywhere
-from stopgo.planner.selection.refine import refined
+from stopgo.planner.selection.continuous_selection import SELECTOR, select_anywhere
+from stopgo.planner.selection.refine import select_refined
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 
@@ -32,10 +31,10 @@ def row(name: str, path: Path, options: dict[str, float]) -> list[object]:
     floor = read_floor(path)
     settings = Settings(selector=SELECTOR, **options)  # type: ignore[arg-type]
     begin = time.process_time()
-    first = select(visibility(candidates(navigable(floor, settings))))
-    found = anywhere(first)
+    seen = visibility(candidates(navigable(floor, settings)))
+    found = select_anywhere(seen)
     took = time.process_time() - begin
-    plain = refined(first)
+    plain = select_refined(seen)
     stops, bound = len(found.chosen), found.bound
     gap = f"{100 * (stops - bound) / stops:.1f} %"
     return [name, round(floor.area), f"{len(plain.chosen)} / {plain.bound}", f"{stops} / {bound}", gap, took]

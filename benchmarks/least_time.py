@@ -15,8 +15,7 @@ from stopgo.planner.candidates import candidates
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import read_floor
 from stopgo.planner.routing import route
-from stopgo.planner.selection import select
-from stopgo.planner.selection.refine import refined
+from stopgo.planner.selection.refine import select_refined
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 
@@ -42,7 +41,7 @@ def main() -> None:
 def row(name: str, scan: str, path: Path, options: dict[str, float]) -> list[object]:
     """A floor's times by both methods."""
     settings = Settings(minimise="time", **{**options, **SCANS[scan]})
-    before = route(refined(select(visibility(candidates(navigable(read_floor(path), settings))))))
+    before = route(select_refined(visibility(candidates(navigable(read_floor(path), settings)))))
     begin = time.process_time()
     made = least_time_route(before)
     took = time.process_time() - begin

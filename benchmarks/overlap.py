@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from stopgo.mission.document import Overlap, stop_names
-from stopgo.mission.plan import PartPlan
+from stopgo.mission.document import stop_names
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages.network import Network
 from stopgo.planner import plan
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.overlap.registered import registered_pairs
 
-SHARES = (0.1, 0.3)
+REGISTER = "--register"
+OVERLAP = 0.3
 DOOR_SCAN = "--door-scan"
 
 
@@ -35,8 +34,7 @@ def main() -> None:
             table(
                 ["floor", "asked for", "stops / bound", "stops", "pieces", "scan min", "bridges", "s"], rows
             ),
-            "Pieces: the scans that hang together, by the pairs that register at a share of 0.1. Seconds: the whole "
-            "plan without files.",
+            "Pieces: the scans that hang together, by the pairs that register. Seconds: the whole plan without files.",
         )
     )
     put("overlap", text)
@@ -47,9 +45,10 @@ def rows_of(name: str, path: Path, options: dict[str, float]) -> Iterator[list[s
     """The plain plan, one with a scan in every doorway, and those that register."""
     plain = 0
     asked = {
-        "plain": {"overlap": 0.0},
-        DOOR_SCAN: {"overlap": 0.0, "door_scan": True},
-        **{f"--overlap {share:g}": {"overlap": share} for share in SHARES},
+        "plain": {},
+        DOOR_SCAN: {"door_scan": True},
+        REGISTER: {"register": True},
+        f"--overlap {OVERLAP:g}": {"overlap": OVERLAP},
     }
     for what, more in asked.items():
         settings = Settings(**options, **more)
@@ -59,7 +58,7 @@ def rows_of(name: str, path: Path, options: dict[str, float]) -> Iterator[list[s
         seconds = time.process_time() - begin
         count = len(made.mission.stops)
         plain = plain or count
-        network = Network(tuple(stop_names(count)), pairs_at(made, 0.1))
+        network = Network(tuple(stop_names(count)), registered_pairs(made.route))
         minutes = sum(stop.scan.duration_s for stop in made.mission.stops) / 60
         yield [
             name if what == "plain" else "",
@@ -71,15 +70,6 @@ def rows_of(name: str, path: Path, options: dict[str, float]) -> Iterator[list[s
             str(len(network.bridges)),
             f"{seconds:.1f}",
         ]
-
-
-def pairs_at(made: PartPlan, share: float) -> tuple[Overlap, ...]:
-    """Pairs of a plan's stops that register, for any required overlap."""
-    route = made.route
-    space = made.space
-    told = replace(space, settings=replace(space.settings, overlap=share))
-    seen = replace(made.visibility, candidates=replace(made.candidates, space=told))
-    return registered_pairs(replace(route, selection=replace(made.selection, visibility=seen)))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ from stopgo.mission.stages.figures import percent
 from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.floors import options_of, read_floor
-from stopgo.planner.overlap import USUAL_SHARE
 from stopgo.planner.scan_simulation.verification import verify
 
 HEAD = (
@@ -33,7 +32,7 @@ def main() -> None:
     """Verify every floor at hand and put the tables into the README."""
     floors = {name: value for name, value in FLOORS.items() if value[0].exists()}
     rows = [row(name, *verified(*value)) for name, value in floors.items()]
-    joined = [joined_row(name, *verified(*value, overlap=USUAL_SHARE)) for name, value in floors.items()]
+    joined = [joined_row(name, *verified(*value, register=True)) for name, value in floors.items()]
     text = "\n\n".join(
         (
             versions("numpy", "embreex", "small-gicp"),
@@ -54,12 +53,12 @@ NOTE = (
     "shared core."
 )
 JOINED_NOTE = (
-    "Plans with `--overlap 0.1`. Promised pairs are those of the mission's network; worst: of the promised pairs, "
+    "Plans with `--register`. Promised pairs are those of the mission's network; worst: of the promised pairs, "
     "from 5 cm and 2° off, to either side. Pieces: what the pairs that register leave."
 )
 
 
-def verified(path: Path, options: dict[str, float], **more: float) -> tuple[PlanProof, float]:
+def verified(path: Path, options: dict[str, float], **more: bool) -> tuple[PlanProof, float]:
     """One floor's verification, and its seconds of processor time."""
     settings = Settings(**options, **more)
     made = plan(read_floor(path, options_of(settings)), settings)

@@ -14,8 +14,7 @@ from stopgo.mission.stages.figures import Figures, Share, percent
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import FloorOptions, read_floor
-from stopgo.planner.selection import select
-from stopgo.planner.selection.refine import refined
+from stopgo.planner.selection.refine import select_refined
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 
@@ -81,7 +80,7 @@ def _selections(seen: Visibility) -> Iterator[Selection]:
         space = seen.space
         settings = replace(space.settings, room_coverage=share, kind_coverage=share)
         again = replace(seen, candidates=replace(seen.candidates, space=replace(space, settings=settings)))
-        yield refined(select(again))
+        yield select_refined(again)
 
 
 def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list[str]]:

@@ -176,7 +176,7 @@ class _Counts:
         visibility = route.visibility
         space, targets = visibility.space, visibility.targets
         elements = targets.element[targets.unit_segment]
-        size, length = len(space.floor.elements), targets.unit_length
+        size, length = len(space.floor.elements), np.rint(targets.unit_length * 1e6) * 1e-6
         seen = visibility.visible & seen_units(route.selection)
         masks = (np.ones(targets.total, dtype=bool), visibility.visible, seen)
         units = [np.bincount(elements[mask], minlength=size) for mask in masks]
@@ -187,8 +187,10 @@ class _Counts:
     def summary(self, rows: list[int], *, with_elements: bool = True) -> dict[str, Any]:
         """Return the sums of some elements."""
         units, visible, seen = (int(number) for number in self.units[rows].sum(axis=0))
-        length, visible_m, seen_m = (round(float(number), 4) for number in self.metres[rows].sum(axis=0))
-        share = seen / visible if self.by_units and visible else (seen_m / visible_m if visible_m else None)
+        metres = self.metres[rows].sum(axis=0)
+        length, visible_m, seen_m = (round(float(number), 4) for number in metres)
+        part, whole = (seen, visible) if self.by_units else (float(metres[2]), float(metres[1]))
+        share = part / whole if whole else None
         summary = {
             **{"units": units, "visible": visible, "seen": seen},
             **{"length_m": length, "visible_m": visible_m, "seen_m": seen_m},

@@ -11,7 +11,7 @@ from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.sheet import PaperSheet
 from stopgo.mission.files.svg import circle, group, line, line_data, path, polygon, rect, text
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.stages.network import network_of
+from stopgo.mission.stages.network import network_of, predicted_error_m
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """Line of the leg to each stop."""
@@ -56,7 +56,7 @@ def route(
 
 
 def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
-    """Draw the pairs of stops whose scans register: bridges stronger, the weakest pair with its strength."""
+    """Draw the pairs of stops whose scans register: bridges stronger, the weakest pair with its error."""
     found = network_of(mission)
     if found is None:
         return
@@ -67,9 +67,8 @@ def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
     yield group("bridges", [line(*at[item.a], *at[item.b]) for item in found.bridges], **BRIDGE)
     if (weakest := found.weakest) is not None:
         x, y = np.mean([at[weakest.a], at[weakest.b]], axis=0).tolist()
-        held = text(
-            x, y + 0.75, f"{weakest.hold_m:.2f} m", size=1.9, fill=BRIDGE["stroke"], text_anchor="middle"
-        )
+        error = f"{1000 * predicted_error_m(weakest.hold_m):.1f} mm"
+        held = text(x, y + 0.75, error, size=1.9, fill=BRIDGE["stroke"], text_anchor="middle")
         yield group("weakest", [rect(x - 3.6, y - 1.4, 7.2, 2.8, fill="#ffffff", **THIN), held])
 
 

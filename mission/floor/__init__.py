@@ -25,6 +25,7 @@ class Rank(IntEnum):
 GRAVE = (
     *("walls_missing", "little_reached", "stray_element", "leg_over_ignored", "units_doubtful"),
     "scans_apart",
+    "accuracy_not_met",
     *("no_geometry", "kernel_crashed", "damaged_model", "schedule_unrelated"),
     "limits_not_met",
     *("open_outline", "missing_block", "no_outline", "bad_coordinates"),

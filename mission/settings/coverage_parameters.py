@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal
 
-from stopgo.mission.settings.parameter import Parameter
+from stopgo.mission.settings.parameter import Pair, Parameter, millimetres
 
 LEAST_SHARE = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
@@ -67,10 +67,18 @@ class CoverageParameters:
             group="Paper",
         ),
     ] = "length"
+    register: Annotated[
+        bool | None,
+        _plan(
+            "Choose stops whose scans register with one another, all in one network",
+            undecided="yes with --overlap, else no",
+            quiet=True,
+        ),
+    ] = None
     overlap: Annotated[
         float | None,
         _plan(
-            "Minimum overlap ratio of neighbouring scans, so that all register; 0: not required",
+            "Minimum overlap ratio of scans that register",
             least=0,
             below=1,
             why="0.1 is 10 %",
@@ -78,6 +86,24 @@ class CoverageParameters:
             quiet=True,
         ),
     ] = None
+    accuracy: Annotated[
+        float | None,
+        _plan(
+            "Maximum predicted position error of every registered scan, with a probability of 0.99",
+            "mm",
+            above=0,
+            form="LENGTH",
+            example="5mm",
+            read=millimetres,
+            quiet=True,
+        ),
+    ] = None
+    control: Annotated[
+        tuple[Pair, ...],
+        _plan(
+            "Control point: a target with known coordinates", "m", form="X,Y", example="2.5,3.0", quiet=True
+        ),
+    ] = ()
     overlap_range: Annotated[
         float | None,
         _plan(
@@ -101,8 +127,13 @@ class CoverageParameters:
         return LEAST_SHARE if given is None else given
 
     @property
+    def registers(self) -> bool:
+        """True if stops are chosen so that their scans register."""
+        return self.least_overlap > 0 if self.register is None else self.register
+
+    @property
     def least_overlap(self) -> float:
-        """Least fraction of a scan that its neighbour covers too; 0 where scans need not register."""
+        """Least fraction of a scan that a scan which registers with it covers too."""
         return self.overlap or 0.0
 
     @property

@@ -15,6 +15,8 @@ FIRST = "Used first"
 GROUPS = ("Floor", "Scanner", "Robot", "Quality", "Route", "Fleet", "Output", "Paper")
 """The other groups of options, in the order of the help: the parameters of the paper come last."""
 
+Pair = tuple[float, float]
+
 LARGEST = 1e6
 FARTHEST = 1e9
 """Coordinates of a site may be this large, in metres."""
@@ -36,6 +38,12 @@ def seconds(text: str) -> float:
     if found is None or not found[0]:
         return float(text)
     return sum(float(part) * size for part, size in zip(found.groups(), (3600, 60, 1), strict=True) if part)
+
+
+def millimetres(text: str) -> float:
+    """Millimetres in `5`, `5mm`, `0.5cm` or `0.005m`."""
+    unit = next((unit for unit in ("mm", "cm", "m") if text.strip().endswith(unit)), "")
+    return float(text.strip().removesuffix(unit)) * {"": 1.0, "mm": 1.0, "cm": 10.0, "m": 1000.0}[unit]
 
 
 _NUMBER = r"(\d+(?:\.\d+)?)"

@@ -23,6 +23,7 @@ def check_settings(settings: Settings) -> None:
     for key, parameter in PARAMETERS.items():
         parameter.check(getattr(settings, key))
     _check_coverage(settings)
+    _check_registration(settings)
     _check_scanner(settings)
     _check_starts(settings)
     _check_division(settings)
@@ -54,6 +55,17 @@ def _check_coverage(settings: Settings) -> None:
             f"does not work with --fov {settings.fov:g}, where one position may have several stops; "
             "leave one of them out",
         )
+
+
+def _check_registration(settings: Settings) -> None:
+    """Refuse an overlap ratio of scans that need not register."""
+    if settings.least_overlap > 0 and not settings.registers:
+        _refuse(settings, "overlap", "has no effect with --no-register; leave one of them out")
+    for key in ("accuracy", "control"):
+        if getattr(settings, key) and not settings.registers:
+            _refuse(settings, key, "is of scans that register; give --register too")
+    if settings.accuracy is not None and settings.minimise == "time":
+        _refuse(settings, "accuracy", "does not work with --minimise time; leave one of them out")
 
 
 def _check_scanner(settings: Settings) -> None:

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal
 
-from stopgo.mission.settings.parameter import Parameter, seconds
+from stopgo.mission.settings.parameter import Pair, Parameter, seconds
 
-Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
 _plan = partial(Parameter, "plan", group="Route")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,16 @@ from msgspec.structs import replace
 
 from stopgo.mission.document import Mission, Overlap
 from stopgo.mission.stages.figures import percent
+
+NOISE_M = 0.33e-3
+"""Registration error of one metre of wall, metres (standard deviation, times the root of the metres)."""
+FLOOR_M = 0.4e-3
+"""Registration error that no length of wall averages out: that of the thinned cloud, metres."""
+
+
+def predicted_error_m(hold_m: float) -> float:
+    """Return the predicted standard deviation of a pair in its weakest direction, metres."""
+    return math.sqrt(FLOOR_M**2 + NOISE_M**2 / max(hold_m, 1e-12))
 
 
 @dataclass(frozen=True)
@@ -96,8 +107,8 @@ def network_table(network: Network | None) -> dict[str, Any]:
 
 
 def network_lines(network: Network | None) -> list[str]:
-    """Return the lines for a terminal: components, the weakest pair, and bridges."""
-    if network is None:
+    """Return the lines for a terminal: components, the weakest pair, and bridges; none for a single scan."""
+    if network is None or len(network.stops) < 2:
         return []
     number, pairs = len(network.pieces), len(network.overlaps)
     lines = [
@@ -120,7 +131,7 @@ def pair_in_words(pair: Overlap) -> str:
     """Return one pair with its figures."""
     return (
         f"{pair.a}-{pair.b}: {pair.common_m:.1f} m visible from both, {percent(pair.share)} of a scan, "
-        f"held as by {pair.hold_m:.2f} m of wall"
+        f"predicted error {1000 * predicted_error_m(pair.hold_m):.1f} mm"
     )
 
 

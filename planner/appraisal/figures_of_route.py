@@ -14,7 +14,7 @@ from stopgo.planner.appraisal.plausibility import floor_of_rooms, near_legs, pla
 from stopgo.planner.appraisal.quality import FEWER_VIEWS, NOT_MET, fewer_views, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.overlap.registered import SCANS_APART, scans_apart
+from stopgo.planner.overlap.registered import SCANS_APART, inaccurate, scans_apart
 from stopgo.planner.space.reach import reach_of
 
 
@@ -27,7 +27,8 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
     views = (*not_met(selection), *fewer_views(selection))
-    doubts = (*plausibility_findings(route, reached_m2=reached), *views, *scans_apart(route))
+    network = (*scans_apart(route), *inaccurate(route))
+    doubts = (*plausibility_findings(route, reached_m2=reached), *views, *network)
     findings = (*space.findings, *doubts)
     shares = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(

@@ -90,9 +90,11 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
     at = np.full(len(xy), -1, dtype=np.int64)
     at[reason == KEPT] = reach.part_at(xy[reason == KEPT] - origin)
     reason = np.where((reason == KEPT) & (at < 0), UNREACHABLE, reason)
-    if part is None and not np.any(at >= 0):
+    extra = _for_overlap_only(space, proposals)
+    own = np.where(extra, -1, at) if len(extra) else at
+    if part is None and not np.any(own >= 0):
         raise NegativeResult(_no_candidate(space, reason))
-    chosen = _chosen_part(space, proposals, reach, at) if part is None else part
+    chosen = _chosen_part(space, proposals, reach, own) if part is None else part
     _check_required(space, proposals, at, chosen)
     reason = np.where((reason == KEPT) & (at != chosen), OTHER_PART, reason)
     return Candidates(
@@ -106,7 +108,7 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
         part_area=reach.parts.areas,
         doorway=frozen(proposals.doorway, np.bool_),
         must=frozen(proposals.must, np.bool_),
-        extra=_for_overlap_only(space, proposals),
+        extra=extra,
     )
 
 

@@ -17,7 +17,7 @@ from stopgo.planner.space.stop_feasibility import StopFeasibility
 def doorways(space: NavigableSpace) -> Proposals:
     """Middle of every opening that is driven through, if the settings require it or it may join scans."""
     settings = space.settings
-    if not (settings.door_scan or settings.door_candidates or settings.least_overlap > 0):
+    if not (settings.door_scan or settings.door_candidates or settings.registers):
         return Proposals.of(np.empty((0, 2)), [])
     index = {item.room: k for k, item in enumerate(space.rooms) if item.room is not None}
     obstacles = to_shape(space.obstacles, local_origin(space.floor))

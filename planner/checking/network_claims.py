@@ -17,10 +17,13 @@ from stopgo.mission.document.problems import Problem
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import network_of
+from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_of
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
-from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, links_of
+from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
+from stopgo.planner.overlap.control import seen_control
+from stopgo.planner.overlap.network_error import information_of, network_errors
 from stopgo.planner.overlap.pairs import Overlaps
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door
@@ -28,13 +31,13 @@ from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 ROUNDED = 1e-5
 """Tolerance of a pair's figures, which are sums of rounded lengths."""
-REQUIRED = "$.origin.parameters.overlap requires scans that register with one another"
+REQUIRED = "the plan's parameters require scans that register with one another"
 LEAST = {"common_m": LEAST_COMMON_M, "hold_m": LEAST_HOLD_M}
 
 
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
     """Every pair that registers less well than claimed or required, and pairs that are missing."""
-    required = space.settings.least_overlap > 0
+    required = space.settings.registers
     if isinstance(mission.network, msgspec.UnsetType):
         if required and len(mission.stops) > 1:
             yield Problem("$.network", f"is missing, but {REQUIRED}")
@@ -42,6 +45,7 @@ def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Prob
     yield from _weak_pairs(mission, space)
     if required and mission.share is msgspec.UNSET and _is_whole(mission, space):
         yield from _separate_scans(mission, space)
+        yield from _inaccurate_scans(mission, space)
 
 
 def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
@@ -64,6 +68,24 @@ def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
                 yield Problem(path, f"is {claimed:g}: {counted_text}; a pair that registers has {needed:g}")
 
 
+def _inaccurate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+    """The scan with the greatest predicted error, if this exceeds the accuracy required."""
+    asked, network = space.settings.accuracy, network_of(mission)
+    if asked is None or network is None or not network.overlaps:
+        return
+    overlaps, origin = _overlaps(mission, space), local_origin(space.floor)
+    row = {stop: k for k, stop in enumerate(network.stops)}
+    ends = [(row[pair.a], row[pair.b]) for pair in network.overlaps]
+    xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - origin
+    information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
+    errors, _ = network_errors(xy, ends, information, seen_control(space, xy))
+    found = CONFIDENCE * 1000 * np.where(np.isfinite(errors), errors, 0.0)
+    worst = int(np.argmax(found))
+    if found[worst] > asked * (1 + ROUNDED):
+        text = f"is {asked:g} mm, but the predicted error of {network.stops[worst]} is {found[worst]:.1f} mm"
+        yield Problem("$.origin.parameters.accuracy", f"{text}, counted line by line")
+
+
 def _is_whole(mission: Mission, space: NavigableSpace) -> bool:
     """True for a plan's own mission; a follow-up mission (another id) also joins earlier scans."""
     floor, made_by = space.floor, mission.origin.stopgo
@@ -76,13 +98,15 @@ def _separate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem
     network = network_of(mission)
     if network is None or len(network.pieces) < 2:
         return
-    found = candidates_of(mission, space)
+    poses = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
+    doorway = np.array([stop.doorway for stop in mission.stops])
+    found = with_scans(candidates_of(mission, space), poses, doorway)
     _, region = connected_components(links_of(found), directed=False)
-    xy = found.xy[found.kept]
-    at = {stop.id: np.flatnonzero(np.hypot(*(xy - (stop.x, stop.y)).T) < 1e-5) for stop in mission.stops}
+    first = len(region) - len(mission.stops)
+    at = {stop.id: first + k for k, stop in enumerate(mission.stops)}
     owner: dict[int, int] = {}
     for number, piece in enumerate(network.pieces):
-        for reached in {int(region[row]) for stop in piece for row in at[stop]}:
+        for reached in {int(region[at[stop]]) for stop in piece}:
             if owner.setdefault(reached, number) != number:
                 yield Problem("$.network", f"leaves {' '.join(piece)} apart, but {REQUIRED}")
                 return

@@ -133,11 +133,10 @@ class PlanReport:
         """Line on the scan with the greatest predicted error in the frame of its network."""
         if self.network is None or not self.network.overlaps:
             return []
-        errors = predicted_errors(self.part.route)
-        worst = int(np.argmax(np.where(np.isfinite(errors), errors, -1.0)))
-        frame = self.network.stops[int(np.argmin(errors))]
-        at = f"{self.network.stops[worst]}: {1000 * errors[worst]:.1f} mm (standard deviation)"
-        return [f"    error     predicted, in the frame of {frame}, at most at {at}"]
+        predicted = predicted_errors(self.part.route)
+        worst = int(np.argmax(np.where(np.isfinite(predicted.m), predicted.m, -1.0)))
+        at = f"{self.network.stops[worst]}: {1000 * predicted.m[worst]:.1f} mm (standard deviation)"
+        return [f"    error     predicted, in the frame of {predicted.frame}, at most at {at}"]
 
     def as_text(self) -> str:
         """Return the lines for a person: the plan, its coverage, the floor left out, and the findings."""

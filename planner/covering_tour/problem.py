@@ -245,7 +245,7 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
     visibility, chosen = route.visibility, np.unique(route.selection.chosen)
     stays: IntArray = np.empty(0, dtype=np.int64)
     connected: ConnectionTest = _any_rows
-    joins = visibility.settings.least_overlap > 0
+    joins = visibility.settings.registers
     if done is not None:
         whole, cover = remaining_cover(visibility, done)
         if joins:

@@ -19,8 +19,6 @@ LEAST_HOLD_M = round((CONFIDENCE * NOISE_M) ** 2 / (ACCURACY_M**2 - (CONFIDENCE 
 """Least registration strength of a pair: metres of wall that face its weakest direction."""
 LEAST_COMMON_M = 1.0
 """Least length of boundary in metres that both must see."""
-USUAL_SHARE = 0.1
-"""Overlap ratio required where the settings give none."""
 
 
 @instance_cached
@@ -49,7 +47,6 @@ def links_of(candidates: Candidates) -> csr_array:
 __all__ = [
     "LEAST_COMMON_M",
     "LEAST_HOLD_M",
-    "USUAL_SHARE",
     "Overlaps",
     "Pairs",
     "links_of",

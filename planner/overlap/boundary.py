@@ -11,13 +11,16 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
-from stopgo.planner.space.targets import face_segments, units_on
-from stopgo.planner.visibility.exact_sight import open_space, viewpoints_of
+from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps, whole_steps_of
+from stopgo.planner.space.targets import face_segments, units_on, without_needless_vertices
+from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.sight.sight import scene_of, sight
 from stopgo.planner.visibility.unit_ranges import ranges, runs_of
@@ -62,9 +65,21 @@ class ShownBoundary:
 
 def boundary_of(space: NavigableSpace) -> Boundary:
     """All faces of what stops the laser."""
-    ends = np.rint(face_segments(whole_steps_of(space.occluders, local_origin(space.floor)))) * GRID
+    ends = np.rint(face_segments(_solids(space))) * GRID
     pieces = units_on(np.hypot(*(ends[:, 1] - ends[:, 0]).T), d_dis=PIECE_M)
     return Boundary(frozen(ends[:, 0]), frozen(ends[:, 1]), frozen(pieces, np.int64))
+
+
+@instance_cached
+def _solids(space: NavigableSpace) -> BaseGeometry:
+    """Solids that stop the laser, in whole grid steps, with one face for each straight side.
+
+    Targets have a face for each element, and vertices where other elements touch them. Which element owns
+    a face may depend on the order of the drawing, and the pieces of these faces must not.
+    """
+    solids = whole_steps_of(space.occluders, local_origin(space.floor))
+    local = shapely.transform(solids, lambda steps: steps * GRID)
+    return whole_steps(without_needless_vertices(local))
 
 
 def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
@@ -77,7 +92,8 @@ def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
     boundary = boundary_of(space)
     places, row = _viewpoints(candidates, rows)
     faces = np.ones(len(boundary.a), dtype=bool)
-    scene = scene_of(open_space(candidates), boundary.a, boundary.b, boundary.pieces, faces)
+    mesh = open_space_around(candidates, _solids(space))
+    scene = scene_of(mesh, boundary.a, boundary.b, boundary.pieces, faces)
     runs = sight(scene, to_grid(places - origin), reach=space.settings.farthest_overlap)
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
     stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)

@@ -14,7 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray
+from stopgo.planner.overlap.control import SeenPoint
 from stopgo.planner.overlap.pairs import FLOOR_M, LEVER_M, NOISE_M
+
+TARGET_M = 2e-3
+"""Error of a target's centre in a scan, metres (standard deviation)."""
+MOST_FRAMES = 3
+"""Scans tried as the frame of a network, those nearest to its middle."""
 
 
 def information_of(moments: FloatArray, at: FloatArray) -> FloatArray:
@@ -29,8 +35,32 @@ def information_of(moments: FloatArray, at: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.inv(alone + from_point @ least @ from_point.T), np.float64)
 
 
+def network_errors(
+    xy: FloatArray,
+    ends: Sequence[tuple[int, int]],
+    information: Sequence[FloatArray],
+    seen: Sequence[SeenPoint] = (),
+) -> tuple[FloatArray, int | None]:
+    """The `scan_errors`, and the scan whose frame they are in; None for that of the control points.
+
+    Control points hold the frame if the largest component sees two of them. Else it is that of the scan,
+    of three in the middle of this component, with the least worst error.
+    """
+    largest = max(_components(len(xy), ends), key=len, default=[])
+    if set(_held(len(xy), ends, seen)) & set(largest):
+        return scan_errors(xy, ends, information, [], seen), None
+    away = np.hypot(*(xy[largest] - xy[largest].mean(axis=0)).T)
+    middle = [largest[k] for k in np.argsort(away, kind="stable")[:MOST_FRAMES].tolist()]
+    tried = [(scan_errors(xy, ends, information, [k]), k) for k in middle]
+    return min(tried, key=lambda one: float(np.max(one[0][np.isfinite(one[0])], initial=0.0)))
+
+
 def scan_errors(
-    xy: FloatArray, ends: Sequence[tuple[int, int]], information: Sequence[FloatArray], anchors: Sequence[int]
+    xy: FloatArray,
+    ends: Sequence[tuple[int, int]],
+    information: Sequence[FloatArray],
+    anchors: Sequence[int],
+    seen: Sequence[SeenPoint] = (),
 ) -> FloatArray:
     """Standard deviation of each scan's position in its worst direction, metres (n,).
 
@@ -41,24 +71,61 @@ def scan_errors(
     ends, information
         Two scans of each pair, and its information about the origin (3, 3).
     anchors
-        Scans whose poses are known. A scan that no pairs join to one has the error infinity.
+        Scans whose poses are known.
+    seen
+        Scans, and the control points that they see. Two points hold all scans that pairs join to these.
+        A scan that nothing holds has the error infinity.
     """
     count = len(xy)
-    joined = _joined(count, ends, anchors)
+    joined = _joined(count, ends, [*anchors, *_held(count, ends, seen)])
     free = [k for k in range(count) if joined[k] and k not in anchors]
-    row = {k: 3 * place for place, k in enumerate(free)}
-    normal = np.zeros((3 * len(free), 3 * len(free)))
+    normal = _normal_matrix({k: 3 * place for place, k in enumerate(free)}, ends, information, seen)
+    covariance = np.linalg.inv(normal) if free else normal
+    errors = np.where(joined, 0.0, np.inf)
+    for place, k in enumerate(free):
+        own = covariance[3 * place : 3 * place + 3, 3 * place : 3 * place + 3]
+        there = np.array([[1.0, 0.0, -xy[k, 1]], [0.0, 1.0, xy[k, 0]]])
+        errors[k] = np.sqrt(np.linalg.eigvalsh(there @ own @ there.T)[-1])
+    return errors
+
+
+def _normal_matrix(
+    row: dict[int, int],
+    ends: Sequence[tuple[int, int]],
+    information: Sequence[FloatArray],
+    seen: Sequence[SeenPoint],
+) -> FloatArray:
+    """Normal matrix of the free scans, whose first rows these are."""
+    normal = np.zeros((3 * len(row), 3 * len(row)))
     for (a, b), block in zip(ends, information, strict=True):
         for i, j, sign in ((a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)):
             if i in row and j in row:
                 normal[row[i] : row[i] + 3, row[j] : row[j] + 3] += sign * block
-    covariance = np.linalg.inv(normal) if free else normal
-    errors = np.where(joined, 0.0, np.inf)
-    for k in free:
-        own = covariance[row[k] : row[k] + 3, row[k] : row[k] + 3]
-        there = np.array([[1.0, 0.0, -xy[k, 1]], [0.0, 1.0, xy[k, 0]]])
-        errors[k] = np.sqrt(np.linalg.eigvalsh(there @ own @ there.T)[-1])
-    return errors
+    for k, (x, y) in seen:
+        if k in row:
+            move = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]) / TARGET_M
+            normal[row[k] : row[k] + 3, row[k] : row[k] + 3] += move.T @ move
+    return normal
+
+
+def _held(count: int, ends: Sequence[tuple[int, int]], seen: Sequence[SeenPoint]) -> list[int]:
+    """Scans of the components that see two control points or more."""
+    found: list[int] = []
+    for component in _components(count, ends) if seen else []:
+        points = {tuple(np.round(point, 3).tolist()) for k, point in seen if k in component}
+        found += component if len(points) > 1 else []
+    return found
+
+
+def _components(count: int, ends: Sequence[tuple[int, int]]) -> list[list[int]]:
+    """Scans by connected component, in the order of their first scans."""
+    found: list[list[int]] = []
+    left = dict.fromkeys(range(count))
+    while left:
+        joined = _joined(count, ends, [next(iter(left))])
+        found.append([k for k in left if joined[k]])
+        left = {k: None for k in left if not joined[k]}
+    return found
 
 
 def _joined(count: int, ends: Sequence[tuple[int, int]], anchors: Sequence[int]) -> list[bool]:

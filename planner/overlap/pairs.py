@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.stages.network import FLOOR_M, NOISE_M
 from stopgo.planner.overlap.boundary import ShownBoundary
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -27,10 +28,6 @@ EDGE_M = 0.14
 thinned to one per 7.5 cm: nearer to an edge they are of two surfaces."""
 LEAST_STRETCH_M = 2 * EDGE_M
 """Least width of a common stretch. Narrower ones, such as door jambs, have no direction of their own."""
-NOISE_M = 0.33e-3
-"""Error of the mean of one metre of wall, metres (standard deviation, times the root of the metres)."""
-FLOOR_M = 0.4e-3
-"""Error that no length of wall averages out: that of the thinned cloud."""
 DIGITS = 6
 """Decimals of a pair's figures, so that both stops of a pair have equal figures."""
 
@@ -104,6 +101,13 @@ class Overlaps:
         )[0]
         return found
 
+    def weakest_move(self, row: int, other: int) -> FloatArray:
+        """Small move (x, y, rotation times LEVER_M) of a row that a pair resists least, unit length (3,)."""
+        shift = _about(self._seen.xy[[row]])[0]
+        _, axes = np.linalg.eigh(shift @ self.normal_matrix(row, other) @ shift.T)
+        move: FloatArray = axes[:, 0]
+        return move
+
     def _common(self, row: int, *, first: int = 0) -> tuple[IntArray, FloatArray, FloatArray]:
         """Stretches that a row and another (from `first` on) both see: the other's stretch, begin, end."""
         seen = self._seen
@@ -159,8 +163,14 @@ def error_of(hold_m: FloatArray) -> FloatArray:
 
 def _least_hold(moments: FloatArray, at: FloatArray) -> FloatArray:
     """Least eigenvalue of each normal matrix about its own point (n, 2), rotations scaled by LEVER_M."""
+    shift = _about(at)
+    about = shift @ moments @ shift.transpose(0, 2, 1)
+    return np.maximum(np.linalg.eigvalsh(about)[:, 0], 0.0) if len(at) else np.empty(0)
+
+
+def _about(at: FloatArray) -> FloatArray:
+    """Matrices (n, 3, 3) that turn a normal matrix about the origin into one about each point (n, 2)."""
     shift = np.repeat(np.eye(3)[None], len(at), axis=0)
     shift[:, 2, 0], shift[:, 2, 1] = at[:, 1], -at[:, 0]  # (p - at) × n = p × n - at × n
     shift[:, 2] /= LEVER_M
-    about = shift @ moments @ shift.transpose(0, 2, 1)
-    return np.maximum(np.linalg.eigvalsh(about)[:, 0], 0.0) if len(at) else np.empty(0)
+    return shift

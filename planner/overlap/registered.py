@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -13,21 +15,21 @@ from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState, Route
+from stopgo.mission.stages.figures import percent
 from stopgo.mission.stages.network import Network
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.overlap import USUAL_SHARE, Overlaps, registers
+from stopgo.planner.geometry.shapes import local_origin, to_shape
+from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
-from stopgo.planner.overlap.network_error import information_of, scan_errors
+from stopgo.planner.overlap.control import seen_control
+from stopgo.planner.overlap.network_error import information_of, network_errors
+from stopgo.planner.overlap.pairs import error_of
 
 
 @instance_cached
 def registered_pairs(route: Route) -> tuple[Overlap, ...]:
-    """Pairs of the route's stops that register with one another, in the order of driving.
-
-    The overlap ratio is that of the settings, or the usual one if they give none.
-    """
-    overlaps, share = _overlaps_of_stops(route), _settings(route).least_overlap or USUAL_SHARE
+    """Pairs of the route's stops that register with one another, in the order of driving."""
+    overlaps, share = _overlaps_of_stops(route), _settings(route).least_overlap
     names = stop_names(overlaps.rows)
     found = []
     for k in range(overlaps.rows):
@@ -39,29 +41,45 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     return tuple(found)
 
 
-def predicted_errors(route: Route) -> FloatArray:
-    """Standard deviation of each stop's scan in its worst direction, metres, in the order of driving (n,).
+@dataclass(frozen=True, eq=False)
+class PredictedErrors:
+    """Standard deviations of a network's scans, and their frame."""
 
-    The frame is that of the stop, of three in the middle, with the least worst error. A scan outside
-    the largest component has the error infinity.
-    """
-    overlaps, network = _overlaps_of_stops(route), Network(stops := _names(route), registered_pairs(route))
+    m: FloatArray
+    """Of each stop's scan in its worst direction, metres, in the order of driving (n,)."""
+    frame: str
+    """The stop that holds the frame, or "control points"."""
+
+
+def predicted_errors(route: Route) -> PredictedErrors:
+    """Predict the error of every stop's scan; a scan that nothing holds has the error infinity."""
+    overlaps, stops = _overlaps_of_stops(route), _names(route)
     number = {stop: k for k, stop in enumerate(stops)}
-    ends = [(number[pair.a], number[pair.b]) for pair in network.overlaps]
+    ends = [(number[pair.a], number[pair.b]) for pair in registered_pairs(route)]
     xy = route.xy - local_origin(route.space.floor)
     information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
-    largest = network.pieces[0] if network.pieces else ()
-    tried = [scan_errors(xy, ends, information, [k]) for k in _middle_first(xy, [number[s] for s in largest])]
-    return min(tried, key=lambda errors: float(np.max(errors[np.isfinite(errors)], initial=0.0)))
+    errors, frame = network_errors(xy, ends, information, seen_control(route.space, xy))
+    return PredictedErrors(errors, "control points" if frame is None else stops[frame])
 
 
-MOST_FRAMES = 3
-"""Stops tried as the frame of a network, those nearest to its middle."""
-
-
-def _middle_first(xy: FloatArray, rows: list[int]) -> list[int]:
-    away = np.hypot(*(xy[rows] - xy[rows].mean(axis=0)).T)
-    return [rows[k] for k in np.argsort(away, kind="stable")[:MOST_FRAMES]]
+def inaccurate(route: Route) -> Iterator[Finding]:
+    """Remedy if a scan's predicted error exceeds the accuracy required."""
+    asked = _settings(route).accuracy
+    if asked is None or not _settings(route).registers:
+        return
+    predicted = predicted_errors(route)
+    errors = CONFIDENCE * 1000 * predicted.m
+    beyond = np.flatnonzero(np.isfinite(errors) & (errors > asked))
+    if len(beyond):
+        worst = int(beyond[np.argmax(errors[beyond])])
+        x, y = route.xy[worst].tolist()
+        yield Finding(
+            "accuracy_not_met",
+            f"the predicted error of {_names(route)[worst]} is {errors[worst]:.1f} mm (99 %) in the frame of "
+            f"{predicted.frame}, with {asked:g} mm required, and no other stop lowers it; measure a target "
+            f"that it sees as a control point, near ({x:.1f}, {y:.1f}), and give it as --control",
+            at=(x, y),
+        )
 
 
 def _names(route: Route) -> tuple[str, ...]:
@@ -84,16 +102,16 @@ SCANS_APART = ("scans_apart", "scans_not_joined")
 
 
 def scans_apart(route: Route) -> Iterator[Finding]:
-    """Remedy for each separate component of the network; without a required overlap, their number."""
+    """Remedy for each separate component of the network; where scans need not register, their number."""
     settings, count = _settings(route), len(route.order)
     names = stop_names(count)
     _, *others = Network(tuple(names), registered_pairs(route)).pieces or ((),)
-    if settings.least_overlap == 0:
+    if not settings.registers:
         if others:
             yield Finding(
                 "scans_not_joined",
-                f"the scans fall into {len(others) + 1} components that no overlap connects; set up target "
-                f"spheres, or plan with --overlap {USUAL_SHARE:g}",
+                f"the scans fall into {len(others) + 1} components that no common surfaces connect; set up "
+                "target spheres, or plan with --register",
             )
         return
     called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]
@@ -128,11 +146,16 @@ def _remedy(
             found = (worth, k, int(pairs.other[index]))
             best = max(best, found) if best else found
     if best is not None:
-        (hold, common), k, j = best
-        x, y = overlaps.middle_of_common(k, j) + local_origin(space.floor)
-        spheres = f"target spheres that {names[k]} and {names[j]} both see would join them, such as near "
-        seen = f" (they see {common:.1f} m of boundary in common, which hold as {hold:.2f} m do)"
-        return f"{spheres}({x:.1f}, {y:.1f}){seen}", (x, y)
+        _, k, j = best
+        x, y = (overlaps.middle_of_common(k, j) + local_origin(space.floor)).tolist()
+        spheres = f"a target sphere or board that {names[k]} and {names[j]} both see would join them, such as"
+        return f"{spheres} near ({x:.1f}, {y:.1f}): {_reason(route, k, j)}", (x, y)
+    if (between := _midway(route, here, there)) is not None:
+        k, j, (x, y) = between
+        near = float(np.hypot(*(route.xy[k] - route.xy[j]))) <= 2 * _settings(route).farthest_overlap
+        target = "a target sphere or board" if near else "a stop, with a target sphere or board on each side,"
+        means = f"{target} between {names[k]} and {names[j]} would join them, such as"
+        return f"{means} at ({x:.1f}, {y:.1f}): they see no boundary in common", (x, y)
     opening = _nearest_opening(space.openings, route.xy[here], route.xy[there])
     if opening is None:
         return (
@@ -147,6 +170,44 @@ def _remedy(
         else f"it would join them if it were not {opening.why}: a scan from it"
     )
     return f"{kind} {name} at ({x:.1f}, {y:.1f}) is nearest to both; {advice} or spheres there", (x, y)
+
+
+def _midway(route: Route, here: IntArray, there: IntArray) -> tuple[int, int, tuple[float, float]] | None:
+    """The nearest stops of two sets in sight of one another, and the position midway; None if none are."""
+    origin = local_origin(route.space.floor)
+    solids = to_shape(route.space.occluders, origin)
+    shapely.prepare(solids)
+    away = np.hypot(*(route.xy[here][:, None] - route.xy[there][None]).transpose(2, 0, 1))
+    for flat in np.argsort(away, axis=None, kind="stable").tolist():
+        i, j = divmod(flat, len(there))
+        ends = route.xy[[here[i], there[j]]]
+        if not solids.intersects(shapely.LineString(ends - origin)):
+            x, y = ends.mean(axis=0).tolist()
+            return int(here[i]), int(there[j]), (x, y)
+    return None
+
+
+FREE_M = 0.5
+"""Predicted error from which on a pair is free, metres."""
+
+
+def _reason(route: Route, k: int, j: int) -> str:
+    """The reason why two stops that see common boundary do not register."""
+    overlaps, asked = _overlaps_of_stops(route), _settings(route).least_overlap
+    pairs = overlaps.of(k)
+    at = np.flatnonzero(pairs.other == j)
+    common, share, hold = (float(values[at][0]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
+    if common < LEAST_COMMON_M:
+        return f"they see only {common:.1f} m of boundary in common"
+    if hold >= LEAST_HOLD_M:
+        return f"they see {percent(share)} of a scan in common, of {percent(asked)} required"
+    error = float(error_of(np.array([hold]))[0])
+    x, y, turn = overlaps.weakest_move(k, j)
+    direction = math.degrees(math.atan2(y, x)) % 180
+    how = "in heading" if abs(turn) > math.hypot(x, y) else f"along {direction:.0f}° from +x"
+    if error > FREE_M:
+        return f"no surface that both see holds them {how}"
+    return f"their predicted error {how} is {1000 * error:.0f} mm (standard deviation)"
 
 
 def _nearest_opening(

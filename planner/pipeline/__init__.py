@@ -62,16 +62,16 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
 
 
 def _selected(found: Candidates, observe: Observe) -> Selection:
-    """Select the fewest stops."""
-    from stopgo.planner.selection import select
-    from stopgo.planner.selection.continuous_selection import SELECTOR, anywhere
-    from stopgo.planner.selection.refine import refined
+    """Select the fewest stops, and more where the accuracy required needs them."""
+    from stopgo.planner.selection.accurate import accurate
+    from stopgo.planner.selection.continuous_selection import SELECTOR, select_anywhere
+    from stopgo.planner.selection.refine import select_refined
     from stopgo.planner.visibility import visibility
 
     observe(found)
     seen = visibility(found)
     observe(seen)
-    return (anywhere if found.space.settings.selector == SELECTOR else refined)(select(seen))
+    return accurate((select_anywhere if found.space.settings.selector == SELECTOR else select_refined)(seen))
 
 
 def _in_least_time(route: Route) -> Route:

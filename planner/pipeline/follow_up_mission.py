@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
@@ -26,9 +25,10 @@ from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.stages import NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.planner.candidates import candidates
+from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import model_solids, options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
@@ -231,29 +231,10 @@ def _with_poses(
         start = planned.mission.start
         poses = np.tile((start.x, start.y, start.heading), (int(totals_of_plan(seen).asked.max()), 1))
         views = [np.flatnonzero(measured & seen.visible)] * len(poses)
-    joined = _joined(seen.candidates, poses)
+    joined = with_scans(seen.candidates, poses)
     units = [*(seen.seen_by(row) for row in range(seen.rows)), *views]
     whole = visibility_of(joined, units, method=seen.method)
     return whole, np.arange(seen.rows, seen.rows + len(poses))
-
-
-def _joined(found: Candidates, poses: ScanPoses) -> Candidates:
-    """Return the candidates with scan poses added; these do not count for the visible share."""
-    count = len(poses)
-    more: dict[str, Any] = {
-        "xy": poses[:, :2], "room": np.full(count, -1), "reason": np.full(count, KEPT),
-        "part": np.full(count, found.chosen_part),
-        "doorway": np.zeros(count, bool), "must": np.zeros(count, bool),
-    }  # fmt: skip
-    if len(found.heading):
-        more["heading"] = poses[:, 2]
-    both = {name: _frozen(getattr(found, name), values) for name, values in more.items()}
-    extra = found.extra if len(found.extra) else np.zeros(len(found.xy), bool)
-    return replace(found, **both, extra=_frozen(extra, np.ones(count, bool)))
-
-
-def _frozen(one: Any, other: Any) -> Any:
-    return frozen(np.concatenate([one, other]), one.dtype)
 
 
 def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float) -> Mission:

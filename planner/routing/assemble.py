@@ -77,7 +77,7 @@ def assemble(
             return_=None if route.return_leg is None else _line(route.return_leg),
             policy=policy_of(settings),
             origin=origin_of(settings, floor=floor.name, digest=floor.digest),
-            network=registered_pairs(route) if settings.least_overlap > 0 else msgspec.UNSET,
+            network=registered_pairs(route) if settings.registers else msgspec.UNSET,
         )
     )
 

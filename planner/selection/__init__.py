@@ -64,16 +64,16 @@ NAMES = {
 }
 
 
-def select(visibility: Visibility) -> Selection:
+def select(visibility: Visibility, *, joined: bool = True) -> Selection:
     """Choose stops by the method of the settings, with a lower bound on their number.
 
     Required stops, and doorways added for registration, are chosen first and count. Where scans must
-    register with one another, doorways are offered too.
+    register with one another, doorways are offered too. Not `joined`, the scans need not register.
     """
     settings = visibility.settings
     method = variant("selector", settings.selector, METHODS)
     whole, fixed, problem = cover_problem(visibility)
-    if settings.least_overlap > 0:
+    if settings.registers and joined:
         rows, bound = _connected(visibility, whole, fixed, np.arange(whole.rows), method)
         return _selection(visibility, whole, rows, bound, method)
     rows, bound = _solved(method, problem, settings)
@@ -87,6 +87,12 @@ def quick_estimate(visibility: Visibility) -> tuple[int, int]:
     start, bound = _greedy(problem, visibility.settings)
     rows = improved(problem, start, at_least=bound, swaps=QUICK_SWAPS)
     return len(fixed) + len(rows), len(fixed) + bound
+
+
+def greedy_count(visibility: Visibility) -> int:
+    """Number of stops of a greedy selection whose scans need not register."""
+    _, fixed, problem = cover_problem(visibility)
+    return len(fixed) + len(greedy(problem))
 
 
 def cover_problem(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
@@ -131,10 +137,12 @@ class Searches:
     @staticmethod
     def default(settings: Settings) -> Search:
         """Drop-and-repair; it ignores the conditions, and its caller connects the components."""
-        return lambda cover, start, conditions: (
-            improved(cover, start, at_least=counting_bound(cover), swaps=SWAPS_BETWEEN),
-            0,
-        )
+
+        def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
+            bound = lower_bound(cover, found=len(start))
+            return improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN), bound
+
+        return search
 
     @staticmethod
     def exact(settings: Settings) -> Search:
@@ -160,7 +168,7 @@ def select_follow_up(visibility: Visibility, done: IntArray) -> Selection:
     """
     settings = visibility.settings
     method = variant("selector", settings.selector, METHODS)
-    if settings.least_overlap > 0:
+    if settings.registers:
         whole = cover_of(visibility, demands_of(visibility))
         both, bound = _connected(visibility, whole, done, offered_for_follow_up(visibility, done), method)
     else:
@@ -239,6 +247,7 @@ __all__ = [
     "Selector",
     "cover_problem",
     "coverage_steps",
+    "greedy_count",
     "offered_for_follow_up",
     "quick_estimate",
     "remaining_cover",

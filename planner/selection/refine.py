@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.selection import select
+from stopgo.planner.selection import greedy_count, select
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -28,18 +29,32 @@ MOST = 25
 """Most stops for which refinement is the default: beyond, it takes more than a second."""
 
 
-def refined(selection: Selection) -> Selection:
-    """A selection with fewer stops, some of them off the pattern; the given one where none is saved."""
-    settings = selection.settings
+def select_refined(seen: Visibility) -> Selection:
+    """The selection, with fewer stops where positions off the pattern save some."""
+    settings = seen.settings
     if settings.coverage_rule == "paper" or settings.fov < 360:
-        return selection
-    if not (len(selection.chosen) <= MOST if settings.refine is None else settings.refine):
-        return selection
-    nearby = _nearby_candidates(selection)
+        return select(seen)
+    if settings.registers:
+        return _select_joined(seen)
+    first = select(seen)
+    nearby = _nearby_candidates(first) if _refines(settings, len(first.chosen)) else None
     if nearby is None:
-        return selection
-    again = select(merged(selection.visibility, visibility(nearby)))
-    return again if len(again.chosen) < len(selection.chosen) else selection
+        return first
+    again = select(merged(seen, visibility(nearby)))
+    return again if len(again.chosen) < len(first.chosen) else first
+
+
+def _select_joined(seen: Visibility) -> Selection:
+    """The selection whose scans register, also from positions near the stops of one that need not."""
+    if not _refines(seen.settings, greedy_count(seen)):
+        return select(seen)
+    nearby = _nearby_candidates(select(seen, joined=False))
+    return select(seen if nearby is None else merged(seen, visibility(nearby)))
+
+
+def _refines(settings: Settings, stops: int) -> bool:
+    """True if more positions are offered: where required, else for few stops."""
+    return stops <= MOST if settings.refine is None else settings.refine
 
 
 def _nearby_candidates(selection: Selection) -> Candidates | None:

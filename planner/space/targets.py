@@ -207,8 +207,10 @@ def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:
     return owners
 
 
-def without_needless_vertices(shape: BaseGeometry, floor: FloorPlan) -> BaseGeometry:
+def without_needless_vertices(shape: BaseGeometry, floor: FloorPlan | None = None) -> BaseGeometry:
     """Remove vertices on a straight face of one element, which crossings inside the union left there.
+
+    Without a floor all faces count as one element's.
 
     They would divide a face and so give more units than the paper's least number. A straightened face keeps
     clear of every other vertex, so the outlines still meet at the same points and nowhere else.
@@ -228,9 +230,10 @@ def without_needless_vertices(shape: BaseGeometry, floor: FloorPlan) -> BaseGeom
 class _Corners:
     """All vertices of a union, with the test for vertices that a face does not need."""
 
-    def __init__(self, shape: BaseGeometry, floor: FloorPlan) -> None:
+    def __init__(self, shape: BaseGeometry, floor: FloorPlan | None) -> None:
         faces = face_segments(shape)
-        self._owner = dict(zip(map(_key, faces), owners_of(faces, floor), strict=True))
+        owners = [0] * len(faces) if floor is None else owners_of(faces, floor)
+        self._owner = dict(zip(map(_key, faces), owners, strict=True))
         self._uses = Counter(map(_key, faces[:, 0]))
         self._all = to_grid(np.array([*self._uses]).reshape(-1, 2)).astype(float)
         self._tree = shapely.STRtree(shapely.points(self._all))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray, bounds, frozen
 from stopgo.mission.stages import Candidates, NavigableSpace, Visibility
@@ -66,10 +67,15 @@ def sides_of_door(space: NavigableSpace, point: FloatArray) -> FloatArray:
 
 
 def open_space(candidates: Candidates) -> Mesh:
-    """A mesh of the open space: a frame around the floor, minus the occluders.
+    """A mesh of the open space: a frame around the floor, minus the occluders."""
+    space = candidates.space
+    return open_space_around(candidates, whole_steps_of(space.occluders, local_origin(space.floor)))
 
-    The occluders are in whole grid steps, where their outlines meet only at vertices. So the mesh's edges
-    are exactly the faces of the occluders.
+
+def open_space_around(candidates: Candidates, solids: BaseGeometry) -> Mesh:
+    """A mesh of the open space around these solids, which are the occluders in whole grid steps.
+
+    Their outlines meet only at vertices. So the mesh's edges are exactly their faces.
     """
     space = candidates.space
     origin = local_origin(space.floor)
@@ -77,4 +83,4 @@ def open_space(candidates: Candidates) -> Mesh:
     low_x, low_y, high_x, high_y = bounds([space.targets.a, space.targets.b, candidates.xy, *outlines])
     corners = np.array([(low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN)]) - origin
     frame = shapely.box(*to_grid(corners).ravel())
-    return mesh_of(shapely.difference(frame, whole_steps_of(space.occluders, origin)))
+    return mesh_of(shapely.difference(frame, solids))

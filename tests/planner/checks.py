@@ -19,6 +19,7 @@ from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, 
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
 from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.space.targets import face_segments
+from stopgo.planner.visibility.exact_sight import viewpoints_of
 from tests.faults.sizes import FULL
 from tests.planner.oracle import visible_pairs
 
@@ -202,10 +203,18 @@ def matrix_by_force(visibility: Visibility, always: np.ndarray) -> np.ndarray:
 
 
 def by_force(found: Candidates, rows: np.ndarray) -> np.ndarray:
+    """Units that candidates see; those in closed doorways look from both sides of the door's line."""
+    eyes, row = viewpoints_of(found)
+    seen = seen_by_eyes(found, eyes[np.isin(row, rows)])
+    of = np.searchsorted(rows, row[np.isin(row, rows)])
+    return np.array([seen[of == k].any(axis=0) for k in range(len(rows))])
+
+
+def seen_by_eyes(found: Candidates, eyes: np.ndarray) -> np.ndarray:
     space, targets = found.space, found.space.targets
     origin = local_origin(space.floor)
     return visible_pairs(
-        to_grid(found.xy[found.kept] - origin)[rows],
+        to_grid(eyes - origin),
         face_segments(whole_steps_of(space.occluders, origin)).astype(np.int64),
         to_grid(targets.a - origin),
         to_grid(targets.b - origin),

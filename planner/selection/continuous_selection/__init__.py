@@ -40,19 +40,20 @@ MOST_OFFERED = 600
 SELECTOR = "anywhere"
 
 
-def anywhere(selection: Selection) -> Selection:
+def select_anywhere(seen: Visibility) -> Selection:
     """The selection with new positions offered wherever they help, and a bound over every position.
+
+    The bound is of selections whose scans need not register. It holds where they must, too.
 
     Raises
     ------
     InputError
         If the settings use a parameter for which the bound does not hold.
     """
-    seen = selection.visibility
     _check(seen.settings)
     search = _CellSearch(seen)
     search.run()
-    found = _best_of(selection, search.offered())
+    found = _best_of(select(seen), search.offered())
     fixed, bound = len(search.fixed), search.bound
     least = min(fixed + bound, len(found.chosen))
     method = found.method.removesuffix(", proved fewest") + ", any place offered"
@@ -63,7 +64,6 @@ def anywhere(selection: Selection) -> Selection:
 def _check(settings: Settings) -> None:
     """Refuse parameters that the visibility of cells does not model."""
     wrong = {
-        f"--overlap {settings.least_overlap:g}": settings.least_overlap > 0,
         f"--min-views {settings.views}": settings.least_views > 1,
         f"--fov {settings.fov:g}": settings.fov < 360,
         f"--visibility {settings.visibility}": settings.visibility != "exact",
@@ -184,4 +184,4 @@ def _most_on_each(cells: PositionCells, worth: FloatArray, units: int) -> FloatA
     return most
 
 
-__all__ = ["SELECTOR", "anywhere"]
+__all__ = ["SELECTOR", "select_anywhere"]

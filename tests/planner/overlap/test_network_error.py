@@ -65,7 +65,7 @@ def test_the_information_of_a_pair_is_that_of_its_walls_wherever_the_origin_is(
 
 def test_a_plan_reports_the_worst_predicted_error() -> None:
     made = plan(two_rooms(0.9), Settings(overlap=0.1)).first
-    errors = predicted_errors(made.route)
+    errors = predicted_errors(made.route).m
     (pair,) = registered_pairs(made.route)
     assert sorted(errors > 0) == [False, True]
     assert errors.max() < 2 * float(error_of(np.array([pair.hold_m]))[0])

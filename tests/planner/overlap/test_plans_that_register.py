@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from stopgo.mission.document import stop_names
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
+from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.stages.network import Network, network_of
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates
@@ -24,6 +26,7 @@ from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, door, floor_of, room, shell, wall
 
 ASKED = Settings(d_sec=0.4, edge=0.0, overlap=0.1, seed=1)
+LOOSE = replace(ASKED, register=False, overlap=None)
 
 
 def three_rooms(*, gap: float = 0.9) -> FloorPlan:
@@ -65,8 +68,8 @@ def test_a_pair_that_says_more_than_is_counted_is_a_problem(made: PlanReport) ->
     assert "counted line by line" in problem.message
 
 
-def test_without_overlap_there_is_no_network_and_not_more_stops(made: PlanReport) -> None:
-    plain = plan(three_rooms(), replace(ASKED, overlap=0.0)).mission
+def test_without_registration_there_is_no_network_and_not_more_stops(made: PlanReport) -> None:
+    plain = plan(three_rooms(), LOOSE).mission
     assert network_of(plain) is None
     assert "network" not in msgspec.to_builtins(plain)
     assert len(plain.stops) <= len(made.mission.stops)
@@ -80,24 +83,25 @@ def test_rooms_that_cannot_see_one_another_are_told_with_a_way_out() -> None:
     network = network_of(report.mission)
     assert network is not None
     assert len(apart) == len(network.pieces) - 1 > 0
-    assert "spheres" in apart[0].message
+    assert "a target sphere or board that" in apart[0].message
+    assert "of 99.0 % required" in apart[0].message
     assert report.strict_exit_code == 1
     assert "COMPONENTS" in report.as_text()
 
 
 def test_a_plan_that_nobody_asked_to_register_tells_into_how_many_pieces_its_scans_fall() -> None:
-    report = PlanReport(plan(three_rooms(), replace(ASKED, overlap=0.0, range=3.0)).first, {}, {})
+    report = PlanReport(plan(three_rooms(), replace(LOOSE, range=3.0)).first, {}, {})
     (told,) = [item for item in report.figures.findings if item.code == "scans_not_joined"]
     joined = Network(tuple(stop_names(len(report.mission.stops))), registered_pairs(report.part.route))
     assert len(joined.pieces) > 1
     count = len(joined.pieces)
-    assert told.message.startswith(f"the scans fall into {count} components that no overlap connects")
+    assert told.message.startswith(f"the scans fall into {count} components that no common surfaces connect")
     assert told.message in report.as_text()
     assert report.strict_exit_code == 0, "a surveyor may have spheres"
 
 
 def test_a_plan_whose_scans_join_anyway_says_nothing() -> None:
-    made = plan(floor_of(box(0, 0, 6, 4), elements=(shell(0, 0, 6, 4),)), replace(ASKED, overlap=0.0))
+    made = plan(floor_of(box(0, 0, 6, 4), elements=(shell(0, 0, 6, 4),)), LOOSE)
     assert not [item for item in made.first.figures.findings if item.code in SCANS_APART]
 
 
@@ -108,7 +112,7 @@ def test_a_further_mission_joins_the_scans_that_were_taken(made: PlanReport) -> 
         space.floor, replace(space.settings, coverage=0.5, room_coverage=0.0), made.mission
     )
     driven = np.array([(2.0, 1.0, 0.0), (10.4, 3.0, 0.0)])
-    loose = top_up(replace(planned, settings=replace(planned.settings, overlap=0.0)), driven)
+    loose = top_up(replace(planned, settings=replace(planned.settings, register=False, overlap=None)), driven)
     joining = top_up(planned, driven)
     assert joining is not None
     assert loose is None or len(loose.stops) <= len(joining.stops)
@@ -117,3 +121,35 @@ def test_a_further_mission_joins_the_scans_that_were_taken(made: PlanReport) -> 
     rows = candidates(navigable(space.floor, asked))
     taken = np.array([np.flatnonzero((rows.xy[rows.kept] == place).all(axis=1))[0] for place in places])
     assert len(components_of(links_of(rows), taken)) == 1
+
+
+def test_scans_register_where_it_is_asked_or_an_overlap_is() -> None:
+    assert not Settings().registers
+    assert Settings(register=True).registers
+    assert ASKED.registers
+    made = plan(three_rooms(), Settings(register=True, d_sec=0.4, edge=0.0)).mission
+    network = network_of(made)
+    assert network is not None
+    assert len(network.pieces) == 1
+
+
+def test_an_overlap_ratio_of_scans_that_need_not_register_is_refused() -> None:
+    with pytest.raises(InputError, match=r"--overlap 0\.1: has no effect with --no-register"):
+        check_settings(replace(ASKED, register=False))
+    check_settings(LOOSE)
+
+
+def test_a_separate_scan_is_told_with_the_reason_and_a_position_for_a_target() -> None:
+    """A corridor of 60 m whose ends no stop in its middle sees: its walls hold nothing along it."""
+    corridor = floor_of(box(0, 0, 60, 3), elements=(shell(0, 0, 60, 3),))
+    asked = Settings(register=True, d_sec=0.5, edge=0.0, overlap_range=8.0, range=8.0)
+    made = plan(corridor, asked).first
+    told = [item for item in made.figures.findings if item.code == "scans_apart"]
+    assert told
+    assert all("a target sphere or board" in item.message and item.at is not None for item in told)
+    assert any("no surface that both see holds them along" in item.message for item in told)
+
+
+def test_doorways_alone_are_no_candidates() -> None:
+    with pytest.raises(NegativeResult, match="no candidate is left"):
+        plan(three_rooms(), replace(ASKED, d_sec=100.0))

@@ -121,7 +121,7 @@ def test_one_stop_is_proved_fewest_of_all_places() -> None:
 
 @pytest.mark.parametrize(
     ("other", "told"),
-    [({"overlap": 0.1}, "--overlap 0.1"), ({"views": 2}, "--min-views 2"), ({"fov": 90.0}, "--fov 90")],
+    [({"views": 2}, "--min-views 2"), ({"fov": 90.0}, "--fov 90")],
 )
 def test_what_cells_do_not_know_is_refused(other: dict[str, float], told: str) -> None:
     with pytest.raises(InputError, match=f"--selector anywhere: not possible with {told}"):
