@@ -8,7 +8,18 @@ import threading
 from pathlib import Path
 
 from tests.faults.sizes import size
-from tests.faults.test_kill import SPEED_UP, Outcome, Supervisor, check, drive, mission, reached, stubbornly
+from tests.faults.test_kill import (
+    SPEED_UP,
+    USUAL,
+    Outcome,
+    Supervisor,
+    begin,
+    check,
+    mission,
+    reached,
+    see_through,
+    stubbornly,
+)
 
 LONGEST_S = 5.0
 """A link that is silent for 2 s is closed."""
@@ -50,7 +61,8 @@ def trial_of_freezes(seed: int, folder: Path) -> tuple[Outcome, int]:
         reached(supervisor.endpoint, outcome, timeout_s=20.0) as station,
     ):
         stubbornly(lambda: station.push(mission()), outcome)
-        paused = drive(station, chance, outcome)
+        begin(station, outcome)
+        paused = see_through(station, chance, outcome, pauses=USUAL.pauses)
     assert supervisor.kills == 0
     check(folder, mission(), paused)
     return outcome, freezing.freezes
