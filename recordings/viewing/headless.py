@@ -35,7 +35,7 @@ Blueprint = Mapping[str, Any]
 
 
 def write_pictures(recordings: Sequence[Path], folder: Path) -> list[Path]:
-    """Write a PNG of each view of recordings that are opened together, at their newest moment.
+    """Write a PNG of each view of the recording in the files, at its newest moment.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def has_vulkan() -> bool:
 def viewer(files: Sequence[Path | str], *, size: str = SIZE) -> Iterator[ViewerClient]:
     """Open a viewer on the files, or on `--connect ADDRESS`; it ends with the block.
 
-    The files are given on the command line, as a person would: opened later they would not be merged.
+    It shows one recording at a time: files with several recording ids are not joined.
     """
     port = free_port()
     command = [str(VIEWER), "--headless", "--bind", "127.0.0.1", "--port", str(port)]

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -61,7 +64,8 @@ def review(
     if view:
         from stopgo.recordings.viewing.viewer import open_viewer
 
-        open_viewer([item.recording.path for item in found.recordings])
+        with _shown_together(found.recordings) as paths:
+            open_viewer(paths)
     return found.check_code if check else found.exit_code
 
 
@@ -79,7 +83,23 @@ def _write_files(found: Review, html: Path | None, out: Path | None, png: Path |
     if png is not None:
         from stopgo.recordings.viewing.headless import write_pictures
 
-        write_pictures([item.recording.path for item in _of_one_mission(found, png)], png)
+        with _shown_together(_of_one_mission(found, png)) as paths:
+            write_pictures(paths, png)
+
+
+@contextmanager
+def _shown_together(recordings: Sequence[RecordingReview]) -> Iterator[list[Path]]:
+    """Yield the files to open: plan and runs of one mission as one recording, for a viewer joins no files."""
+    paths = [item.recording.path for item in recordings]
+    if len(paths) < 2 or len({item.recording.mission_id for item in recordings}) > 1:
+        yield paths
+        return
+    from stopgo.recordings.catalog.merging import merge
+
+    with TemporaryDirectory() as folder:
+        merged = Path(folder) / "together.rrd"
+        merge([item.recording for item in recordings], merged)
+        yield [merged]
 
 
 def _of_one_mission(found: Review, folder: Path) -> tuple[RecordingReview, ...]:

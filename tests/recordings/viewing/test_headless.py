@@ -22,9 +22,9 @@ def test_every_view_is_drawn_to_a_file_of_its_own(plan: Path, field: Path, tmp_p
     assert told.returncode == 0, told.stderr
     pictures = sorted((tmp_path / "views").iterdir())
     names = [path.stem.partition("-")[2] for path in pictures]
-    assert names[:4] == ["Plan-and-run", "3D", "Report", "Plan-report"]
+    assert names[:5] == ["Plan-and-run", "3D", "Report", "Run-run-1", "Plan-report"]
     assert names[-1] == "Log"
-    assert len(names) == len(set(names)) == 16
+    assert len(names) == len(set(names)) == 17
     for path in pictures:
         assert Image.open(path).convert("RGB").getcolors(10) is None, f"{path} has no more than 10 colours"
     sight = next(path for path in pictures if "What-a-candidate-sees" in path.name)
