@@ -57,7 +57,7 @@ class RecordingReview:
         """Return the review for a person; without what to do next if there are more runs of the mission."""
         contents = self.recording.contents
         lines = [
-            f"{self.recording.path}: recording {contents.recording_id} (mission of the same id)",
+            f"{self.recording.path}: recording {contents.recording_id}, mission {self.recording.mission_id}",
             f"  timelines {', '.join(contents.timelines)};"
             f" {len(contents.rows)} entities, {contents.total_rows} rows",
             *(f"  problem: {problem}" for problem in self.problems),

@@ -84,5 +84,5 @@ def _print_outcome(comparison: Comparison, final_state: str, out: Path) -> int:
 
     typer.echo(f"\n{comparison_text(comparison)}\n")
     typer.echo(f"run {comparison.run_id} {final_state}")
-    typer.echo(f"look at plan and run: rerun {out / 'field.rrd'}")
+    typer.echo(f"look at both: stopgo review {out / 'plan.rrd'} {out / 'field.rrd'} --view")
     return judge(comparison).exit_code
