@@ -25,6 +25,8 @@ from stopgo.mission.errors import InputError, OutcomeUnknown
 
 TRIES = 2
 TICK_S = 0.5
+PLANS_EACH = 16
+"""Plans of one process; its memory grows by some megabytes with each."""
 BASE_BYTES = 350e6
 """Memory of a process that plans a small floor."""
 BYTES_PER_BYTE = 12.0
@@ -55,8 +57,13 @@ class LocalEngine:
     def __init__(self, workers: int) -> None:
         self.slots = workers
         self._pools: list[Executor | None] = [None] * workers
+        self._worked = [0] * workers
+        """Plans that each slot's process has made."""
 
     def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
+        if self._worked[slot] >= PLANS_EACH:
+            self.renew(slot)
+        self._worked[slot] += 1
         pool = self._pools[slot]
         if pool is None:
             pool = self._pools[slot] = worker_process()
@@ -64,6 +71,7 @@ class LocalEngine:
 
     def renew(self, slot: int) -> None:
         pool, self._pools[slot] = self._pools[slot], None
+        self._worked[slot] = 0
         if pool is not None:
             pool.shutdown(wait=False, cancel_futures=True)
 
