@@ -13,7 +13,7 @@ def charge_text(charge: float | None) -> str:
 def health_text(report: StateReport) -> str:
     """Return battery, position estimate and geofence; the latter two only of a robot that reports either."""
     failed = ", its failsafe lasts" if report.battery_ok is False else ""
-    words = [f"battery {charge_text(report.battery)}{failed}"]
+    words = [f"battery {charge_text(report.charge)}{failed}"]
     if (report.battery_ok, report.position_ok, report.fence_ok) != (None, None, None):
         words.append(f"position estimate {_word(report.position_ok, 'lost')}")
         words.append(f"geofence {_word(report.fence_ok, 'breached')}")

@@ -125,8 +125,8 @@ class RunDrawing:
         stop_state = "" if report.stop_state is None else report.stop_state
         self._at(self.names.flat(entities.STOP_STATE), rr.StateChange(state=stop_state), report.robot_ns)
         self._at(self.names.flat(entities.STOP), rr.StateChange(state=report.stop or ""), report.robot_ns)
-        if report.battery is not None:
-            battery = rr.Scalars(report.battery * 100)
+        if report.charge is not None:
+            battery = rr.Scalars(report.charge * 100)
             self._at(self.names.metric(entities.METRIC_BATTERY), battery, report.robot_ns)
         self._note_vehicle_health(report)
 
@@ -153,9 +153,10 @@ class RunDrawing:
 
     def health(self, report: Health) -> None:
         """Write the base's health, and log each change of a value that stops a robot."""
-        known = {name: value for name in HEALTH_FIELDS if (value := getattr(report, name)) is not None}
+        values = {"battery": report.charge} | {name: getattr(report, name) for name in HEALTH_FIELDS}
+        known = {name: value for name, value in values.items() if value is not None}
         self._at(self.names.health, rr.DynamicArchetype("Health", components=known), report.robot_ns)
-        stops = {name: getattr(report, name) for name in HEALTH_FIELDS[2:]}
+        stops = {name: getattr(report, name) for name in HEALTH_FIELDS[1:]}
         changed = {name for name, value in stops.items() if bool(value) != bool(self._stops.get(name))}
         self._stops = stops
         for name in sorted(changed):
@@ -336,7 +337,7 @@ class RunDrawing:
         self.canvas.columns(entity, indexes, *groups)
 
 
-HEALTH_FIELDS = ("battery", "localisation", "emergency_stop", "safety_field")
+HEALTH_FIELDS = ("localisation", "emergency_stop", "safety_field")
 EVENT_FIELDS = (
     *("event", "number", "revision", "stop", "reason", "deviation_m", "commander"),
     *("file", "size", "sha256", "points"),
