@@ -90,7 +90,7 @@ class Skipped(Event, frozen=True, kw_only=True):
     reason: str
 
 
-JUMPED_OVER = "jumped over by somebody"
+JUMPED_OVER = "jumped over by"
 """First words of the reason of a stop that was skipped by no command from here."""
 
 

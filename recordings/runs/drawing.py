@@ -33,7 +33,7 @@ from stopgo.mission.run.events import (
     StateReport,
     Unconfirmed,
 )
-from stopgo.mission.run.health_text import health_text
+from stopgo.mission.run.health_text import health_text, health_words
 from stopgo.mission.run.run_log import Track
 from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
 from stopgo.mission.stages.sight import Sight
@@ -79,7 +79,7 @@ class RunDrawing:
         self._acquired = AcquiredDrawing(sights[-1]) if sights else None
         self._thinner, self._trail, self._cross_track = Thinner(), Trail(), DelayedDeviation(mission)
         self._stops: dict[str, bool | None] = {}
-        self._vehicle_health: tuple[bool | None, ...] = (None, None, None)
+        self._vehicle_health: tuple[bool | None, ...] | None = None
         self._style()
         self._describe()
 
@@ -131,11 +131,20 @@ class RunDrawing:
         self._note_vehicle_health(report)
 
     def _note_vehicle_health(self, report: StateReport) -> None:
-        """Log the health of an autopilot's vehicle whenever it changes."""
-        health = (report.battery_ok, report.position_ok, report.fence_ok)
-        if health == self._vehicle_health:
+        """Write the vehicle's health at the begin, whenever it changes and at the end; log the changes."""
+        before, health = self._vehicle_health, (report.battery_ok, report.position_ok, report.fence_ok)
+        if health == before and report.state not in ("FINISHED", "ABORTED"):
             return
         self._vehicle_health = health
+        words = health_words(report)
+        values = {
+            "charge": report.battery, "battery": words.battery,
+            "position_estimate": words.position, "geofence": words.fence,
+        }  # fmt: skip
+        archetype = rr.DynamicArchetype("VehicleHealth", components=values)
+        self._at(self.names.vehicle_health, archetype, report.robot_ns)
+        if health == (before or (None, None, None)):
+            return
         level = "WARN" if False in health else "INFO"
         self._at(self.names.log, rr.TextLog(health_text(report), level=level), report.robot_ns)
 

@@ -16,6 +16,7 @@ from stopgo.bridge.mavlink.simulated.guided_target import GuidedTarget
 from stopgo.bridge.mavlink.simulated.lasting_failsafes import LastingFailsafes
 from stopgo.bridge.mavlink.simulated.parameters import Parameters, parameter_handlers
 from stopgo.bridge.mavlink.simulated.real_drive import RealDrive
+from stopgo.bridge.mavlink.simulated.remote_control import RemoteControl
 from stopgo.bridge.mavlink.simulated.rover import STANDING, Rover
 from stopgo.bridge.mavlink.simulated.steering import LAWS
 from stopgo.bridge.mavlink.simulated.streams import Streams
@@ -97,6 +98,7 @@ class Vehicle:
         self.failsafe = False
         """True while it holds because setpoints were missing, and no command has come since."""
         self.failsafes = LastingFailsafes(setup.faults)
+        self.remote_control = RemoteControl()
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setup.state)
@@ -307,6 +309,8 @@ class Vehicle:
             self.failsafes.begin(int(failsafe.amount), self.time.wall_ns)
             self.text(self.autopilot.failsafe_texts[int(failsafe.amount)])
             self.set_mode("hold")
+        for switch in self._mishaps.by("switch", up_s):
+            self.set_mode(self.remote_control.switch(int(switch.amount)))
 
     def _end_scan(self) -> None:
         message, why = self.camera.end(self.now_ns, self.time.boot_ms)

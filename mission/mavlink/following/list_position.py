@@ -24,6 +24,8 @@ class Jump:
     """Index of the item before it."""
     end: int
     """Index of the item after it."""
+    ns: int
+    """Time when it was seen."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,11 @@ class ListPosition:
             return False
         return jump.first < listed.stops[run.at].after <= jump.end
 
+    @property
+    def jumped_ns(self) -> int:
+        """Time of the last jump."""
+        return 0 if self._jump is None else self._jump.ns
+
     def is_at_stop(self, listed: ListedMission | None) -> bool:
         """Return True if the vehicle is at a stop, and not driving."""
         if listed is None or self._current is None:
@@ -139,4 +146,4 @@ class ListPosition:
             return
         passed_s = max((now.since_ns - before.since_ns) / 1e9, (now.since_ms - before.since_ms) / 1e3)
         if listed.wait_s(first, place) > passed_s + JUMP_SLACK_S:
-            self._jump = Jump(listed, first, place)
+            self._jump = Jump(listed, first, place, now.since_ns)
