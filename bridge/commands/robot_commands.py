@@ -88,15 +88,13 @@ def robot(
     """
     from stopgo.bridge.robot.program import RobotOptions
 
-    given = given_options(context)
     simulated = SimulatedOptions(at, read_map(map_), read_battery_life(battery_life), read_faults(fault))
     driven = AutopilotOptions(arm, set_origin, set_timeout, trigger, signing_key, vehicle, insecure)
-    body = body_of(controller, state, given, simulated, driven)
+    body = body_of(controller, state, given_options(context), simulated, driven)
     run(RobotOptions(
         name, listen, state, body, connect=connect, site=site, speed_up=speed_up, to_map=simulated.to_map,
         insecure=insecure, keys=keys, revisions=read_revisions(revision), faults=simulated.faults, say=say,
-        record_bytes=round(record * 1e6),
-    ), given)  # fmt: skip
+        record_bytes=round(record * 1e6)), given_options(context))  # fmt: skip
 
 
 def run(options: RobotOptions, given: GivenOptions) -> None:

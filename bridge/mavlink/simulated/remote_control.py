@@ -7,21 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.autopilots.kind import ModeName
-from stopgo.mission.mavlink.telemetry import Message
 
 CHANNELS, MODE_SWITCH = 8, 7
 """Number of channels, and the index of the mode switch (ArduPilot Rover: MODE_CH 8)."""
-MIDDLE_US, ABSENT = 1500, 65_535
+MIDDLE_US = 1500
 POSITIONS_US = (1100, 1300, 1425)
 """Values of the mode switch in its positions."""
 MODES: tuple[ModeName, ...] = ("manual", "hold", "auto")
 """Mode of each position."""
 UPPER_US = (1230, 1360)
 """Values up to which the switch is in the first and second position (RC_Channel::read_6pos_switch)."""
-SIGNAL = 200
-"""Strength of the signal, of 254."""
 UNTOUCHED = (0, 65_535)
 
 
@@ -45,7 +41,7 @@ class RemoteControl:
         now = self._channels[MODE_SWITCH]
         return None if now == before else MODES[sum(now > upper for upper in UPPER_US)]
 
-    def report(self, boot_ms: int) -> Message:
-        """RC_CHANNELS."""
-        values = [*self._channels, *[ABSENT] * (18 - CHANNELS)]
-        return dialect.MAVLink_rc_channels_message(boot_ms, CHANNELS, *values, SIGNAL)
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """Microseconds of each channel, as an autopilot reports them."""
+        return tuple(self._channels)

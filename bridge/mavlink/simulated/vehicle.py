@@ -90,15 +90,13 @@ class Vehicle:
     ) -> None:  # fmt: skip
         self.autopilot = autopilot = setup.autopilot
         self._setup, self._wall, self._transmit, self._makers = setup, wall, send, makers
-        self._mishaps = Mishaps(setup.faults)
-        self._saved_ns = 0
+        self._mishaps, self._saved_ns = Mishaps(setup.faults), 0
         self.time = VehicleClock(clock, wall, boots_by_wall=setup.faults.any("jitter") is not None)
         self.mode: ModeName = "manual"
         self.armed = False
         self.failsafe = False
         """True while it holds because setpoints were missing, and no command has come since."""
-        self.failsafes = LastingFailsafes(setup.faults)
-        self.remote_control = RemoteControl()
+        self.failsafes, self.remote_control = LastingFailsafes(setup.faults), RemoteControl()
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setup.state)

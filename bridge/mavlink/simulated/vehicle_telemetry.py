@@ -158,7 +158,9 @@ def item_reached(vehicle: Vehicle) -> Message | None:
 
 
 def rc_channels(vehicle: Vehicle) -> Message:
-    return vehicle.remote_control.report(vehicle.time.boot_ms)
+    channels = vehicle.remote_control.channels
+    values = [*channels, *[65_535] * (18 - len(channels))]
+    return dialect.MAVLink_rc_channels_message(vehicle.time.boot_ms, len(channels), *values, 200)
 
 
 def image_captured(vehicle: Vehicle) -> Message | None:

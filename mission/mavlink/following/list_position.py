@@ -37,7 +37,9 @@ class Work:
     """True if all is done."""
     since_ns: int
     since_ms: int
-    """The same on the vehicle's own clock."""
+    """The same on the vehicle's own clock; 0 as long as that is not known."""
+    begin_seen: bool
+    """True if the item before it was seen; else it may have become current long before."""
 
 
 class ListPosition:
@@ -127,8 +129,11 @@ class ListPosition:
         """Take a report of the current item at a time of the vehicle; return True if it is the same."""
         self._current = TimestampedMessage(message, now_ns)
         before = self._work
-        work = Work(message.seq, message.mission_state == MissionState.COMPLETE, now_ns, boot_ms)
+        complete = message.mission_state == MissionState.COMPLETE
+        work = Work(message.seq, complete, now_ns, boot_ms, begin_seen=before is not None)
         if before is not None and (before.sequence, before.complete) == (work.sequence, work.complete):
+            if before.since_ms == 0:
+                self._work = replace(before, since_ms=boot_ms)
             return True
         if before is not None and listed is not None:
             self._note_jump(listed, before, work)
@@ -144,6 +149,7 @@ class ListPosition:
             self._jump = replace(self._jump, end=place) if self._jump.listed is listed else None
         if place <= first or not 0 < before.since_ms <= now.since_ms:
             return
+        waits_s = listed.wait_s(first if before.begin_seen else first + 1, place)
         passed_s = max((now.since_ns - before.since_ns) / 1e9, (now.since_ms - before.since_ms) / 1e3)
-        if listed.wait_s(first, place) > passed_s + JUMP_SLACK_S:
+        if waits_s > passed_s + JUMP_SLACK_S:
             self._jump = Jump(listed, first, place, now.since_ns)

@@ -93,8 +93,12 @@ class Camera:
             self.poses.pop(0)
         return present[3]
 
-    def mode_change(self) -> str:
-        return self.switched
+    @property
+    def is_changed(self) -> bool:
+        return bool(self.switched)
+
+    def other_hands(self, within_s: float) -> str:
+        return ""
 
     def other_control(self) -> str:
         return self.taken
