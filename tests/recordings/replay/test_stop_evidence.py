@@ -17,6 +17,8 @@ from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replaying import replay
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 from tests.recordings.replay.test_replaying import log_of
+from tests.recordings.truth.drives import mission_with_return, shuffled
+from tests.recordings.truth.senses import sensed
 
 MISSION = wandering(1)
 FIRST = Placing(align="first")
@@ -151,6 +153,14 @@ def test_poses_every_five_seconds_are_never_a_no(seed: int) -> None:
     judged = drive_verdict(replay(log_of(rare), mission, Placing(align="first")))
     assert judged.answer != "no"
     assert "not at a stop" not in judged.text
+
+
+@pytest.mark.parametrize("seed", [3110, 1, 2, 3, 4, 5, 6, 7])
+def test_poses_every_five_seconds_are_never_a_no_in_any_order_of_the_stops(seed: int) -> None:
+    mission, chance = mission_with_return(seed), np.random.default_rng(seed)
+    poses = sensed(shuffled(mission, chance), 0.2)
+    judged = drive_verdict(replay(log_of(Track.of(poses.ns, poses.xy, poses.heading)), mission, THERE))
+    assert judged.answer == "unknown"
 
 
 def test_stops_that_were_visited_in_another_order_were_visited() -> None:
