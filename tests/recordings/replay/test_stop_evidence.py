@@ -17,7 +17,13 @@ from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replaying import replay
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 from tests.recordings.replay.test_replaying import log_of
-from tests.recordings.truth.drives import mission_with_return, shuffled
+from tests.recordings.truth.drives import (
+    about_the_start,
+    as_planned,
+    mission_with_return,
+    shifted,
+    shuffled,
+)
 from tests.recordings.truth.senses import sensed
 
 MISSION = wandering(1)
@@ -33,11 +39,48 @@ def seen(drive: Drive, kept: Callable[[np.ndarray], np.ndarray]) -> Track:
 
 
 @pytest.mark.parametrize("placing", [Placing(align="first"), Placing(align="stops")])
-def test_a_constant_drift_that_explains_every_halt_is_told_from_position_errors(placing: Placing) -> None:
-    """Wheels 1 % too large that turn away: six numbers explain all nine halts, within millimetres."""
+def test_a_constant_drift_that_explains_every_halt_is_no_evidence_for_them(placing: Placing) -> None:
+    """Wheels 1 % too large that turn away look like a robot whose map is turned and stretched."""
     found = replay(log_of(logged(driven(MISSION), Senses(slip=0.01))), MISSION, placing)
     assert found.comparison.greatest_deviation_m is not None and found.comparison.greatest_deviation_m > 0.1
-    assert drive_verdict(found).answer == "yes"
+    assert drive_verdict(found).answer == "unknown"
+
+
+@pytest.mark.parametrize("turn, scale", [(0.01, 1.0), (0.02, 1.0), (0.0, 1.01), (0.01, 0.99)])
+@pytest.mark.parametrize("placing", [THERE, FIRST, Placing(align="stops")], ids=["map", "first", "stops"])
+def test_a_tour_that_was_turned_or_stretched_is_never_a_yes(
+    turn: float, scale: float, placing: Placing
+) -> None:
+    """The robot's map lies so beside the drawing; at its start both agree."""
+    for seed in range(1, 4):
+        mission = mission_with_return(seed)
+        tour = about_the_start(mission, turn, scale)
+        assert not all(tour.good)
+        poses = sensed(tour)
+        track = Track.of(poses.ns, poses.xy, poses.heading)
+        for frame in ("map", "odom"):
+            assert drive_verdict(replay(log_of(track, frame=frame), mission, placing)).answer != "yes"
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+@pytest.mark.parametrize("by", [(0.9, -0.7), (0.1, 0.06), (-0.06, 0.02)])
+def test_a_tour_that_was_shifted_is_no_yes_by_a_fit_to_its_stops(seed: int, by: tuple[float, float]) -> None:
+    mission = mission_with_return(seed)
+    poses = sensed(shifted(mission, by))
+    log = log_of(Track.of(poses.ns, poses.xy, poses.heading))
+    judged = drive_verdict(replay(log, mission, Placing(align="stops")))
+    assert judged.answer == "unknown"
+    assert "give --map X,Y,HEADING" in judged.text
+
+
+def test_a_fit_to_the_stops_is_a_yes_where_the_log_begins_at_the_start() -> None:
+    mission = mission_with_return(1)
+    for writer in (shifted(mission, (0.0, 0.0)), as_planned(mission, np.random.default_rng(1))):
+        poses = sensed(writer)
+        track = Track.of(poses.ns, poses.xy, poses.heading)
+        assert drive_verdict(replay(log_of(track), mission, Placing(align="stops"))).answer == "yes"
+        late = Track.of(track.ns[200:], track.xy[200:], track.heading[200:])
+        assert drive_verdict(replay(log_of(late), mission, Placing(align="stops"))).answer == "unknown"
 
 
 @pytest.mark.parametrize("seed", range(1, 5))
