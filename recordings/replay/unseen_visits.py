@@ -77,9 +77,21 @@ JUMPS = "its poses jump while it is stationary; give another source of poses"
 
 
 def possible_s(track: Track, match: Match) -> float:
-    """Return the longest time that a standstill may have taken: from the pose before it to that after."""
+    """Return the longest time that a standstill may have taken: from the pose before it to that after.
+
+    A gap that begins within a second, while the robot is still there, counts as part of it.
+    """
+    slack_ns = int(LEAST_GAP_S * 1e9)
     before = int(np.searchsorted(track.ns, match.standstill.begin_ns)) - 1
     after = int(np.searchsorted(track.ns, match.standstill.end_ns, side="right"))
+    there = np.hypot(*(track.xy - match.standstill.xy).T) <= NEAR_M
+    gaps = np.flatnonzero(np.diff(track.ns) > slack_ns)
+    ends = track.ns[gaps] - match.standstill.end_ns
+    begins = match.standstill.begin_ns - track.ns[gaps + 1]
+    for k in gaps[(ends > 0) & (ends <= slack_ns) & there[gaps]].tolist():
+        after = max(after, k + 1)
+    for k in gaps[(begins > 0) & (begins <= slack_ns) & there[gaps + 1]].tolist():
+        before = min(before, k)
     begin, end = track.ns[max(before, 0)], track.ns[min(after, len(track) - 1)]
     return float(end - begin) / 1e9
 

@@ -15,6 +15,7 @@ from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replaying import replay
+from stopgo.recordings.replay.unseen_visits import possible_s
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 from tests.recordings.replay.test_replaying import log_of
 from tests.recordings.truth.drives import (
@@ -156,6 +157,30 @@ def test_poses_that_are_missing_during_a_stop_do_not_tell_that_nobody_was_there(
     judged = drive_verdict(replay(log_of(track), MISSION, THERE))
     assert judged.answer == "unknown"
     assert "8 of 9" in judged.text and "s05 is undecided" in judged.text and "without poses" in judged.text
+
+
+@pytest.mark.parametrize("late_s", [0.13, 0.23, 1.23, -3.3])
+def test_a_gap_into_which_the_robot_turned_away_does_not_tell_that_it_stood_too_shortly(
+    late_s: float,
+) -> None:
+    """Of 14 s at the stop, the last ones are unseen, and after the gap it has turned, or driven on."""
+    drive = driven(MISSION)
+    end = drive.halts[0].end_s + late_s
+    track = seen(drive, lambda s: (s <= end - 8.0) | (s >= end))
+    judged = drive_verdict(replay(log_of(track), MISSION, THERE))
+    assert judged.answer == ("unknown" if late_s > 0 else "yes")
+
+
+def test_a_gap_that_begins_just_behind_a_standstill_counts_with_it() -> None:
+    """The standstill ends one pose before the gap: autopilots round their poses."""
+    drive = driven(MISSION)
+    halt = drive.halts[0]
+    track = seen(drive, lambda s: (s <= halt.end_s - 4.2) | (s >= halt.end_s + 2.8))
+    found = replay(log_of(track), MISSION, THERE)
+    match = found.matches[0]
+    short = replace(match, standstill=replace(match.standstill, end_ns=match.standstill.end_ns - 10**8))
+    assert possible_s(found.run.poses, short) == pytest.approx(possible_s(found.run.poses, match))
+    assert possible_s(found.run.poses, short) > 14
 
 
 def test_a_stop_that_was_passed_in_sight_is_a_no() -> None:
