@@ -1,7 +1,8 @@
-"""Common error of a log that was fitted to the stops: the fit takes up a shift or turn of the whole drive.
+"""Common error of a log that was placed by itself: a shift or turn of the whole drive that placing takes up.
 
-Only the begin of the log shows it: a run begins at the mission's start. Each stop's error is the distance
-between its positions by the fit and by the first pose. Without headings, nothing shows a turn.
+After a fit to the stops only the begin of the log shows it: a run begins at the mission's start. Each stop's
+error is the distance between its positions by the fit and by the first pose. Without headings, nothing shows
+a turn, whether the log was fitted or placed by its begin.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ Pose = tuple[float, float, float]
 
 
 def fit_error_m(replay: Replay) -> FloatArray:
-    """Return the common error that a fit to the stops may have at each stop (n,); 0 without a fit."""
+    """Return the common error that placing may leave at each stop (n,); 0 if the log was placed by others."""
     stops = np.array([(stop.x, stop.y) for stop in replay.mission.stops])
     alignment, track = replay.run.alignment, replay.run.poses
-    if alignment is None or alignment.residual_rms_m is None or not len(track):
+    if alignment is None or not alignment.pairs or not len(track):
         return np.zeros(len(stops))
     if not replay.placed.turns:
         return np.full(len(stops), np.inf)
+    if alignment.residual_rms_m is None:
+        return np.zeros(len(stops))
     error = _from_start(replay, stops)
     for ns in track.restarts_ns:  # joined logs were fitted one by one
         k = int(np.searchsorted(track.ns, ns))

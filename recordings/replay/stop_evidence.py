@@ -42,19 +42,23 @@ def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
     """Return the evidence for each stop, in the mission's order."""
     errors, fit_m = position_errors(replay), fit_error_m(replay)
     found = (_evidence(replay, k, item, errors) for k, item in enumerate(replay.comparison.asked))
-    return tuple(_with_error_of_fit(one, float(errors.unsure_m[k] + fit_m[k])) for k, one in enumerate(found))
+    return tuple(
+        _with_error_of_fit(one, float(errors.unsure_m[k] + fit_m[k]), headings=replay.placed.turns)
+        for k, one in enumerate(found)
+    )
 
 
-def _with_error_of_fit(evidence: StopEvidence, unsure_m: float) -> StopEvidence:
-    """Return a yes as undecided if the common error of a fit to the stops may exceed the tolerance."""
+def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: bool) -> StopEvidence:
+    """Return a yes as undecided if the common error of placing may exceed the tolerance."""
     item = evidence.item
     if evidence.answer != "yes" or not is_outside(
         (item.deviation_m or 0.0) + unsure_m, item.tolerance_m or 0.0
     ):
         return evidence
-    return StopEvidence(item, "unknown", FIT)
+    return StopEvidence(item, "unknown", FIT if headings else NO_HEADINGS)
 
 
+NO_HEADINGS = "the log has no headings, so that a turn of the whole drive is hidden; give --map X,Y,HEADING"
 FIT = (
     "a fit to the stops hides a shift or turn of the whole drive, and the log does not begin at the start "
     "with its heading; give --map X,Y,HEADING"

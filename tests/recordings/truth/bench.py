@@ -109,11 +109,14 @@ def could_tell(case: Case, tour: Tour, poses: Sensed) -> bool:
     """True if the poses alone, with their errors known, show that all was scanned, or that a stop was not.
 
     Heights of robots have errors of metres. A shift or turn of all stops looks like that of a map. A log that
-    is fitted to its stops must begin at the start, with a heading.
+    is fitted to its stops must begin at the start, and one that places itself must have headings.
     """
     if case.mishap in (drives.another_storey, drives.climbs, *WRONG_MAPS):
         return False
-    if case.placing == FITTED and case.writer not in VEHICLES and not _begins(tour, poses):
+    own = case.writer not in VEHICLES
+    if own and (case.placing == FITTED and not _begins(tour, poses)):
+        return False
+    if own and poses.headless and case.placing != MAP:
         return False
     if case.placing == FITTED and case.writer not in VEHICLES and case.mishap in AWAY:
         return False
@@ -141,9 +144,9 @@ def _shown(tour: Tour, poses: Sensed, number: int, *, good: bool) -> bool:
 
 
 def _begins(tour: Tour, poses: Sensed) -> bool:
-    """True if the poses have headings, and begin where the drive does."""
+    """True if the poses begin where the drive does."""
     first = poses.ns.argmin()
-    return not poses.headless and bool(poses.true_s[first] < 3.0)
+    return bool(poses.true_s[first] < 3.0)
 
 
 def _whole(poses: Sensed, tour: Tour, least_s: float) -> bool:
