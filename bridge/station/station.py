@@ -44,7 +44,7 @@ from stopgo.bridge.link.tls_probe import why_no_link
 from stopgo.bridge.station import follow
 from stopgo.bridge.station.robot_replies import read_reply
 from stopgo.bridge.station.window import Window, windowed
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.mission_json import parse
 from stopgo.mission.run.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
@@ -271,7 +271,7 @@ class Station:
         """
         self._check_role("push")
         # A file may have 0 for 0.0, and the digest of that; the robot computes the digest of the numbers.
-        mission = sealed(mission)
+        mission = with_digest(mission)
         document = msgspec.json.encode(mission)
         manifest = Manifest(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
