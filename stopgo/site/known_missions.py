@@ -42,8 +42,8 @@ class KnownMission:
         sight = next((one for one in sights if one.digest == self.mission.digest), None)
         if sight is None:
             return None
-        whole = sight.shares(done).whole
-        with_skipped = sight.shares((*done, *skipped)).whole
+        whole = sight.coverage(done).whole
+        with_skipped = sight.coverage((*done, *skipped)).whole
         lost = None
         if whole.coverage is not None and with_skipped.coverage is not None:
             lost = with_skipped.coverage - whole.coverage
