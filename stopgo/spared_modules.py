@@ -11,7 +11,7 @@ SPARED = ("numpy.f2py", "numpy.ma", "numpy.random", "numpy.testing")
 
 
 def load_when_used(names: Iterable[str] = SPARED) -> None:
-    """Put a stand-in for each of these modules, which loads it when a name in it is used or it is imported."""
+    """Put a stand-in for each of these modules; it loads the module when that is imported or used."""
     for name in names:
         package, _, own = name.rpartition(".")
         spec = None if name in sys.modules else find_spec(name)
