@@ -7,6 +7,9 @@ as it is, and is marked as older than its code. Exit code 1: a benchmark failed,
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -48,11 +51,17 @@ def outcome(name: str, seconds: float) -> str:
     if seconds <= 0:
         return "no time left"
     command = [sys.executable, "-m", f"benchmarks.{name}", *ALL[name]]
+    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
     try:
-        done = subprocess.run(command, cwd=ROOT, timeout=seconds, check=False)
-    except subprocess.TimeoutExpired:
+        code = process.wait(seconds)
+    except BaseException as error:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # with the processes that it has started
+        process.wait()
+        if not isinstance(error, subprocess.TimeoutExpired):
+            raise
         return "ended: no time left"
-    return "done" if done.returncode == 0 else f"failed ({done.returncode})"
+    return "done" if code == 0 else f"failed ({code})"
 
 
 if __name__ == "__main__":
