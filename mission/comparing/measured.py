@@ -92,9 +92,8 @@ class Measured:
         totals, size = self.totals, len(self.totals.elements)
 
         def amounts(mask: BoolArray) -> FloatArray:
-            return (
-                np.bincount(totals.element, np.where(mask, totals.weight, 0), minlength=size) * totals.scale
-            )
+            weight = np.where(mask, totals.weight, 0).astype(float)
+            return np.asarray(np.bincount(totals.element, weight, minlength=size) * totals.scale, np.float64)
 
         could, did = amounts(visible & totals.visible), amounts(visible & totals.visible & self.hit)
         whole = amounts(totals.visible)

@@ -125,8 +125,8 @@ def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str
         least, most = (percent(pick(item.visible for item in absent)) for pick in (min, max))
         range_text = least if least == most else f"{least} to {most}"
         yield (
-            f"No point lies on {named([item.id for item in absent])}, although {range_text} of it was visible: "
-            "not built, hidden, or missing from the clouds."
+            f"No point lies on {named([item.id for item in absent])}, although {range_text} of it was "
+            "visible: not built, hidden, or missing from the clouds."
         )
 
 
