@@ -129,9 +129,9 @@ def test_an_accuracy_that_is_none_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        ({"accuracy": 5.0}, "give --register too"),
-        ({"control": ((1.0, 2.0),)}, "give --register too"),
-        ({"accuracy": 5.0, "register": True, "minimise": "time"}, "--minimise time"),
+        ({"accuracy": 5.0, "register": False}, "no effect with --no-register"),
+        ({"control": ((1.0, 2.0),), "coverage_rule": "paper"}, "no effect with --coverage-rule paper"),
+        ({"accuracy": 5.0, "minimise": "time"}, "--minimise time"),
     ],
 )
 def test_an_accuracy_needs_scans_that_register(more: dict[str, Any], told: str) -> None:
