@@ -48,7 +48,8 @@ def main() -> None:
 
 
 NOTE = (
-    "Plans with `--no-register`; walls nominally 2.7 m. Claims: units of all stops together. Not met: what the proof names; a "
+    "Plans with `--no-register`; walls nominally 2.7 m. Claims: units of all stops together. Not met: what the "
+    "proof names; a "
     "column's side met at 89° is in sight and gets no points. Seconds: proof without files, on one thread of a "
     "shared core."
 )

@@ -83,7 +83,7 @@ def positions(floor: FloorPlan, settings: Settings, seed: int) -> FloatArray:
 def simulated(name: str, floor: FloorPlan, settings: Settings, seed: int) -> Iterator[dict[str, Any]]:
     """Every pair of positions with shared surfaces, registered from several starts."""
     simulation = Simulation(range_m=settings.range, ceiling_m=floor.ceiling_m or 2.7)
-    site = ScanSite.of(navigable(floor, settings), simulation)
+    site = ScanSite.of(navigable(floor, settings), simulation, None)
     xy = positions(floor, settings, seed)
     at = np.column_stack([xy - site.solids.origin, np.full(len(xy), simulation.height_m)])
     poses = [ScannerPose(frozen(place), 0.0, number=k) for k, place in enumerate(at)]

@@ -108,10 +108,11 @@ def scans_apart(route: Route) -> Iterator[Finding]:
     _, *others = Network(tuple(names), registered_pairs(route)).pieces or ((),)
     if not settings.registers:
         if others:
+            how = "without --no-register" if settings.register is False else "with --register"
             yield Finding(
                 "scans_not_joined",
                 f"the scans fall into {len(others) + 1} components that no common surfaces connect; set up "
-                "target spheres, or plan with --register",
+                f"target spheres, or plan {how}",
             )
         return
     called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]
