@@ -12,7 +12,7 @@ from stopgo.mission.settings import Settings
 
 DIGEST = "0" * 64
 PLAIN = "8e3eb962160421246979a76d4468c7c1"
-"""The id of a floor that is nothing but its file's digest, by the default parameters: it changes with these."""
+"""The id of a floor that is nothing but its file's digest, by the default parameters."""
 
 
 def id_of(**chosen: Any) -> str:
