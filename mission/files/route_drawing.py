@@ -22,7 +22,7 @@ BRIDGE: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.5, "stroke_d
 """Line of a pair without which the scans are not connected."""
 ERROR: dict[str, object] = {"stroke": "#0b6e99", "stroke_width": 0.3, "fill": "none"}
 """Outline of a scan's predicted error."""
-LARGEST_ERROR = 8.0
+LARGEST_ERROR = 14.0
 """Millimetres of the largest half axis of a drawn error ellipse."""
 THIN: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.2}
 STOP = 2.6
