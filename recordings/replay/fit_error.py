@@ -19,7 +19,7 @@ from stopgo.recordings.replay.replayed import Replay
 SIGMAS = 3.0
 """Standard deviations of a mean heading that are no turn."""
 
-Pose = tuple[float, float, float]
+XYHeading = tuple[float, float, float]
 
 
 def fit_error_m(replay: Replay) -> FloatArray:
@@ -54,12 +54,12 @@ def _from_start(replay: Replay, stops: FloatArray) -> FloatArray:
     return min((_apart(pose, wanted, 0.0, stops) for pose in (one, before)), key=np.max)
 
 
-def _pose(track: Track, index: int) -> Pose:
+def _pose(track: Track, index: int) -> XYHeading:
     x, y = track.xy[index].tolist()
     return x, y, float(track.heading[index])
 
 
-def _apart(pose: Pose, wanted: Pose, unsure: float, stops: FloatArray) -> FloatArray:
+def _apart(pose: XYHeading, wanted: XYHeading, unsure: float, stops: FloatArray) -> FloatArray:
     """Return how far points (n, 2) move by the transform of one pose to another, at most."""
     turn = abs(math.remainder(pose[2] - wanted[2], math.tau))
     away = np.hypot(*(stops - wanted[:2]).T)
