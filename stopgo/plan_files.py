@@ -155,11 +155,11 @@ def _revised(part: PartPlan, path: Path) -> PartPlan:
     """The part's plan, its mission with the revision that replaces the file at `path`."""
     from msgspec.structs import replace as changed
 
-    from stopgo.mission.document import sealed
+    from stopgo.mission.document import with_digest
     from stopgo.mission.files.mission_json import next_revision
 
     revision = next_revision(path, part.mission)
-    return replace(part, mission=sealed(changed(part.mission, revision=revision)))
+    return replace(part, mission=with_digest(changed(part.mission, revision=revision)))
 
 
 def _recording(recording_id: str) -> PlanRecording | None:

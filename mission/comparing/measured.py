@@ -9,7 +9,7 @@ import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
 from stopgo.mission.stages.coverage_totals import CoverageTotals
-from stopgo.mission.stages.figures import Shares
+from stopgo.mission.stages.figures import CoverageByGroup
 
 LEAST_VISIBLE = 0.5
 """Metres, or units, of an element that must have been visible before it is called absent."""
@@ -85,8 +85,8 @@ class Measured:
         )
 
     @cached_property
-    def shares(self) -> Shares:
-        return self.totals.shares(self.hit)
+    def coverage(self) -> CoverageByGroup:
+        return self.totals.coverage(self.hit)
 
     @cached_property
     def deviations(self) -> tuple[tuple[str, int, float, float], ...]:

@@ -69,7 +69,7 @@ class LimitsSpec(Document, frozen=True):
     """Number of stops that must see it."""
 
 
-class MissionShare(Document, frozen=True):
+class MissionAllocation(Document, frozen=True):
     """Part of this mission in a floor that several missions cover together."""
 
     kind: Literal["robot", "tour"]
@@ -159,7 +159,7 @@ class Mission(Document, frozen=True, kw_only=True):
     scanner: ScannerSpec
     limits: LimitsSpec | UnsetType = UNSET
     """Absent if there are no limits."""
-    share: MissionShare | UnsetType = UNSET
+    share: MissionAllocation | UnsetType = UNSET
     """Absent if this mission alone covers its part of the floor."""
     start: Start
     stops: tuple[Stop, ...]
@@ -208,7 +208,7 @@ def _add_stops(hashed: hashlib._Hash, stops: tuple[Stop, ...]) -> None:
     hashed.update(b"]" if stops else b"[]")
 
 
-def sealed(mission: Mission) -> Mission:
+def with_digest(mission: Mission) -> Mission:
     """Return the same mission with its `digest` set."""
     return msgspec.structs.replace(mission, digest=digest_of(mission))
 

@@ -16,7 +16,7 @@ from msgspec import UNSET
 from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.as_driven import AsDriven
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.own_floor import must_be_own_floor
@@ -187,7 +187,8 @@ def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(totals_of_plan(known.seen), asked=frozen([1], np.int64))
     return (
-        once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage or 0.0
+        once.coverage(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage
+        or 0.0
     )
 
 
@@ -247,7 +248,7 @@ def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float
     parameters.pop("views", None)
     settings = read_settings(None, parameters)
     basis = f"{before.id}:{before.revision}:{evidence}:{mission.digest}"
-    return sealed(
+    return with_digest(
         changed(
             mission,
             id=hashlib.sha256(basis.encode()).hexdigest()[:32],

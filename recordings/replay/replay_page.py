@@ -72,9 +72,9 @@ def run_texts(replay: Replay) -> Iterator[RunLines]:
         yield (
             "Visible from the robot's stationary poses",
             tuple(
-                f"{share.name}: {percent(share.coverage)} (planned {percent(planned.coverage)}, "
-                f"required {percent(share.required)})"
-                for planned, share in replay.sight.pairs
+                f"{group.name}: {percent(group.coverage)} (planned {percent(planned.coverage)}, "
+                f"required {percent(group.required)})"
+                for planned, group in replay.sight.pairs
             ),
         )
     yield "Driven path", tuple(" ".join(line.split()) for line in (*path_lines(replay), *truth_lines(replay)))

@@ -83,7 +83,7 @@ def _sight(replay: Replay) -> list[str]:
     """Return the visible fractions, lowest first, next to those planned."""
     if replay.sight is None:
         return []
-    rows = [pair_cells(planned, share) for planned, share in replay.sight.pairs]
+    rows = [pair_cells(planned, group) for planned, group in replay.sight.pairs]
     lines = table(("visible", "planned %", "as driven %", "required %"), rows).split("\n")
     return ["", *(f"  {line}" for line in lines), ""]
 
@@ -93,9 +93,9 @@ def measured_lines(replay: Replay) -> list[str]:
     found = replay.measured
     if found is None:
         return []
-    share = found.shares.whole
+    whole = found.coverage.whole
     lines = [
-        f"  measured   {percent(share.coverage)} of what is visible has points within "
+        f"  measured   {percent(whole.coverage)} of what is visible has points within "
         f"{1000 * found.tolerance_m:.0f} mm ({found.points} points)"
     ]
     worst = sorted(found.deviations, key=lambda item: -abs(item[2]))[:MOST_LOST]
@@ -136,23 +136,23 @@ def as_json(replay: Replay) -> dict[str, Any]:
 
 
 def _sight_json(sight: AsDriven) -> dict[str, Any]:
-    shares = {
-        share.name: {
-            "planned": planned.coverage, "as_driven": share.coverage,
-            "asked": share.required, "met": share.met,
+    groups = {
+        group.name: {
+            "planned": planned.coverage, "as_driven": group.coverage,
+            "asked": group.required, "met": group.met,
         }
-        for planned, share in sight.pairs
+        for planned, group in sight.pairs
     }  # fmt: skip
     elements = [{"id": item.name, "visible": item.visible, "seen": item.seen} for item in sight.elements]
-    return {"shares": shares, "elements": elements}
+    return {"shares": groups, "elements": elements}
 
 
 def _measured_json(found: Measured) -> dict[str, Any]:
     return {
         "tolerance_m": found.tolerance_m,
         "points": found.points,
-        "share": found.shares.whole.coverage,
-        "required": found.shares.whole.required if found.decides else None,
+        "share": found.coverage.whole.coverage,
+        "required": found.coverage.whole.required if found.decides else None,
         "misplaced_m": [round(away, 3) if math.isfinite(away) else None for away in found.misplaced_m or ()],
         "elements": [
             {"id": name, "points": count, "mean_m": mean, "rms_m": rms}

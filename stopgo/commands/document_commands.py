@@ -327,14 +327,14 @@ def import_command(
     """
     from msgspec.structs import replace
 
-    from stopgo.mission.document import sealed
+    from stopgo.mission.document import with_digest
     from stopgo.mission.files.imports import read_mission
     from stopgo.mission.files.mission_json import encode, next_revision, read
 
     given = {"origin": origin, "start": start}
     settings = read_settings(parameters, {key: PARAMETERS[key].given(text) for key, text in given.items()})
     made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
-    mission = sealed(replace(made, revision=next_revision(out, made)))
+    mission = with_digest(replace(made, revision=next_revision(out, made)))
     write_checked(out, encode(mission))
     _print_import(read(out), out, (*track.notes, LEGS_UNCHECKED), as_json)
 

@@ -25,7 +25,7 @@ def runs(
     web: Annotated[
         bool, typer.Option("--web", help="Show them in a browser on this machine, until Ctrl-C.")
     ] = False,
-    port: Annotated[int | None, typer.Option(help="With --web: port to listen on; else a free one.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port of the pages; else a free one.")] = None,
 ) -> None:
     """List plans and runs in a folder, the newest run first, with what each acquired.
 

@@ -18,7 +18,7 @@ from stopgo.mission.document import (
     Start,
     Stop,
     mission_id,
-    sealed,
+    with_digest,
 )
 from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.document.problems import problems_of
@@ -51,7 +51,7 @@ def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str
     """
     legs = list(_legs(track, settings))
     start = _start(track, settings, legs[0], file)
-    mission = sealed(
+    mission = with_digest(
         Mission(
             id=mission_id(FloorSource(file, digest), settings, __version__),
             revision=1,

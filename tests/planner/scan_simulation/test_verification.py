@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as changed
 
-from stopgo.mission.document import MissionShare
+from stopgo.mission.document import MissionAllocation
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.files.coverage_json import Coverage, coverage_json
 from stopgo.mission.floor import FloorPlan
@@ -80,7 +80,7 @@ def test_points_on_a_wall_are_as_many_as_its_angle_has_rays() -> None:
 def test_every_target_of_a_hall_is_acquired_from_its_middle() -> None:
     proof = verified(hall(3, 2), Settings(range=10.0))
     assert proof.met
-    assert proof.whole.kept == pytest.approx(10.0)
+    assert proof.whole.acquired == pytest.approx(10.0)
     assert proof.quality.seen_m2 == pytest.approx(10.0 * 2.7)
     assert proof.quality.by_stops[1] == 1.0
 
@@ -115,7 +115,7 @@ def test_a_stop_that_was_removed_is_caught() -> None:
 
 def test_of_one_mission_of_several_no_share_is_asked_that_is_asked_of_all() -> None:
     made = plan(hall(3, 2), Settings(range=10.0))
-    share = changed(made.mission, share=MissionShare(kind="robot", number=1, of=2))
+    share = changed(made.mission, share=MissionAllocation(kind="robot", number=1, of=2))
     alone, one_of_two = (verify(item, made.space, COARSEST, None) for item in (made.mission, share))
     assert all(item.required for item in (*alone.rooms[:1], *alone.kinds))
     assert not any(item.required for item in (one_of_two.whole, *one_of_two.rooms, *one_of_two.kinds))
@@ -136,8 +136,8 @@ def test_beams_are_seen_from_below_and_windows_seen_through() -> None:
     )
     by_kind = {share.name: share for share in proof.kinds}
     assert by_kind["beams"].simulated == pytest.approx(1.0, abs=0.05)
-    assert by_kind["windows"].kept > 0
-    assert by_kind["walls"].kept > 0.95 * by_kind["walls"].promised, "behind the pane too"
+    assert by_kind["windows"].acquired > 0
+    assert by_kind["walls"].acquired > 0.95 * by_kind["walls"].promised, "behind the pane too"
 
 
 def test_closed_doors_stop_rays_except_from_the_doorway() -> None:

@@ -130,7 +130,7 @@ def test_what_a_run_acquires_counts_views_too() -> None:
     sight: Sight = sight_of(made.route, made.mission, made.figures)
     assert sight.planned.whole == made.figures.whole
     assert not sight.planned.short
-    one = sight.shares([mission.stops[0].id])
+    one = sight.coverage([mission.stops[0].id])
     assert one.whole.seen < 0.05 * sight.planned.whole.seen
     views = sight.views_from(sight.ids[:-1])
     assert sight.brings(sight.ids[-1], views) > 0

@@ -85,7 +85,7 @@ def seen_by_laser(solid: shapely.Geometry, pose: tuple[float, float, float]) -> 
 def test_walls_as_planned_are_measured_without_deviation(planned: PlannedFloor) -> None:
     found = measured(planned, placed_sweeps(scanned(planned)))
     assert found.unplanned == ()
-    assert (found.shares.whole.coverage or 0) > 0.8
+    assert (found.coverage.whole.coverage or 0) > 0.8
     for _, count, mean, rms in found.deviations:
         assert count > 10
         assert abs(mean) <= 0.006
@@ -99,7 +99,7 @@ def test_a_wall_that_stands_elsewhere_is_told_by_its_side(planned: PlannedFloor)
     assert max(means) > 0.02
     assert min(means) < -0.02
     as_planned = measured(planned, placed_sweeps(scanned(planned)), tolerance=0.02)
-    assert (found.shares.whole.coverage or 0) < 0.75 * (as_planned.shares.whole.coverage or 0)
+    assert (found.coverage.whole.coverage or 0) < 0.75 * (as_planned.coverage.whole.coverage or 0)
 
 
 def test_what_nobody_planned_is_found_and_driven_round(planned: PlannedFloor) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as changed
 
-from stopgo.mission.document import sealed
+from stopgo.mission.document import with_digest
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.drive_verdict import drive_verdict
@@ -162,7 +162,7 @@ def test_stops_that_were_visited_in_another_order_were_visited() -> None:
         changed(stops[3], approach=(other, one)),
         changed(stops[5], approach=(one, behind)),
     ]
-    drive = driven(sealed(changed(MISSION, stops=tuple(stops))))
+    drive = driven(with_digest(changed(MISSION, stops=tuple(stops))))
     judged = drive_verdict(replay(log_of(logged(drive)), MISSION, THERE))
     assert judged.answer == "yes"
     assert "9 of 9 stops" in judged.text

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec.structs import replace as changed
 
-from stopgo.mission.document import Mission, Point, sealed
+from stopgo.mission.document import Mission, Point, with_digest
 from tests.recordings.replay.driving import Drive, wandering
 
 STOPS = 8
@@ -53,7 +53,7 @@ def mission_with_return(seed: int) -> Mission:
     plain = wandering(seed, stops=STOPS)
     last = plain.stops[-1]
     corner = (last.x, plain.start.y)
-    return sealed(changed(plain, return_=((last.x, last.y), corner, (plain.start.x, plain.start.y))))
+    return with_digest(changed(plain, return_=((last.x, last.y), corner, (plain.start.x, plain.start.y))))
 
 
 def toured(mission: Mission, visits: list[Visit], *, home: bool = True) -> Drive:
