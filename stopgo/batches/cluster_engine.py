@@ -14,7 +14,6 @@ from concurrent.futures import Future
 from typing import Any
 
 from stopgo.batches.content import computed_by
-from stopgo.batches.engine import memory_of
 from stopgo.batches.work import PlanOutcome, PlanTask, work
 from stopgo.mission.console.notice import notice
 from stopgo.mission.errors import InputError, OutcomeUnknown
@@ -58,7 +57,7 @@ class ClusterEngine:
 
     def submit(self, slot: int, task: PlanTask, *, roomiest: bool = False) -> Future[PlanOutcome]:
         self._be_connected()
-        needed, most = memory_of(task), max(self._limits.values())
+        needed, most = task.memory, max(self._limits.values())
         able = [address for address, limit in self._limits.items() if limit >= (most if roomiest else needed)]
         able = able or [address for address, limit in self._limits.items() if limit == most]
         future: Future[PlanOutcome] = self._client.get_executor(pure=False, workers=able).submit(work, task)

@@ -24,10 +24,6 @@ TRIES = 2
 TICK_S = 0.5
 PLANS_EACH = 16
 """Plans of one process; its memory grows by some megabytes with each."""
-BASE_BYTES = 350e6
-"""Memory of a process that plans a small floor."""
-BYTES_PER_BYTE = 12.0
-"""Memory per byte of the floor's file."""
 
 
 class Engine(Protocol):
@@ -153,7 +149,7 @@ class Running:
 
     def outcomes(self, stopped: Callable[[], bool] = lambda: False) -> Iterator[PlanOutcome]:
         """Work on all entries, the largest files first; once `stopped`, begin no more."""
-        queue = deque(sorted(self.tasks, key=memory_of, reverse=True))
+        queue = deque(sorted(self.tasks, key=lambda task: task.memory, reverse=True))
         alone: deque[PlanTask] = deque()
         while queue or alone or self._now:
             if stopped():
@@ -179,10 +175,8 @@ class Running:
         """Begin entries while there are free slots and memory; one always runs."""
         free = [slot for slot in range(self.engine.slots) if slot not in {s for s, _ in self._now.values()}]
         for slot in free:
-            used = sum(memory_of(task) for _, task in self._now.values())
-            fitting = next(
-                (t for t in queue if not self._now or used + memory_of(t) <= self.engine.memory), None
-            )
+            used = sum(task.memory for _, task in self._now.values())
+            fitting = next((t for t in queue if not self._now or used + t.memory <= self.engine.memory), None)
             if fitting is None:
                 return
             queue.remove(fitting)
@@ -213,15 +207,6 @@ class Running:
 
 def _failed(task: PlanTask, problem: str) -> PlanOutcome:
     return PlanOutcome(name=task.name, status="failed", exit_code=2, problem=f"{task.floor}: {problem}")
-
-
-def memory_of(task: PlanTask) -> float:
-    """Return the estimated memory of an entry, bytes."""
-    try:
-        size = os.path.getsize(task.floor)
-    except OSError:
-        size = 0
-    return BASE_BYTES + BYTES_PER_BYTE * size
 
 
 def free_memory() -> float:

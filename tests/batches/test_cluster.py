@@ -14,8 +14,8 @@ import pytest
 from stopgo.batches import cluster_engine
 from stopgo.batches.cluster_engine import ClusterEngine
 from stopgo.batches.content import computed_by
-from stopgo.batches.engine import BASE_BYTES, Running
-from stopgo.batches.work import PlanOutcome, PlanTask
+from stopgo.batches.engine import Running
+from stopgo.batches.work import BASE_BYTES, PlanOutcome, PlanTask
 from stopgo.mission.errors import InputError, OutcomeUnknown
 from stopgo.mission.settings import Settings
 

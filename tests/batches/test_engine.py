@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.batches.engine import BASE_BYTES, Running
-from stopgo.batches.work import PlanOutcome, PlanTask
+from stopgo.batches.engine import Running
+from stopgo.batches.work import BASE_BYTES, PlanOutcome, PlanTask
 from stopgo.mission.settings import Settings
 from tests.batches.inline_engine import InlineEngine
 
