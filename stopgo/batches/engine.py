@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from multiprocessing import get_context
 from typing import Protocol
 
+from stopgo.batches.cluster_engine import ClusterEngine
 from stopgo.batches.work import PlanOutcome, PlanTask, work
 
 TRIES = 2
@@ -123,8 +124,6 @@ def engine_for(*, workers: int, scheduler: str | None) -> Engine:
     """Return the engine that the options choose."""
     if scheduler is None:
         return LocalEngine(workers)
-    from stopgo.batches.cluster_engine import ClusterEngine
-
     return ClusterEngine(scheduler)
 
 
