@@ -153,7 +153,7 @@ class RunRoom:
         """
         listed = next((one for one in self.listed()["missions"] if one["key"] == key), None)
         if listed is None or listed["file"] is None:
-            raise InputError("the folder has no mission.json beside the plan of these runs")
+            raise InputError("the folder has no mission.json next to the plan of these runs")
         path = self._folder.file(listed["file"])
         mission = read(path)
         floor = self._floor_of(mission)

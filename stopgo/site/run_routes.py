@@ -15,6 +15,8 @@ from stopgo.site.run_pages import PageDownload, RunRoom
 from stopgo.site.web_app import body_of
 from stopgo.site.web_viewer import WebViewer
 
+RESOURCES = "Cross-Origin-Resource-Policy"
+
 
 class MissionKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A mission of the list, by its key."""
@@ -36,14 +38,12 @@ def run_routes(room: RunRoom, viewer: WebViewer, address: str) -> list[Route]:
         return viewer.showing(f"{address}/recordings/{room.open_recording(key)}.rrd")
 
     async def open_viewer(request: Request) -> Response:
-        given = await body_of(request, MissionKey)
-        return JSONResponse({"address": await asyncio.to_thread(open_recording, given.key)})
+        key = (await body_of(request, MissionKey)).key
+        return JSONResponse({"address": await asyncio.to_thread(open_recording, key)})
 
     def recording(request: Request) -> Response:
         body = room.recording_of_secret(request.path_params["secret"])
-        allowed = {
-            "Access-Control-Allow-Origin": viewer.origin, "Cross-Origin-Resource-Policy": "cross-origin"
-        }  # fmt: skip
+        allowed = {"Access-Control-Allow-Origin": viewer.origin, RESOURCES: "cross-origin"}
         return Response(body, media_type="application/octet-stream", headers=allowed)
 
     def download(request: Request) -> Response:
