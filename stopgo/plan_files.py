@@ -18,6 +18,7 @@ from stopgo.mission.files.atomic import must_be_writable, replacing
 from stopgo.planner import plan
 from stopgo.recording_process import recording_process
 from stopgo.result_files import is_missing, report_missing_rerun, result_folder
+from stopgo.spared_modules import load_when_used
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
@@ -74,6 +75,8 @@ class _Writing:
 
 def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool) -> list[PlanReport]:
     from stopgo.planner.commands.outputs import names
+
+    load_when_used()
     from stopgo.planner.floors import model_solids, options_of, read_floor, standing_bodies
 
     read = read_floor(floor, options_of(settings))

@@ -99,6 +99,17 @@ class Sees(Document, frozen=True):
     """Those of them that count as seen from this stop of the route on."""
 
 
+class PositionError(Document, frozen=True):
+    """Predicted error of a scan's position in the frame of its network: the standard error ellipse."""
+
+    major_m: float
+    """Standard deviation in the worst direction, metres."""
+    minor_m: float
+    """Standard deviation across it, metres."""
+    direction: float
+    """Worst direction, radians counter-clockwise from +x, from 0 to π."""
+
+
 class Stop(Document, frozen=True):
     id: str
     x: float
@@ -113,6 +124,8 @@ class Stop(Document, frozen=True):
     approach: tuple[Point, ...]
     """Polyline from the previous stop (or the start) to this stop, both ends included."""
     sees: Sees
+    error: PositionError | UnsetType = UNSET
+    """Absent if no network holds the scan; 0 for the scan whose frame the network has."""
 
 
 class Overlap(Document, frozen=True):
