@@ -69,7 +69,7 @@ def main() -> None:
 
 def cost_row(name: str, path: Path, options: dict[str, float]) -> list[str]:
     """Stops and bound at each required fraction."""
-    settings = Settings(**options)
+    settings = Settings(register=False, **options)
     floor = read_floor(path, FloorOptions(d_dis=settings.d_dis))
     seen = visibility(candidates(navigable(floor, settings)))
     return [name, *(f"{len(s.chosen)} / {s.bound}" for s in _selections(seen))]
@@ -86,7 +86,7 @@ def _selections(seen: Visibility) -> Iterator[Selection]:
 def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list[str]]:
     """Figures of a plan by either rule, counted by length."""
     for rule in ("paper", "length"):
-        settings = Settings(**options, coverage_rule=rule)
+        settings = Settings(**options, coverage_rule=rule, register=False)
         begin = time.perf_counter()
         made = plan(read_floor(path, FloorOptions(d_dis=settings.d_dis)), settings)
         took = time.perf_counter() - begin

@@ -22,10 +22,12 @@ from stopgo.mission.files.svg import circle, group, line, number, path, polygon,
 from stopgo.mission.geometry import polyline_length
 from stopgo.mission.stages import Route, Selection
 from stopgo.mission.stages.figures import Figures, GroupCoverage
-from stopgo.mission.stages.network import network_of
+from stopgo.mission.stages.network import magnified_errors, network_of
 from stopgo.mission.stages.plan_results import PlanResults
 
 BODY = 2.5
+ERROR = "predicted error"
+"""Legend of the error ellipses; the sheet's magnification follows it."""
 LINE = 4.2
 """Height of a line of the title block and of the legend."""
 TITLE_HEAD = 15.0
@@ -176,6 +178,7 @@ def _network_entries(mission: Mission) -> list[tuple[str, str, bool]]:
     return [
         ("pair", "scans that register", len(network.overlaps) > len(network.bridges)),
         ("bridge", "their only connection", bool(network.bridges)),
+        ("error", ERROR, magnified_errors(mission, most_m=1.0) is not None),
     ]
 
 
@@ -188,7 +191,9 @@ def legend(entries: list[tuple[str, str]], mission: Mission, sheet: PaperSheet) 
     box = sheet.legend
     rows = math.ceil(len(entries) / 2)
     items = [text(box.x + 3, box.y + 4.6, "Legend", size=2.6, font_weight="bold")]
-    for index, (symbol, words) in enumerate(entries):
+    errors = route_look.errors_of(mission, sheet)
+    for index, (symbol, name) in enumerate(entries):
+        words = f"{name} × {errors.factor:g}" if symbol == "error" and errors is not None else name
         x = box.x + 3 + (index // rows) * (COLUMN / 2)
         y = box.y + 8.5 + LINE * (index % rows)
         items += [_symbol(symbol, x, y), text(x + 9, y + 0.8, words, size=BODY)]
@@ -209,6 +214,9 @@ def _symbol(name: str, x: float, y: float) -> str:
         return line(x, y, x + 7, y, **floor_look.BLOCKED) + mark
     if name == "start":
         return circle(x + 3.5, y, 1.9, fill="#111111") + _centred("S", x + 3.5, y, fill="#ffffff")
+    if name == "error":
+        turn = np.linspace(0, 2 * np.pi, 25)
+        return polygon(place + np.stack([3.2 * np.cos(turn), 1.3 * np.sin(turn)], axis=1), **route_look.ERROR)
     if name in ("stop", "doorway"):
         outer = circle(x + 3.5, y, 1.9, fill="#fff", stroke=route_look.INK, stroke_width=0.2)
         inner = circle(x + 3.5, y, 1.5, fill="#fff", stroke=route_look.INK, stroke_width=0.3)

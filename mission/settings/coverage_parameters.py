@@ -71,8 +71,7 @@ class CoverageParameters:
         bool | None,
         _plan(
             "Choose stops whose scans register with one another, all in one network",
-            undecided="yes with --overlap, else no",
-            quiet=True,
+            undecided="yes; no with --coverage-rule paper",
         ),
     ] = None
     overlap: Annotated[
@@ -129,7 +128,7 @@ class CoverageParameters:
     @property
     def registers(self) -> bool:
         """True if stops are chosen so that their scans register."""
-        return self.least_overlap > 0 if self.register is None else self.register
+        return self.coverage_rule != "paper" if self.register is None else self.register
 
     @property
     def least_overlap(self) -> float:

@@ -20,7 +20,7 @@ from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.own_floor import must_be_own_floor
-from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
@@ -93,7 +93,7 @@ def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
         When the file cannot be read.
     """
     must_be_own_floor(path, mission)
-    settings = read_settings(None, mission.origin.parameters)
+    settings = recorded_settings(mission.origin.parameters)
     return PlannedFloor(read_floor(path, options_of(settings)), settings, mission, path)
 
 
@@ -246,7 +246,7 @@ def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float
     asked = {"coverage": math.floor(coverage * 1e6) / 1e6, "room_coverage": 0.0, "kind_coverage": 0.0}
     parameters = {**mission.origin.parameters, **asked}
     parameters.pop("views", None)
-    settings = read_settings(None, parameters)
+    settings = recorded_settings(parameters)
     basis = f"{before.id}:{before.revision}:{evidence}:{mission.digest}"
     return with_digest(
         changed(

@@ -39,7 +39,7 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace, Route
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.overlap.registered import registered_pairs
+from stopgo.planner.overlap.registered import error_of_stop, registered_pairs
 from stopgo.planner.routing import GRAPHS
 from stopgo.planner.space.gaps import CLEAR_SLACK, Walls, keeps_clear
 from stopgo.planner.space.reach import walls_of
@@ -110,7 +110,9 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
         sees = Sees(units=len(units), new_units=new)
         doorway = int(row) in doorways
         stops.append(_stop(name, approach, heading, sees, settings, doorway=doorway))
-    return tuple(stops)
+    if not settings.registers:
+        return tuple(stops)
+    return tuple(msgspec.structs.replace(stop, error=error_of_stop(route, k)) for k, stop in enumerate(stops))
 
 
 def _scan_heading(candidates: Candidates, row: int, arrival: float) -> float:

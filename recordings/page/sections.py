@@ -12,11 +12,11 @@ from stopgo.mission.files.mission_text import route_length
 from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.run.events import Scanned
 from stopgo.mission.stages.figures import CoveragePair, GroupCoverage, percent
-from stopgo.recordings.page.floor_picture import legend, line_sample, plan_picture
+from stopgo.recordings.page.floor_picture import errors_in_picture, legend, line_sample, plan_picture
 from stopgo.recordings.page.plots import plots
 from stopgo.recordings.page.runs_together import run_names, when_and_who
 from stopgo.recordings.page.stop_table import stop_table
-from stopgo.recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
+from stopgo.recordings.page.style import ANSWERS, BLUE, ERROR, GREY, PURPLE, STATES, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
 
@@ -201,6 +201,9 @@ def _pictured(subject: ReportSubject, comparison: Comparison | None) -> str:
         if comparison.sighted.gaps:
             marks.append((line_sample(PURPLE, 1.8, "3 4"), "no poses: path unseen"))
         marks += [(cross, "not scanned"), (diamond, "stationary")]
+    mission = subject.mission if comparison is None else comparison.mission
+    if (errors := errors_in_picture(mission)) is not None:
+        marks.append((line_sample(ERROR, 1.4), f"predicted scan error × {errors.factor:g}"))
     return legend(marks) + plan_picture(subject, comparison)
 
 

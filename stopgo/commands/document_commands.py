@@ -17,7 +17,7 @@ from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult, OtherFloor
 from stopgo.mission.files.atomic import must_not_replace, write_checked
 from stopgo.mission.files.own_floor import must_be_own_floor
-from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.files.plan_toml import read_settings, recorded_settings
 from stopgo.mission.settings import PARAMETERS
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     must_be_own_floor(path, mission)
     data = path.read_bytes()
     drawing, _ = open_drawing(data, source=path)
-    options = options_of(read_settings(None, mission.origin.parameters))
+    options = options_of(recorded_settings(mission.origin.parameters))
     metres = metres_in(drawing, source=path, options=options)
     return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres)
 

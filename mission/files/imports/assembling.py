@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import msgspec
 
@@ -65,7 +66,7 @@ def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str
             stops=tuple(_stops(track.visits, legs, start.heading, settings)),
             return_=tuple(_distinct([legs[-1][-1], *track.back])) if track.back else None,
             policy=policy_of(settings),
-            origin=origin_of(settings, floor=file, digest=digest),
+            origin=origin_of(replace(settings, register=False), floor=file, digest=digest),
         )
     )
     for problem in problems_of(mission):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +20,9 @@ from stopgo.mission.proof.plan_proof import PlanProof, Simulation
 from stopgo.mission.proof.proof_text import network_words
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
+from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
+from stopgo.planner.floors import read_floor
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
 from stopgo.planner.scan_simulation.registration import (
@@ -33,7 +37,20 @@ from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
 from stopgo.planner.scan_simulation.strips import strips_of
 from stopgo.planner.scan_simulation.verification import verify
 from stopgo.planner.space.navigable import navigable
-from tests.planner.worlds import box, column, element, hall, two_rooms
+from tests.faults.sizes import FULL
+from tests.planner.worlds import (
+    SHARED,
+    box,
+    column,
+    door,
+    element,
+    floor_of,
+    hall,
+    room,
+    shell,
+    two_rooms,
+    wall,
+)
 
 COARSE = Simulation(range_m=10.0, step_deg=0.2)
 COARSEST = Simulation(range_m=10.0, step_deg=0.5)
@@ -275,3 +292,42 @@ def test_a_pair_that_is_to_register_and_does_not_is_caught() -> None:
     simulation = replace(COARSEST, range_m=3.0, joining_m=1.0)
     proof = verify(lying, made.space, simulation, None)
     assert f"{names[0]} and {names[-1]}: planned to register, but do not" in proof.unmet
+
+
+def rooms_in_a_row(count: int) -> FloorPlan:
+    """Rooms of 4 m x 4 m in a row, with a door between neighbours."""
+    low = [wall(f"w{k}", box(4.2 * k - 0.2, 0, 4.2 * k, 1.55)) for k in range(1, count)]
+    high = [wall(f"v{k}", box(4.2 * k - 0.2, 2.45, 4.2 * k, 4)) for k in range(1, count)]
+    return floor_of(
+        box(0, 0, 4.2 * count - 0.2, 4),
+        rooms=[room(f"r{k}", box(4.2 * k, 0, 4.2 * k + 4, 4)) for k in range(count)],
+        openings=[door(f"d{k}", (4.2 * k - 0.1, 1.55), (4.2 * k - 0.1, 2.45)) for k in range(1, count)],
+        elements=[shell(0, 0, 4.2 * count - 0.2, 4), *low, *high],
+    )
+
+
+SMALL: dict[str, Callable[[], FloorPlan]] = {
+    "hall": lambda: hall(8, 6),
+    "two rooms, narrow door": lambda: two_rooms(0.75),
+    "rooms in a row": lambda: rooms_in_a_row(3),
+    "corridor": lambda: hall(12, 2.2),
+}
+READ = {
+    "office": Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf",
+    **{name: SHARED / "layered" / f"{name}.dxf" for name in ("duplex-l1", "fzk-haus-eg", "office-l1")},
+}
+JOINED = (*SMALL, *(READ if FULL else ()))
+
+
+@pytest.mark.parametrize("name", JOINED)
+def test_the_components_of_a_plan_are_those_of_its_simulated_scans(name: str) -> None:
+    if name in READ and not READ[name].exists():
+        pytest.skip(f"{READ[name]} is not at hand")
+    floor = SMALL[name]() if name in SMALL else read_floor(READ[name])
+    settings, step = (Settings(range=4.0), 0.5) if name in SMALL else (Settings(), 0.1)
+    proof = verified(floor, settings, Simulation(range_m=settings.range, step_deg=step))
+    network = network_of(proof.mission)
+    assert network is not None
+    planned, simulated = ({frozenset(piece) for piece in item.pieces} for item in (network, proof.network))
+    assert planned == simulated
+    assert not [line for line in proof.unmet if "planned to register" in line]
