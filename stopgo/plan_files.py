@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -49,13 +49,16 @@ def plan_files(
     all_parts: bool = False,
     print_options: PrintOptions | None = None,
     beside: bool = False,
+    observe: Callable[[object], None] = lambda result: None,
 ) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first.
 
     With `beside` the recordings are drawn in a process of their own, which loads Rerun during planning.
+    `observe` is called with the result of each stage as soon as it is there.
     """
     with running(f"reading {floor}") as step, recording_process() as recorder:
-        writing = _Writing(out, print_options or PrintOptions(), Stopwatch(step), recorder, beside)
+        watch = Stopwatch(step, observe)
+        writing = _Writing(out, print_options or PrintOptions(), watch, recorder, beside)
         return _planned(floor, settings, writing, all_parts)
 
 
@@ -286,16 +289,18 @@ STAGES = {
 class Stopwatch:
     """Seconds per stage; names the running step."""
 
-    def __init__(self, step: RunningStep) -> None:
+    def __init__(self, step: RunningStep, also: Callable[[object], None]) -> None:
         self._laps: dict[str, float] = {}
         self._begin = self._last = time.perf_counter()
         self._step = step
+        self._also = also
 
     def observe(self, result: object) -> None:
         """Count the time since the last result to the stage that ends with this one."""
         ended, begins = STAGES.get(type(result).__name__, ("other", "files"))
         self.lap(ended)
         self._step.begin(begins)
+        self._also(result)
 
     def lap(self, stage: str) -> None:
         """Count the time since the last lap to a stage."""

@@ -226,13 +226,17 @@ def with_digest(mission: Mission) -> Mission:
     return msgspec.structs.replace(mission, digest=digest_of(mission))
 
 
+BY_HAND = ("use", "avoid")
+"""Parameters by which a person moves, adds or forbids single stops."""
+
+
 def mission_id(source: FloorSource, settings: Settings, version: str, part: int = 0) -> str:
     """Return the hash of floor, parameters, version and part: known before planning, and the recording id.
 
-    Parameters of the floor's reader are hashed as part of the source.
+    Parameters of the floor's reader are hashed as part of the source. Stops that are required or forbidden
+    by hand make another revision, not another mission.
     """
-    parameters = {
-        key: value for key, value in recorded_values(settings).items() if key not in FLOOR_PARAMETERS
-    }
+    recorded = recorded_values(settings) | {name: [] for name in BY_HAND}
+    parameters = {key: value for key, value in recorded.items() if key not in FLOOR_PARAMETERS}
     basis = [source.basis, parameters, version, part]
     return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

@@ -36,6 +36,8 @@ class FloorShapes:
 
 def shapes_of(floor: FloorPlan) -> FloorShapes:
     """Return the lines of a floor that was read from a file."""
+    import shapely
+
     kinds: dict[str, list[FloatArray]] = {}
     for element in floor.elements:
         lines = [line for solid in element.solids for line in _rings(solid)]
@@ -44,8 +46,8 @@ def shapes_of(floor: FloorPlan) -> FloorShapes:
     for room in floor.rooms:
         largest = max(room.polygons, key=lambda part: part.area, default=None)
         if largest is not None:
-            x, y = (largest.exterior.min(axis=0) + largest.exterior.max(axis=0)) / 2
-            names.append((room.label, float(x), float(y)))
+            inside = shapely.Polygon(largest.exterior, largest.holes).representative_point()
+            names.append((room.label, inside.x, inside.y))
     return FloorShapes(
         outline=tuple(line for part in floor.outline for line in _rings(part)),
         kinds={kind: tuple(lines) for kind, lines in kinds.items()},

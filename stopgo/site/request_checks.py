@@ -7,7 +7,7 @@ and its files, which hold nothing of the site.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 
@@ -23,7 +23,8 @@ MOST_PATH = 2048
 KEY_HEADER = "X-Stopgo-Key"
 READING = ("GET", "HEAD")
 SIGN_IN = "/api/session"
-FREE = ("/pages/", "/recordings/")
+RECORDINGS = "/recordings/"
+FREE = ("/pages/", RECORDINGS)
 """Paths without a session: files of the page, and recordings for the viewer, whose names are secrets."""
 
 POLICY = (
@@ -79,10 +80,14 @@ class NotAdmitted:
 class RequestChecks:
     """ASGI application in front of another: refuses what may not pass."""
 
-    def __init__(self, app: ASGIApp, *, address: SiteAddress, access: PageAccess) -> None:
+    def __init__(
+        self, app: ASGIApp, *, address: SiteAddress, access: PageAccess, viewer: Callable[[], str]
+    ) -> None:
         self._app = app
         self._address = address
         self._access = access
+        self._viewer = viewer
+        """Returns the origin of Rerun's viewer; empty while it does not run."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -100,7 +105,7 @@ class RequestChecks:
     def _refused(self, scope: Scope, headers: Headers) -> NotAdmitted | None:
         """Return why a request may not pass; puts its session into the scope if it may."""
         path, method = scope["path"], scope["method"]
-        foreign = self._foreign(headers, reading=method in READING)
+        foreign = self._foreign(headers, path, reading=method in READING)
         if foreign or len(path) > MOST_PATH:
             return NotAdmitted(403, foreign or "the path is too long")
         if method not in READING:
@@ -113,11 +118,13 @@ class RequestChecks:
             return None
         return _not_allowed(session, headers, reading=method in READING)
 
-    def _foreign(self, headers: Headers, *, reading: bool) -> str:
+    def _foreign(self, headers: Headers, path: str, *, reading: bool) -> str:
         """Return why a request does not come from this site's own page; empty if it does."""
         if headers.getlist("host") not in [[host] for host in self._address.hosts]:
             return "this address is not the site's"
         origin = headers.get("origin")
+        if reading and path.startswith(RECORDINGS) and origin and origin == self._viewer():
+            return ""
         if origin is None and reading:
             outside = headers.get("sec-fetch-site", "none") not in ("none", "same-origin")
             return "requested by another site's page" if outside and not _opens_page(headers) else ""

@@ -70,6 +70,8 @@ class SiteParts:
     may_command: bool = True
     """False if the keys are a viewer's: no page may order anything."""
     ended: Callable[[], bool] = lambda: False
+    viewer: Callable[[], str] = lambda: ""
+    """Returns the origin of Rerun's viewer."""
     more: list[Route] = field(default_factory=list)
     """Routes of planning and of looking back."""
 
@@ -93,7 +95,7 @@ def web_app(parts: SiteParts) -> RequestChecks:
         *parts.more,
     ]
     app = Starlette(routes=routes, exception_handlers={StopgoError: refused})
-    return RequestChecks(app, address=parts.address, access=parts.access)
+    return RequestChecks(app, address=parts.address, access=parts.access, viewer=parts.viewer)
 
 
 def refused(request: Request, error: Exception) -> Response:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import uvicorn
@@ -30,11 +31,16 @@ from stopgo.site.event_feed import EventFeed
 from stopgo.site.known_missions import KnownMission, KnownMissions
 from stopgo.site.live_robot import LiveRobot
 from stopgo.site.page_access import PageAccess, read_stored
+from stopgo.site.planning import PlanningRoom
+from stopgo.site.planning_routes import planning_routes
 from stopgo.site.request_checks import SiteAddress
 from stopgo.site.robot_orders import RobotOrders
+from stopgo.site.run_pages import RunRoom
+from stopgo.site.run_routes import run_routes
 from stopgo.site.server_certificate import own_certificate
 from stopgo.site.site_folder import SiteFiles
 from stopgo.site.web_app import SiteParts, web_app
+from stopgo.site.web_viewer import WebViewer
 
 HERE = "127.0.0.1"
 GATHER_S = 1.0
@@ -94,7 +100,7 @@ def serving_site(options: SiteOptions, *, say: Callable[[str], None]) -> Iterato
             robots=fleet.robots, orders=fleet.orders, commander=fleet.commander,
             may_command=held is None or held.holder.role == "station", ended=stopped.is_set,
         )  # fmt: skip
-        opened.enter_context(_more_rooms(parts, options))
+        opened.enter_context(_more_rooms(parts))
         opened.callback(feed.close)
         opened.callback(stopped.set)
         opened.enter_context(_running(web_app(parts), listener, tls))
@@ -103,9 +109,24 @@ def serving_site(options: SiteOptions, *, say: Callable[[str], None]) -> Iterato
         yield f"{address.url}/#token={access.invite('operator')}"
 
 
-def _more_rooms(parts: SiteParts, options: SiteOptions) -> AbstractContextManager[None]:
-    """Add the routes of planning and of looking back."""
-    return nullcontext()
+@contextmanager
+def _more_rooms(parts: SiteParts) -> Iterator[None]:
+    """Add the rooms of planning and of looking back, and end their processes with the block."""
+    viewer = WebViewer()
+
+    def look_again() -> None:
+        for robot in list(parts.robots.values()):
+            robot.look_again()
+
+    with ExitStack() as opened:
+        merged = opened.enter_context(TemporaryDirectory(prefix="stopgo-runs-", ignore_cleanup_errors=True))
+        planning = PlanningRoom(parts.folder, parts.feed, look_again)
+        opened.callback(planning.close)
+        opened.callback(viewer.close)
+        room = RunRoom(parts.folder, Path(merged), planning.files)
+        parts.viewer = lambda: viewer.origin
+        parts.more += [*planning_routes(planning), *run_routes(room, viewer, parts.address.url)]
+        yield
 
 
 @dataclass
@@ -162,6 +183,9 @@ def _recording(path: Path, known: KnownMission | None) -> Iterator[RunCollector]
         ) from None
     with FieldRecording(path, plan=None if known is None else known.recording) as record:
         yield RunCollector(record)
+    if path.exists():  # what a killed site left of this run is in it, too
+        for left in path.parent.glob(f"{path.stem}.partial*.rrd"):
+            left.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -1,7 +1,9 @@
 // The page from top to bottom: sign in, the STOP bar, and three views that share one link to the server.
 import { isSignedIn, read, send, signIn } from "./api.js";
 import { fill, h, say } from "./dom.js";
+import { makeBack } from "./back.js";
 import { makeLive } from "./live.js";
+import { makePlan } from "./plan.js";
 import { makeStopBar } from "./stop.js";
 import { listen, silentMs, watchLink } from "./store.js";
 import { chooseLanguage, otherLanguage, seconds, t } from "./words.js";
@@ -10,7 +12,7 @@ const SILENT_MS = 2500;
 const main = document.getElementById("main");
 const head = document.getElementById("head");
 const offline = document.getElementById("offline");
-const VIEWS = { live: makeLive };
+const VIEWS = { live: makeLive, plan: makePlan, back: makeBack };
 let leave = () => {};
 
 async function begin() {
