@@ -21,6 +21,7 @@ MEANINGS = {
     "--floor": "file of the floor that the mission was planned on",
     "--html": "report to write, as one HTML file",
     "--json": "one JSON object on stdout",
+    "--listen": "address to listen at",
     "--map": "transform from the site to a map",
     "--mavlink": "MAVLink address",
     "--mission": "mission.json that the command works with",

@@ -147,8 +147,8 @@ def _heights_at(t: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     for a, b in ((0, 1), (1, 2), (2, 0)):
         span = t[:, b] - t[:, a]
         level = np.abs(span) < 1e-9
-        share = np.clip(-t[:, a] / np.where(level, 1.0, span), 0.0, 1.0)
-        at = z[:, a] + share * (z[:, b] - z[:, a])
+        fraction = np.clip(-t[:, a] / np.where(level, 1.0, span), 0.0, 1.0)
+        at = z[:, a] + fraction * (z[:, b] - z[:, a])
         on = (
             ~level
             & (np.minimum(t[:, a], t[:, b]) <= ON_FACE_M)
@@ -219,8 +219,8 @@ class _MarkedColumns:
         clear = np.ones(z.shape, dtype=bool)
         for step in np.arange(STEP_M, float(away.max(initial=0.0)) - AT_TARGET_M, STEP_M):
             on = np.flatnonzero(away - AT_TARGET_M > step)
-            share = step / away[on]
-            at = np.floor((stop + share[:, None] * (ends[on] - stop) - self._low) / self._side).astype(
+            fraction = step / away[on]
+            at = np.floor((stop + fraction[:, None] * (ends[on] - stop) - self._low) / self._side).astype(
                 np.int64
             )
             at = np.clip(at, 0, np.array(self._shape) - 1)
@@ -228,7 +228,7 @@ class _MarkedColumns:
             met = np.flatnonzero(pattern)
             if len(met):
                 rows = on[met]
-                level = np.floor((height + (z[rows] - height) * share[met, None]) / self._tall)
+                level = np.floor((height + (z[rows] - height) * fraction[met, None]) / self._tall)
                 level = np.clip(level, 0, LEVELS - 1).astype(np.uint64)
                 clear[rows] &= (pattern[met, None] >> level) & np.uint64(1) == 0
         return clear

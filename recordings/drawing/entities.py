@@ -58,6 +58,7 @@ ROUTE = "/plan/route"
 STOPS = "/plan/stops"
 HEADINGS = "/plan/stops/heading"
 NETWORK = "/plan/stops/network"
+ERRORS = "/plan/stops/errors"
 PLANNED_ROBOT = "/plan/robot"
 
 WORLD = "/world"

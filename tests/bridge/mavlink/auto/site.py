@@ -22,7 +22,7 @@ from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.station.station import Station
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import ItemList
@@ -45,7 +45,7 @@ KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
 def real_tour(**details: Any) -> Mission:
     """The tour for a vehicle that drives as a real one: beside its stops, and late to stand still."""
     made = tour(**{"tolerance_m": 0.3, "settle_s": 3.0, **details})
-    return sealed(msgspec.structs.replace(made, robot=msgspec.structs.replace(made.robot, speed=0.5)))
+    return with_digest(msgspec.structs.replace(made, robot=msgspec.structs.replace(made.robot, speed=0.5)))
 
 
 @dataclass

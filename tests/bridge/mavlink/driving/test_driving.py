@@ -14,7 +14,7 @@ from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import read_signing_key
-from stopgo.mission.document import Scan, sealed
+from stopgo.mission.document import Scan, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import STILL_M_S
 from stopgo.mission.run.events import Arrived, Finished, Held, PoseReport, Scanned, Settled
@@ -76,7 +76,7 @@ def test_an_ardupilot_rover_turns_to_the_headings_that_a_narrow_scanner_needs(tm
     mission = site_mission(heading=math.pi / 2)
     narrow = msgspec.structs.replace(mission, scanner=msgspec.structs.replace(mission.scanner, fov_deg=90.0))
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
-        station.push(sealed(narrow))
+        station.push(with_digest(narrow))
         station.command("start")
         until(station.reports(), is_state("FINISHED"))
         arrived = [event for event in events_of(station) if isinstance(event, Arrived)]
@@ -110,7 +110,7 @@ def test_a_scanner_that_needs_headings_is_not_driven_by_what_cannot_turn(tmp_pat
         gateway(tmp_path, vehicle.url) as station,
         pytest.raises(NegativeResult, match="sees 90°"),
     ):
-        station.push(sealed(narrow))
+        station.push(with_digest(narrow))
 
 
 def test_nothing_starts_without_origin_arming_or_a_free_hand(tmp_path: Path) -> None:
