@@ -120,9 +120,14 @@ def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str
     for group in (whole, *(group for group in measured.coverage.short if group is not whole)):
         name, least = group.name if group is not whole else "what is visible", percent(group.required)
         yield f"Of {name}, {percent(group.coverage)} was measured; {least} is required."
-    absent = () if sight is None else measured.absent(sight.driven)
+    absent = [] if sight is None else [item for item in measured.absent(sight.driven) if item.empty == 1.0]
     if absent:
-        yield f"No point lies on {named(absent)}, although it was visible: not built, or hidden."
+        least, most = (percent(pick(item.visible for item in absent)) for pick in (min, max))
+        range_text = least if least == most else f"{least} to {most}"
+        yield (
+            f"No point lies on {named([item.id for item in absent])}, although {range_text} of it was "
+            "visible: not built, hidden, or missing from the clouds."
+        )
 
 
 def _scans_text(replay: Replay) -> str:

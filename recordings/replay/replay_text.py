@@ -9,7 +9,7 @@ from typing import Any
 
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_table
-from stopgo.mission.comparing.measured import Measured
+from stopgo.mission.comparing.measured import Absent, Measured
 from stopgo.mission.console.table import printable, table
 from stopgo.mission.stages.figures import pair_cells, percent
 from stopgo.recordings.logs.field_log import FieldLog
@@ -105,10 +105,23 @@ def measured_lines(replay: Replay) -> list[str]:
     ]
     lines += [
         f"  unplanned  at ({item.middle[0]:.2f}, {item.middle[1]:.2f}), {item.size_m:.1f} m, "
-        f"hit in {item.hits} scans"
+        f"hit in {item.hits} of {item.sweeps} scans ({percent(item.hits / item.sweeps)})"
         for item in found.unplanned
     ]
+    lines += [
+        f"  absent     {item.id}: no point on {percent(item.empty)} of its visible part; "
+        f"{percent(item.visible)} of it was visible"
+        for item in absent_of(replay)
+    ]
     return [*lines, ""]
+
+
+def absent_of(replay: Replay) -> tuple[Absent, ...]:
+    """Return the elements that the scanner's clouds hardly show, though they were visible."""
+    found = replay.measured
+    if found is None or replay.sight is None or not found.decides or found.placing_text:
+        return ()
+    return found.absent(replay.sight.driven)
 
 
 def as_json(replay: Replay) -> dict[str, Any]:
@@ -130,7 +143,7 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "halts": [_standstill_json(replay, k) for k in range(len(replay.matches))],
         "true_offset_m": {stop.id: replay.true_offset_m(k) for k, stop in enumerate(replay.mission.stops)},
         "coverage": None if replay.sight is None else _sight_json(replay.sight),
-        "measured": None if replay.measured is None else _measured_json(replay.measured),
+        "measured": None if replay.measured is None else _measured_json(replay, replay.measured),
         "run": comparison_json(replay.comparison),
     }
 
@@ -147,7 +160,7 @@ def _sight_json(sight: AsDriven) -> dict[str, Any]:
     return {"shares": groups, "elements": elements}
 
 
-def _measured_json(found: Measured) -> dict[str, Any]:
+def _measured_json(replay: Replay, found: Measured) -> dict[str, Any]:
     return {
         "tolerance_m": found.tolerance_m,
         "points": found.points,
@@ -166,9 +179,10 @@ def _measured_json(found: Measured) -> dict[str, Any]:
         },
         "unplanned": [
             {"x": item.middle[0], "y": item.middle[1], "size_m": item.size_m, "hits": item.hits,
-             "outline": item.outline.exterior.tolist()}
+             "scans": item.sweeps, "outline": item.outline.exterior.tolist()}
             for item in found.unplanned
         ],
+        "absent": [vars(item) for item in absent_of(replay)],
     }  # fmt: skip
 
 

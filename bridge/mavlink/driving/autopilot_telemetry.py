@@ -48,6 +48,7 @@ STREAMS = {
     "EKF_STATUS_REPORT": (MessageId.EKF_STATUS_REPORT, 1),
     "ESTIMATOR_STATUS": (MessageId.ESTIMATOR_STATUS, 1),
     "FENCE_STATUS": (MessageId.FENCE_STATUS, 1),
+    "RC_CHANNELS": (MessageId.RC_CHANNELS, 4),
 }
 """Wanted messages by name: number of the message, times a second."""
 
