@@ -25,15 +25,13 @@ from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
 from stopgo.mission.errors import InputError, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
-from stopgo.mission.mavlink.autopilots.kind import why_no_rover
+from stopgo.mission.mavlink.autopilots.kind import ALONE_S, why_no_rover
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
 
 ON_BOARD = Who(253, Component.ONBOARD_COMPUTER)
 """Our own address: neither QGroundControl (255) nor a station of ours (254)."""
 TICK_S = 0.1
-ALONE_S = 0.5
-"""Longest time that a vehicle should drive on without us."""
 SOONEST_GIVEN_UP_S = 0.3
 """Least duration of a course, whatever a parameter says: an autopilot checks it at intervals."""
 
