@@ -65,7 +65,7 @@ def _health(values: Values, names: entities.RunEntities) -> tuple[HealthWords, .
     ns, _ = values.columns(entity, "charge")
     words = (values.texts(entity, name, "charge") for name in ("battery", "position_estimate", "geofence"))
     rows = zip(ns.tolist(), *words, strict=True)
-    return tuple(HealthWords(*row) for row in sorted(rows))
+    return tuple(HealthWords(*row) for row in sorted(rows, key=lambda row: row[0]))
 
 
 def _poses(values: Values, names: entities.RunEntities) -> dict[str, Track]:

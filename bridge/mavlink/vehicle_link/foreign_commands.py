@@ -88,9 +88,14 @@ class MovedChannel:
     before_us: int
     after_us: int
     at_s: float
+    has_receiver: bool = True
+    """False if RC_CHANNELS reports no receiver: then a station overrides the channel."""
 
     def __str__(self) -> str:
-        return f"the remote control (its channel {self.channel}: {self.before_us} → {self.after_us} µs)"
+        moved = f"channel {self.channel}: {self.before_us} → {self.after_us} µs"
+        if self.has_receiver:
+            return f"the remote control (its {moved})"
+        return f"a station in place of a remote control (not known which; {moved})"
 
 
 class ForeignCommands(MessageQueue):
@@ -213,7 +218,7 @@ class ForeignCommands(MessageQueue):
         for nth, (before, after) in enumerate(zip(self._channels, channels, strict=True)):
             known = before in SIGNAL_US and after in SIGNAL_US
             if known and abs(after - before) >= MOVED_US:
-                self._motions.append(MovedChannel(nth + 1, before, after, now_s))
+                self._motions.append(MovedChannel(nth + 1, before, after, now_s, message.chancount > 0))
             if not known or abs(after - before) >= MOVED_US:
                 self._channels[nth] = after
         self._channels_s = now_s
