@@ -159,7 +159,7 @@ class SiteFleet:
             )
             robot = LiveRobot(station, self.feed, self.missions, self.recorder)
             self.robots[name] = robot
-        thread = threading.Thread(target=robot.follow, args=(self.stopped,), daemon=True)
+        thread = threading.Thread(target=robot.work, args=(self.stopped,), daemon=True)
         self.threads.append(thread)
         thread.start()
 
