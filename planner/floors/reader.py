@@ -45,6 +45,8 @@ class FloorOptions:
     """Meanings of layers with other names: names in capitals, kinds as in LAYER_ROLES."""
     layer_map: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """The same, from a file that `stopgo floors --write-map` wrote."""
+    found_layers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    """The same, as the reader itself found them by the line work; no user gives it."""
     drawing: int | None = None
     """Number of the drawing, of several in one model space, from 1."""
     region: tuple[float, float, float, float] | None = None
