@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ezdxf.document import Drawing
 
@@ -23,6 +24,7 @@ from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
 from stopgo.planner.floors.linework import PATTERN, Derived, as_room_name, completed, derived
 from stopgo.planner.floors.parts import in_order, parts_of
+from stopgo.planner.floors.raised_floor import with_heights
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
 from stopgo.planner.floors.units.unit_lengths import METRES
@@ -58,6 +60,7 @@ def _read_sheet(
 ) -> FloorPlan:
     """The floor of a drawing as interpreted, with the findings on its file."""
     floor = _floor_of(sheet, file.path, _source(file, options), tried)
+    floor = with_heights(floor, options)
     return replace(floor, findings=in_order((*odd_file, *floor.findings)))
 
 
@@ -115,7 +118,13 @@ ANY_UNIT = ("m", "cm", "mm")
 
 
 def _source(file: FloorFile, options: FloorOptions) -> FloorSource:
-    more = {"layer_map": dict(sorted(options.layer_map.items()))} if options.layer_map else {}
+    more: dict[str, Any] = {}
+    if options.layer_map:
+        more["layer_map"] = dict(sorted(options.layer_map.items()))
+    if options.heights:
+        more["heights"] = {kind: list(span) for kind, span in sorted(options.heights.items())}
+        names = ("scan_height", "robot_height")
+        more |= {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     return file.source(drawing=options.drawing, region=options.region, units=options.units, options=more)
 
 
@@ -191,7 +200,7 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
 
 @instance_cached
 def _line_work(sheet: DxfSheet) -> Derived:
-    """What is derived from a sheet's line work; it takes long, and is needed by trials and by the floor."""
+    """Walls, doors, rooms and floor derived from a sheet's line work, once for trial and floor."""
     return derived(sheet.strokes, sheet.words)
 
 

@@ -241,7 +241,7 @@ class _Labels:
 
 
 def _labels(rooms: Sequence[shapely.Polygon], words: Sequence[Word]) -> _Labels:
-    """What the texts in the rooms say of them."""
+    """Numbers of rooms by what texts in them say."""
     tree = shapely.STRtree(list(rooms))
     areas: dict[int, list[float]] = {}
     texts: dict[int, list[str]] = {}

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from ezdxf.document import Drawing
 from ezdxf.entities import DXFEntity
+from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.drawing import BROKEN_INPUT
@@ -226,8 +227,6 @@ def _heights(shape: Shape) -> Iterator[float]:
 
 def _names_apart(shapes: Iterable[Shape]) -> float | None:
     """The median distance between names of dwellings' rooms; None for fewer than three."""
-    from scipy.spatial import cKDTree
-
     places = []
     for shape in shapes:
         if shape.is_text:

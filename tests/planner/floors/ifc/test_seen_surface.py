@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stopgo.command_line import main
-from stopgo.planner.floors import FloorOptions, model_solids, read_floor
+from stopgo.planner.floors import FloorOptions, read_floor
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 
@@ -71,7 +71,7 @@ def test_elements_have_the_heights_of_their_bodies(read: Read, tmp_path: Path) -
 
 def test_leaves_and_panes_stop_no_ray_of_a_model(read: Read, tmp_path: Path) -> None:
     read(two_rooms())
-    solids = model_solids(tmp_path / "house.ifc", FloorOptions(storey="EG"))
+    solids = read_floor(tmp_path / "house.ifc", FloorOptions(storey="EG")).solids
     assert solids is not None
     assert np.isfinite(solids.triangles).all()
     assert solids.triangles[..., 2].min() >= -3.0
@@ -83,7 +83,7 @@ def test_a_drawing_has_no_solids(tmp_path: Path) -> None:
     drawing = new_drawing()
     rectangle(drawing.modelspace(), "A-WALL", 0, 0, 6, 5)
     drawing.saveas(tmp_path / "plan.dxf")
-    assert model_solids(tmp_path / "plan.dxf", FloorOptions()) is None
+    assert read_floor(tmp_path / "plan.dxf").solids is None
 
 
 def test_a_proof_at_the_models_solids_agrees_with_the_plan(
