@@ -29,7 +29,7 @@ def main() -> None:
 def row(name: str, path: Path, options: dict[str, float]) -> list[object]:
     """A floor's stops and bounds by both methods."""
     floor = read_floor(path)
-    settings = Settings(selector=SELECTOR, **options)  # type: ignore[arg-type]
+    settings = Settings(selector=SELECTOR, register=False, **options)  # type: ignore[arg-type]
     begin = time.process_time()
     seen = visibility(candidates(navigable(floor, settings)))
     found = select_anywhere(seen)

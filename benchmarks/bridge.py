@@ -30,7 +30,7 @@ from stopgo.bridge.link.keys import now_utc
 from stopgo.bridge.station.station import Station, connect
 from stopgo.bridge.station.window import Window
 from stopgo.mission.console.ports import free_port
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.run.run_commands import Verb
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
@@ -116,7 +116,7 @@ def winding(mission: Mission) -> Mission:
         )
         for stop in mission.stops
     )
-    return sealed(msgspec.structs.replace(mission, stops=stops))
+    return with_digest(msgspec.structs.replace(mission, stops=stops))
 
 
 def slow_push(station: Station) -> None:

@@ -33,6 +33,8 @@ from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
 from stopgo.planner.scan_simulation.verification import _ScanSite as ScanSite
 from stopgo.planner.space.navigable import navigable
 
+ALONE = Settings(register=False)
+"""Candidates without doorways, of which any may be required as a position."""
 POSITIONS = 11
 """Positions on each floor; two rounds with different ones."""
 ROUNDS = 2
@@ -50,20 +52,20 @@ STOREYS = {
 def floors() -> Iterator[tuple[str, FloorPlan, Settings]]:
     """Layered floors, storeys of models, drawings, and synthetic offices; a floor that is missing is left out."""
     for seed, size in enumerate(((24, 14), (30, 14), (40, 16), (30, 28), (18, 14), (36, 28)), start=1):
-        yield f"office {size[0]} x {size[1]}, seed {seed}", office(*size, seed=seed), Settings()
+        yield f"office {size[0]} x {size[1]}, seed {seed}", office(*size, seed=seed), ALONE
     for name, (path, options) in FLOORS.items():
         if path.exists():
-            yield name, read_floor(path, FloorOptions(d_dis=0.05)), Settings(**options)
+            yield name, read_floor(path, FloorOptions(d_dis=0.05)), Settings(**options, register=False)
     for name in ("house", "barcelona-plan"):
         path = SHARED / "dxf" / f"{name}.dxf"
         if path.exists():
-            yield name, read_floor(path, FloorOptions(d_dis=0.05)), Settings()
+            yield name, read_floor(path, FloorOptions(d_dis=0.05)), ALONE
     for name, storeys in STOREYS.items():
         path = SHARED / "ifc" / f"{name}.ifc"
         for storey in storeys if path.exists() else ():
-            yield f"{name} {storey}", read_floor(path, FloorOptions(d_dis=0.05, storey=storey)), Settings()
+            yield f"{name} {storey}", read_floor(path, FloorOptions(d_dis=0.05, storey=storey)), ALONE
     for seed, size in enumerate(((26, 14), (50, 14), (20, 28), (44, 30)), start=11):
-        yield f"office {size[0]} x {size[1]}, seed {seed}", office(*size, seed=seed), Settings()
+        yield f"office {size[0]} x {size[1]}, seed {seed}", office(*size, seed=seed), ALONE
 
 
 def standing(floor: FloorPlan, settings: Settings, xy: FloatArray) -> Candidates:
@@ -83,7 +85,7 @@ def positions(floor: FloorPlan, settings: Settings, seed: int) -> FloatArray:
 def simulated(name: str, floor: FloorPlan, settings: Settings, seed: int) -> Iterator[dict[str, Any]]:
     """Every pair of positions with shared surfaces, registered from several starts."""
     simulation = Simulation(range_m=settings.range, ceiling_m=floor.ceiling_m or 2.7)
-    site = ScanSite.of(navigable(floor, settings), simulation)
+    site = ScanSite.of(navigable(floor, settings), simulation, None)
     xy = positions(floor, settings, seed)
     at = np.column_stack([xy - site.solids.origin, np.full(len(xy), simulation.height_m)])
     poses = [ScannerPose(frozen(place), 0.0, number=k) for k, place in enumerate(at)]
@@ -150,7 +152,7 @@ def counting(*, edge: float, least: float, spacing: float, incidence: float) -> 
 def counted(floor: FloorPlan, settings: Settings, rows: list[dict[str, Any]]) -> list[Figures]:
     """Figures of each pair by the constants in force."""
     xy = np.unique([place for row in rows for place in (row["a"], row["b"])], axis=0)
-    found = standing(floor, replace(settings, overlap=0.1), xy)
+    found = standing(floor, settings, xy)
     at, overlaps, result = found.xy[found.kept], overlaps_of(found), []
     for row in rows:
         i, j = (int(np.argmin(np.hypot(*(at - np.array(row[end])).T))) for end in ("a", "b"))

@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.table import put, table, versions
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
-from stopgo.mission.stages.figures import Figures, Share, percent
+from stopgo.mission.stages.figures import Figures, GroupCoverage, percent
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import FloorOptions, read_floor
@@ -69,7 +69,7 @@ def main() -> None:
 
 def cost_row(name: str, path: Path, options: dict[str, float]) -> list[str]:
     """Stops and bound at each required fraction."""
-    settings = Settings(**options)
+    settings = Settings(register=False, **options)
     floor = read_floor(path, FloorOptions(d_dis=settings.d_dis))
     seen = visibility(candidates(navigable(floor, settings)))
     return [name, *(f"{len(s.chosen)} / {s.bound}" for s in _selections(seen))]
@@ -86,7 +86,7 @@ def _selections(seen: Visibility) -> Iterator[Selection]:
 def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list[str]]:
     """Figures of a plan by either rule, counted by length."""
     for rule in ("paper", "length"):
-        settings = Settings(**options, coverage_rule=rule)
+        settings = Settings(**options, coverage_rule=rule, register=False)
         begin = time.perf_counter()
         made = plan(read_floor(path, FloorOptions(d_dis=settings.d_dis)), settings)
         took = time.perf_counter() - begin
@@ -102,18 +102,18 @@ def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list
 
 def _by_length(selection: Selection, figures: Figures) -> Figures:
     """The figures of a selection by length, for either rule."""
-    from stopgo.planner.appraisal.figures_of_route import shares_of
+    from stopgo.planner.appraisal.figures_of_route import coverage_by_group
 
     space = selection.space
     by_length = replace(space, settings=replace(space.settings, coverage_rule="length"))
     found = replace(selection.candidates, space=by_length)
     again = replace(selection, visibility=replace(selection.visibility, candidates=found))
-    shares = shares_of(again)
-    return replace(figures, whole=shares.whole, rooms=shares.rooms, kinds=shares.kinds)
+    found = coverage_by_group(again)
+    return replace(figures, whole=found.whole, rooms=found.rooms, kinds=found.kinds)
 
 
-def _told(shares: list[Share] | tuple[Share, ...]) -> str:
-    seen = [share for share in shares if share.coverage is not None]
+def _told(groups: list[GroupCoverage] | tuple[GroupCoverage, ...]) -> str:
+    seen = [group for group in groups if group.coverage is not None]
     return f"{percent(seen[0].coverage)} {seen[0].name}" if seen else "-"
 
 

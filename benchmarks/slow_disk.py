@@ -21,7 +21,7 @@ import msgspec
 from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.console.ports import free_port
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.run.events import PoseReport
 from tests.bridge.world import corridor
 
@@ -87,7 +87,7 @@ def one_leg(length_m: float = LEG_M) -> Mission:
     """A mission with one stop at the end of a long leg."""
     made = corridor(stops=1, closed=False)
     stop = msgspec.structs.replace(made.stops[0], x=length_m, approach=((0.0, 0.0), (length_m, 0.0)))
-    return sealed(msgspec.structs.replace(made, stops=(stop,)))
+    return with_digest(msgspec.structs.replace(made, stops=(stop,)))
 
 
 @contextmanager

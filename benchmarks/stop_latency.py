@@ -29,7 +29,7 @@ from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import now_utc
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.console.ports import free_port
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import PoseReport
 from tests.bridge.proxy import Proxy
@@ -281,7 +281,7 @@ def extended(revision: int) -> Mission:
         for stop in more
     ]
     stops[0] = msgspec.structs.replace(stops[0], approach=((x, 0.0), stops[0].approach[-1]))
-    return sealed(msgspec.structs.replace(first, revision=revision, stops=(first.stops[0], *stops)))
+    return with_digest(msgspec.structs.replace(first, revision=revision, stops=(first.stops[0], *stops)))
 
 
 def flood(port: int, kind: str) -> None:

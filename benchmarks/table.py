@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from benchmarks.ages import stamp
+
 README = Path(__file__).with_name("README.md")
 
 
@@ -45,10 +47,12 @@ def median_seconds(action: Callable[[], object], *, runs: int = 5) -> float:
 
 
 def put(section: str, text: str) -> None:
-    """Replace what stands between the section's markers in the README."""
+    """Replace what stands between the section's markers in the README, and stamp it with the code measured."""
     begin, end = f"<!-- {section}: begin -->", f"<!-- {section}: end -->"
     whole = README.read_text(encoding="utf-8")
     if begin not in whole:
         whole += f"\n{begin}\n{end}\n"
     before, _, rest = whole.partition(begin)
-    README.write_text(f"{before}{begin}\n{text}\n{end}{rest.partition(end)[2]}", encoding="utf-8")
+    README.write_text(
+        f"{before}{begin}\n{text}\n\n{stamp(section)}\n{end}{rest.partition(end)[2]}", encoding="utf-8"
+    )

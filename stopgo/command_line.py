@@ -35,6 +35,7 @@ COMMANDS = {
     ),
     "review_command": ("review",),
     "runs_command": ("runs",),
+    "site_command": ("site",),
     "importer_command": ("rerun-importer",),
     "replay_command": ("replay",),
     "document_commands": ("show", "check", "export", "import", "align"),
@@ -53,6 +54,7 @@ EXTRAS = {
     "rerun": "record", "rosbags": "record", "pyulog": "record",
     "laspy": "clouds", "pye57": "clouds", "reportlab": "plan", "PIL": "plan",
     "embreex": "prove", "small_gicp": "prove", "kiss_matcher": "prove", "pyvrp": "fleet",
+    "starlette": "site", "uvicorn": "site",
 }  # fmt: skip
 """The extra that installs each optional library."""
 

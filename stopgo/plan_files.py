@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +16,9 @@ from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
 from stopgo.planner import plan
+from stopgo.recording_process import recording_process
 from stopgo.result_files import is_missing, report_missing_rerun, result_folder
+from stopgo.spared_modules import load_when_used
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from stopgo.mission.stages.seen_area import SeenSurface
     from stopgo.planner.commands.plan_report import PlanReport
     from stopgo.planner.floors.standing_body import StandingBody
-    from stopgo.recordings.plan import PlanRecording
+    from stopgo.recording_process import PlanDrawing, RecordingProcess
 
 
 @dataclass(frozen=True)
@@ -45,26 +47,47 @@ def plan_files(
     *,
     all_parts: bool = False,
     print_options: PrintOptions | None = None,
+    beside: bool = False,
+    observe: Callable[[object], None] = lambda result: None,
 ) -> list[PlanReport]:
-    """Plan a floor's file into a folder; one report per part, the main part first."""
-    with running(f"reading {floor}") as step:
-        return _planned(floor, out, settings, Stopwatch(step), all_parts, print_options or PrintOptions())
+    """Plan a floor's file into a folder; one report per part, the main part first.
+
+    With `beside` the recordings are drawn in a process of their own, which loads Rerun during planning.
+    `observe` is called with the result of each stage as soon as it is there.
+    """
+    with running(f"reading {floor}") as step, recording_process() as recorder:
+        watch = Stopwatch(step, observe)
+        writing = _Writing(out, print_options or PrintOptions(), watch, recorder, beside)
+        return _planned(floor, settings, writing, all_parts)
 
 
-def _planned(
-    floor: Path, out: Path, settings: Settings, watch: Stopwatch, all_parts: bool, options: PrintOptions
-) -> list[PlanReport]:
+@dataclass(frozen=True, eq=False)
+class _Writing:
+    """Where the files of a plan go, and the means to write them."""
+
+    out: Path
+    options: PrintOptions
+    watch: Stopwatch
+    recorder: RecordingProcess
+    beside: bool
+
+
+def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool) -> list[PlanReport]:
     from stopgo.planner.commands.outputs import names
+
+    load_when_used()
     from stopgo.planner.floors import options_of, read_floor, standing_bodies
 
     read = read_floor(floor, options_of(settings))
-    folder = result_folder(out)
+    folder = result_folder(writing.out)
     for path in names(folder, 0).values():
         must_be_writable(path)
+    if writing.beside:
+        writing.recorder.start()
     with _print_findings_on_error(read):
-        made = plan(read, settings, observe=watch.observe, all_parts=all_parts)
+        made = plan(read, settings, observe=writing.watch.observe, all_parts=all_parts)
     bodies = standing_bodies(floor, options_of(settings))
-    reports = [_write_part(made, number, folder, options, watch, bodies) for number in range(len(made.parts))]
+    reports = [_write_part(made, number, folder, writing, bodies) for number in range(len(made.parts))]
     _set_aside_old(folder, len(reports), read, settings)
     if made.divided is None:
         return reports
@@ -106,8 +129,7 @@ def _write_part(
     plan: Plan,
     number: int,
     folder: Path,
-    options: PrintOptions,
-    watch: Stopwatch,
+    writing: _Writing,
     bodies: Sequence[StandingBody],
 ) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
@@ -117,26 +139,27 @@ def _write_part(
 
     files = names(folder, number)
     part = _revised(plan.parts[number], files["mission"])
-    recording = _recording(part.mission.id)
+    recording = _recording(part, writing.recorder)
     if recording is None:
         del files["recording"]
-    contents = _PartContents(part, plan, options, _today(), _seen_from(part, watch))
+    watch = writing.watch
+    contents = _PartContents(part, plan, writing.options, _today(), _seen_from(part, watch))
     sheets = contents.sheets(files["sheets"])
     unwanted = [files.pop("sheets")] if sheets is None else []
     unwanted += [files.pop("picture")] if plan.divided and number else []
     keys = [key for key in WRITTEN if key in files]
     with replacing(*(files[key] for key in keys)) as paths:
         written = dict(zip(keys, paths, strict=True))
-        if recording is not None:
-            contents.record(recording)
-            recording.write(written["recording"])
-        watch.lap("recording")
         if sheets is not None:
             written["sheets"].write_bytes(sheets)
         written["coverage"].write_bytes(contents.coverage())
         if "picture" in written:
             written["picture"].write_bytes(contents.picture())
         written["mission"].write_bytes(contents.mission())
+        watch.lap("files")
+        if recording is not None:
+            recording.write(written["recording"])
+        watch.lap("recording")
     for path in unwanted:
         set_aside_file(path)
     watch.lap("files")
@@ -152,21 +175,27 @@ def _revised(part: PartPlan, path: Path) -> PartPlan:
     """The part's plan, its mission with the revision that replaces the file at `path`."""
     from msgspec.structs import replace as changed
 
-    from stopgo.mission.document import sealed
+    from stopgo.mission.document import with_digest
     from stopgo.mission.files.mission_json import next_revision
 
     revision = next_revision(path, part.mission)
-    return replace(part, mission=sealed(changed(part.mission, revision=revision)))
+    return replace(part, mission=with_digest(changed(part.mission, revision=revision)))
 
 
-def _recording(recording_id: str) -> PlanRecording | None:
-    """A new recording of a plan; None, and a line on stderr, if Rerun is not installed."""
-    try:
-        from stopgo.recordings.plan import PlanRecording
-    except ModuleNotFoundError as error:
-        report_missing_rerun(error, "plan.rrd")
-        return None
-    return PlanRecording(recording_id)
+def _recording(part: PartPlan, recorder: RecordingProcess) -> PlanDrawing | None:
+    """The recording of a part, while it is drawn; None, and a line on stderr, if Rerun is not installed."""
+    if not recorder.is_running:
+        try:
+            import stopgo.recordings.plan  # noqa: F401  refused now, not when all else is written
+        except ModuleNotFoundError as error:
+            report_missing_rerun(error, "plan.rrd")
+            return None
+    from stopgo.mission.document.schedule import schedule
+    from stopgo.mission.stages.sight import sight_of
+
+    mission = part.mission
+    sight = sight_of(part.route, mission, part.figures)
+    return recorder.draw(mission.id, (*part.stage_results(), mission, schedule(mission), sight))
 
 
 def _seen_from(part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
@@ -187,16 +216,6 @@ class _PartContents:
     options: PrintOptions
     date: str
     surface: SeenSurface | None = None
-
-    def record(self, recording: PlanRecording) -> None:
-        """Hand every stage result of the part to the recording."""
-        from stopgo.mission.document.schedule import schedule
-        from stopgo.mission.stages.sight import sight_of
-
-        mission = self.part.mission
-        sight = sight_of(self.part.route, mission, self.part.figures)
-        for result in (*self.part.stage_results(), mission, schedule(mission), sight):
-            recording.observe(result)
 
     def sheets(self, path: Path) -> bytes | None:
         """The set of sheets, if it is wanted; None, and a line on stderr, if reportlab is not installed."""
@@ -259,16 +278,18 @@ STAGES = {
 class Stopwatch:
     """Seconds per stage; names the running step."""
 
-    def __init__(self, step: RunningStep) -> None:
+    def __init__(self, step: RunningStep, also: Callable[[object], None]) -> None:
         self._laps: dict[str, float] = {}
         self._begin = self._last = time.perf_counter()
         self._step = step
+        self._also = also
 
     def observe(self, result: object) -> None:
         """Count the time since the last result to the stage that ends with this one."""
         ended, begins = STAGES.get(type(result).__name__, ("other", "files"))
         self.lap(ended)
         self._step.begin(begins)
+        self._also(result)
 
     def lap(self, stage: str) -> None:
         """Count the time since the last lap to a stage."""

@@ -77,6 +77,7 @@ RENAMED: Mapping[str, Mapping[str, NewName | Dropped | Unavailable]] = {
     "retry": _OF_VEHICLES,
     "robot": {"--endurance": NewName("--battery-life", unit="h")},
     "simulate": {"--profile": NewName("--autopilot")},
+    "runs": {"--web": Unavailable("the pages are part of stopgo site DIR")},
     "tunnel": {"--raw-orders": NewName("--allow-commands")},
 }
 """Old options by command."""

@@ -31,21 +31,20 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
         "status": "Print the state of the robots",
         "session": "Hold a session open for commands",
         "watch": "Follow and record a run",
+        "site": "Plan, run and review in the browser",
     },
     "Look back": {
         "review": "Compare recordings with their plan",
         "runs": "List the plans and runs in a folder",
         "replay": "Compare a robot's own log with a mission",
     },
-    "Robots": {
+    "Robots and upkeep": {
         "robot": "Run the robot agent",
         "simulate": "Simulate a MAVLink vehicle",
         "fetch-mission": "Read the mission of a MAVLink vehicle",
         "clear": "Clear the mission of a MAVLink vehicle",
         "align": "Fit the site to a robot's map",
         "tunnel": "Carry MAVLink frames over zenoh",
-    },
-    "Upkeep": {
         "doctor": "Check presets, keys, robot and vehicle",
         "keys": "Create, renew and revoke a site's keys",
         "conform": "Test a third-party robot or station",

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.bridge.conform.command_requirements import IDLE, ORDERS
-from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
+from stopgo.bridge.conform.falsified_signatures import FalsifiedSigning
 from stopgo.bridge.conform.requirements import (
     ConformVerdict,
     Nonconforming,
@@ -25,18 +25,18 @@ from stopgo.bridge.conform.robot_pushes import PUSHES
 from stopgo.bridge.conform.robot_questions import QUESTIONS
 from stopgo.bridge.conform.robot_restarts import RESTARTS
 from stopgo.bridge.conform.robot_runs import RUNS
-from stopgo.bridge.conform.robot_seals import SEALS
+from stopgo.bridge.conform.robot_signatures import SIGNATURE_REQUIREMENTS
 from stopgo.bridge.conform.robot_slow_disk import SLOW_DISK
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import Info, KeyExpressions
-from stopgo.bridge.link.seals import Seals
+from stopgo.bridge.link.signatures import MessageSigning
 from stopgo.bridge.link.zenoh_link import Guard, connecting
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.run.lease import remaining_s
 
 REQUIREMENTS: tuple[Requirement[RobotBench], ...] = (
-    *QUESTIONS, *SEALS, *IDLE, *PUSHES, *ORDERS, *RUNS, *SLOW_DISK, *RESTARTS,
+    *QUESTIONS, *SIGNATURE_REQUIREMENTS, *IDLE, *PUSHES, *ORDERS, *RUNS, *SLOW_DISK, *RESTARTS,
 )  # fmt: skip
 RESTART_S = 120.0
 """Timeout of a command that restarts a robot or makes its disk slow."""
@@ -69,7 +69,7 @@ class FalsifiedGuard(Guard):
     falsified: Any = None
 
     @property
-    def seals(self) -> Seals:
+    def signing(self) -> MessageSigning:
         return self.falsified
 
 
@@ -152,11 +152,11 @@ def check_at_rest(info: Info, commander: str, *, take_over: bool) -> None:
 def _forger(station: Station, options: ConformOptions, stack: ExitStack) -> Forger | None:
     if station.held is None:
         return None
-    seals = FalsifiedSeals(Guard(station.held).seals)
-    guard = FalsifiedGuard(station.held, falsified=seals)
+    signing = FalsifiedSigning(Guard(station.held).signing)
+    guard = FalsifiedGuard(station.held, falsified=signing)
     link = stack.enter_context(connecting(options.endpoint, guard, open_s=options.timeout_s))
     await_robot(link, station.keys, options.timeout_s)
-    return Forger(link, seals)
+    return Forger(link, signing)
 
 
 def await_robot(link: Link, keys: KeyExpressions, timeout_s: float) -> None:

@@ -18,7 +18,7 @@ from stopgo.bridge.conform.station_bench import StationAction, StationBench
 from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
 from stopgo.bridge.link.access import access_control
 from stopgo.bridge.link.protocol import KeyExpressions
-from stopgo.bridge.link.seals import Seals
+from stopgo.bridge.link.signatures import MessageSigning
 from stopgo.bridge.link.zenoh_link import Guard, listening
 from stopgo.bridge.robot.controller import new_boot_id
 from stopgo.bridge.robot.program import robots_keys
@@ -57,8 +57,8 @@ class ForgingGuard(Guard):
     forged: Any = None
 
     @property
-    def seals(self) -> Seals:
-        return super().seals if self.forged is None else self.forged
+    def signing(self) -> MessageSigning:
+        return super().signing if self.forged is None else self.forged
 
 
 @contextmanager
@@ -70,7 +70,7 @@ def station_bench(options: StationOptions, ready: Callable[[], None]) -> Iterato
     plain = Guard(
         held, options.insecure, None if held is None else access_control(keys), boot_id
     )  # fmt: skip
-    forged = None if held is None else ForgedAnswers(plain.seals)
+    forged = None if held is None else ForgedAnswers(plain.signing)
     guard = ForgingGuard(held, options.insecure, plain.access, boot_id, forged=forged)
     with (
         tempfile.TemporaryDirectory(prefix="stopgo-conform-") as folder,

@@ -12,7 +12,13 @@ import msgspec
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.link.link import Answering, Hearing, Link, Presence, Publish, Request, Unanswered
 from stopgo.bridge.link.protocol import KeyExpressions
-from stopgo.bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
+from stopgo.bridge.link.signatures import (
+    MessageSigning,
+    Question,
+    SignatureAttachment,
+    SignedAnswering,
+    SignedHearing,
+)
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
@@ -121,35 +127,35 @@ class FaultyLink:
 class ForgedAnswers:
     """Message signatures of a robot; those of answers on keys for which `forges` is true are wrong."""
 
-    def __init__(self, seals: Seals) -> None:
-        self._seals = seals
+    def __init__(self, signing: MessageSigning) -> None:
+        self._signing = signing
         self.distrusted = ""
         self.forges: Callable[[str], bool] = lambda key: False
 
-    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
-        return self._seals.seal_question(key, payload, parameters)
+    def sign_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        return self._signing.sign_question(key, payload, parameters)
 
-    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
-        return self._seals.verify_answer(question, payload, seal)
+    def verify_answer(self, question: Question, payload: bytes, attachment: bytes) -> bytes | None:
+        return self._signing.verify_answer(question, payload, attachment)
 
-    def seal_answers(self, answer: Answering) -> SealedAnswering:
-        sealed = self._seals.seal_answers(answer)
+    def sign_answers(self, answer: Answering) -> SignedAnswering:
+        signed = self._signing.sign_answers(answer)
 
         def answered(request: Request) -> tuple[bytes, bytes]:
-            reply, seal = sealed(request)
-            return (reply, _falsified(seal)) if self.forges(request.key) else (reply, seal)
+            reply, attachment = signed(request)
+            return (reply, _falsified(attachment)) if self.forges(request.key) else (reply, attachment)
 
         return answered
 
-    def seal_publication(self, key: str, payload: bytes) -> bytes:
-        return self._seals.seal_publication(key, payload)
+    def sign_publication(self, key: str, payload: bytes) -> bytes:
+        return self._signing.sign_publication(key, payload)
 
-    def verify_publications(self, heard: Hearing) -> SealedHearing:
-        return self._seals.verify_publications(heard)
+    def verify_publications(self, heard: Hearing) -> SignedHearing:
+        return self._signing.verify_publications(heard)
 
 
-def _falsified(seal: bytes) -> bytes:
-    valid = msgspec.json.decode(seal, type=Seal)
+def _falsified(attachment: bytes) -> bytes:
+    valid = msgspec.json.decode(attachment, type=SignatureAttachment)
     signature = bytes([valid.signature[0] ^ 1]) + valid.signature[1:]
     return msgspec.json.encode(msgspec.structs.replace(valid, signature=signature))
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
+from stopgo.bridge.conform.falsified_signatures import FalsifiedSigning
 from stopgo.bridge.conform.requirements import Nonconforming, PeerNotResponding
 from stopgo.bridge.conform.robot_queries import TRY_S, RobotQueries, read
 from stopgo.bridge.conform.trial_commands import TrialCommands
@@ -34,7 +34,7 @@ class Forger:
     """Link on which queries have falsified signatures."""
 
     link: Link
-    seals: FalsifiedSeals
+    signing: FalsifiedSigning
 
 
 class RobotBench(RobotQueries):

@@ -20,7 +20,7 @@ from stopgo.bridge.link.protocol import (
     Ready,
     encode,
 )
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 
 MANY_STOPS = 10
 """Stops of a mission that needs several of the smallest chunks."""
@@ -135,7 +135,7 @@ def what_cannot_be_driven_is_infeasible(bench: RobotBench) -> None:
     last = mission.stops[-1]
     torn = msgspec.structs.replace(last, approach=((last.x + 3.0, last.y), (last.x, last.y)))
     must_reject(
-        bench.missions.push(sealed(msgspec.structs.replace(mission, stops=(*mission.stops[:-1], torn)))),
+        bench.missions.push(with_digest(msgspec.structs.replace(mission, stops=(*mission.stops[:-1], torn)))),
         "infeasible",
     )
 
@@ -147,7 +147,7 @@ def unknown_profiles_are_infeasible(bench: RobotBench) -> None:
     first = mission.stops[0]
     scan = msgspec.structs.replace(first.scan, profile=uuid.uuid4().hex)
     stops = (msgspec.structs.replace(first, scan=scan), *mission.stops[1:])
-    must_reject(bench.missions.push(sealed(msgspec.structs.replace(mission, stops=stops))), "infeasible")
+    must_reject(bench.missions.push(with_digest(msgspec.structs.replace(mission, stops=stops))), "infeasible")
 
 
 def a_rejection_changes_nothing(bench: RobotBench) -> None:
@@ -167,7 +167,7 @@ def the_same_again_changes_nothing(bench: RobotBench) -> None:
 
 def a_revision_is_taken_once(bench: RobotBench) -> None:
     mission = bench.missions.store(bench.missions.mission())
-    other = sealed(msgspec.structs.replace(mission, name="another name"))
+    other = with_digest(msgspec.structs.replace(mission, name="another name"))
     must_reject(bench.missions.begin(manifest_of(other, msgspec.json.encode(other))), "revision_taken")
 
 

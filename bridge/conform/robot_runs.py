@@ -11,7 +11,7 @@ from stopgo.bridge.conform.robot_queries import describe, must_reject, read, rea
 from stopgo.bridge.conform.robot_questions import keeps_a_record, states_are_bounded
 from stopgo.bridge.link.capabilities import RECORD
 from stopgo.bridge.link.protocol import POSE_PAGE, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.run.events import (
     AnyEvent,
     Arrived,
@@ -191,7 +191,9 @@ def a_start_from_elsewhere_is_refused(bench: RobotBench) -> None:
     first = mission.stops[0]
     moved = msgspec.structs.replace(first, approach=((far.x, far.y), (first.x, first.y)))
     bench.missions.store(
-        sealed(msgspec.structs.replace(mission, start=far, stops=(moved, *mission.stops[1:]), return_=None))
+        with_digest(
+            msgspec.structs.replace(mission, start=far, stops=(moved, *mission.stops[1:]), return_=None)
+        )
     )
     bench.commands.must_refuse(bench.commands.order("start"), "not_at_start")
 
@@ -240,13 +242,13 @@ def a_path_that_differs_is_refused(bench: RobotBench) -> None:
 
 def another_mission_is_refused_during_a_run(bench: RobotBench) -> None:
     mission, _ = _started(bench)
-    other = sealed(msgspec.structs.replace(mission, id=f"{mission.id}-other"))
+    other = with_digest(msgspec.structs.replace(mission, id=f"{mission.id}-other"))
     must_reject(bench.missions.push(other), "running")
 
 
 def _next(bench: RobotBench, mission: Mission, **changes: object) -> Mission:
     revision = bench.missions.mission().revision
-    return sealed(msgspec.structs.replace(mission, revision=revision, **changes))
+    return with_digest(msgspec.structs.replace(mission, revision=revision, **changes))
 
 
 def the_record_has_no_gaps(bench: RobotBench) -> None:

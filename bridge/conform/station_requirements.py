@@ -328,7 +328,7 @@ def _boot_of(there: bool) -> bytes:
     return encode(Booted(boot_id="twin"))
 
 
-def questions_are_sealed(bench: StationBench) -> None:
+def questions_are_signed(bench: StationBench) -> None:
     with bench.forging("no such key"):
         bench.ready()
         must_exit(bench.does("start"), DONE, "a start that was carried out is not reported as done")
@@ -377,7 +377,7 @@ STATION_REQUIREMENTS: tuple[Requirement[StationBench], ...] = tuple(
         ("Events", "poses that were missed are requested", missed_poses_are_asked_for),
         ("Keys", "who watches shows a token and asks `keep`", a_watch_is_known_to_the_robot),
         ("One robot, one name", "two boots: no command, both paused", two_of_one_name_are_stopped),
-        ("Signatures", "queries are signed", questions_are_sealed),
+        ("Signatures", "queries are signed", questions_are_signed),
         ("Signatures", "an Info without a valid signature: no command", forged_states_are_not_believed),
         ("Signatures", "an answer without a valid signature: unknown", forged_answers_are_not_believed),
     )

@@ -15,7 +15,7 @@ from stopgo.mission.document import (
     Sees,
     Start,
     Stop,
-    sealed,
+    with_digest,
 )
 from stopgo.mission.run.events import Pose
 
@@ -38,7 +38,7 @@ def trial_mission(
     """Make a mission of stops on a line ahead of `pose`, the last `reach_m` metres away, and a return leg."""
     positions = [_ahead(pose, reach_m * (index + 1) / stops) for index in range(stops)]
     here = (pose.x, pose.y)
-    return sealed(
+    return with_digest(
         Mission(
             id=mission_id, revision=revision, name=f"conformance {mission_id}", digest="",
             frame=Frame(name="site"), georeference=None,

@@ -37,7 +37,7 @@ from pathlib import Path
 from stopgo.bridge.link.direct_question import PROTOCOL, answer_directly
 from stopgo.bridge.link.keys import Certificates, HeldKeys, Holder, Untrusted, now_utc
 from stopgo.bridge.link.relay_end import RelayEnd
-from stopgo.bridge.link.seals import SealedAnswering
+from stopgo.bridge.link.signatures import SignedAnswering
 from stopgo.mission.console.ports import free_port
 from stopgo.mission.errors import InputError
 
@@ -143,7 +143,7 @@ class Admission:
     inner: InnerEndpoints
     refused: Callable[[str], None]
     state: Path | None = None
-    answers: dict[str, SealedAnswering] = field(default_factory=dict)
+    answers: dict[str, SignedAnswering] = field(default_factory=dict)
     """Answers to questions on connections of their own, by key (`direct_question`)."""
     failed: Callable[[Exception], None] = lambda error: None
     """Called with an error that ended the relay."""

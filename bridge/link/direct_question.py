@@ -17,7 +17,7 @@ import msgspec
 
 from stopgo.bridge.link.keys import HeldKeys
 from stopgo.bridge.link.link import Request, Unanswered
-from stopgo.bridge.link.seals import KeySeals, SealedAnswering
+from stopgo.bridge.link.signatures import KeySigning, SignedAnswering
 
 PROTOCOL: Final = "stopgo-question/1"
 MOST_BYTES: Final = 16_384
@@ -27,11 +27,11 @@ LINE_S: Final = 5.0
 
 
 class DirectMessage(msgspec.Struct, frozen=True, kw_only=True):
-    """A question or an answer with its seal; the key is the question's."""
+    """A question or an answer with its signature; the key is the question's."""
 
     key: str = ""
     payload: bytes
-    seal: bytes
+    attachment: bytes = msgspec.field(name="seal")
 
 
 class DirectQuestion:
@@ -55,12 +55,14 @@ class DirectQuestion:
         ):
             if line.selected_alpn_protocol() != PROTOCOL:
                 return
-            seals = KeySeals(self._held)
-            question = seals.seal_question(self._key, self._payload, {})
+            signing = KeySigning(self._held)
+            question = signing.sign_question(self._key, self._payload, {})
             self.may_be_sent = True
-            line.sendall(_line(DirectMessage(key=self._key, payload=self._payload, seal=question.seal)))
+            line.sendall(
+                _line(DirectMessage(key=self._key, payload=self._payload, attachment=question.attachment))
+            )
             answer = _read(line)
-            self.reply = seals.verify_answer(question, answer.payload, answer.seal)
+            self.reply = signing.verify_answer(question, answer.payload, answer.attachment)
 
 
 def can_ask_directly(endpoint: str) -> bool:
@@ -68,15 +70,15 @@ def can_ask_directly(endpoint: str) -> bool:
     return endpoint.startswith("tls/") and not set(",?#") & set(endpoint)
 
 
-def answer_directly(line: ssl.SSLSocket, answers: Mapping[str, SealedAnswering]) -> None:
+def answer_directly(line: ssl.SSLSocket, answers: Mapping[str, SignedAnswering]) -> None:
     """Answer one question on an admitted connection, and close it; the answers are by key."""
     with suppress(OSError, msgspec.DecodeError, Unanswered), line:
         line.settimeout(LINE_S)
         question = _read(line)
         if question.key in answers:
-            request = Request(question.key, question.payload, {}, question.seal)
-            payload, seal = answers[question.key](request)
-            line.sendall(_line(DirectMessage(payload=payload, seal=seal)))
+            request = Request(question.key, question.payload, {}, question.attachment)
+            payload, attachment = answers[question.key](request)
+            line.sendall(_line(DirectMessage(payload=payload, attachment=attachment)))
 
 
 def station_context(held: HeldKeys) -> ssl.SSLContext:

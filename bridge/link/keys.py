@@ -2,7 +2,7 @@
 
 A certificate names who holds it in its common name (`robot:r1`, `station:alice`), so that a router can tell
 one from another, and carries the role apart, as its organisational unit. Keys are Ed25519 and serve both the
-links (mTLS) and the seals. `stopgo.bridge.link.authority` issues them and calls them back.
+links (mTLS) and of messages. `stopgo.bridge.link.authority` issues them and calls them back.
 """
 
 from __future__ import annotations

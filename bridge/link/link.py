@@ -20,7 +20,7 @@ class Request:
     key: str
     payload: bytes
     parameters: Mapping[str, str] = field(default_factory=dict)
-    seal: bytes = b""
+    attachment: bytes = b""
     holder: Holder | None = None
     """The verified sender; `None` if ends hold no keys."""
     fresh: bool = True

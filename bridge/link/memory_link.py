@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from stopgo.bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, matches
-from stopgo.bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, Seals
+from stopgo.bridge.link.signatures import NO_SIGNING, MessageSigning, SignedAnswering, SignedHearing
 
 
 @dataclass(frozen=True)
-class SealedMessage:
+class SignedMessage:
     """A message as its carrier sees it."""
 
     kind: Literal["question", "answer", "told"]
     key: str
     payload: bytes
-    seal: bytes
+    attachment: bytes
     parameters: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -25,8 +25,8 @@ class Switchboard:
     """Connects links in memory: publications arrive at once, in the caller's thread."""
 
     def __init__(self) -> None:
-        self.serving: list[tuple[MemoryLink, str, SealedAnswering]] = []
-        self.hearing: list[tuple[str, SealedHearing]] = []
+        self.serving: list[tuple[MemoryLink, str, SignedAnswering]] = []
+        self.hearing: list[tuple[str, SignedHearing]] = []
         self.watching: list[tuple[str, Presence]] = []
         self.alive: set[str] = set()
         self.cut = False
@@ -37,55 +37,55 @@ class Switchboard:
     def fail(self, error: Exception) -> None:
         self.failure = error
 
-    def link(self, seals: Seals = NO_SEALS) -> MemoryLink:
-        return MemoryLink(self, seals)
+    def link(self, signing: MessageSigning = NO_SIGNING) -> MemoryLink:
+        return MemoryLink(self, signing)
 
-    def carried(self, packet: SealedMessage) -> Iterable[SealedMessage]:
+    def carried(self, packet: SignedMessage) -> Iterable[SignedMessage]:
         """Return the messages that arrive: this one, unless the link is cut."""
         return () if self.cut else (packet,)
 
-    def answers(self, question: SealedMessage) -> list[SealedMessage]:
+    def answers(self, question: SignedMessage) -> list[SignedMessage]:
         """Return all answers to a question, as they arrive at the end that asked."""
         if self.failure is not None:
             raise self.failure
-        arrived: list[SealedMessage] = []
+        arrived: list[SignedMessage] = []
         for asked in self.carried(question):
-            request = Request(asked.key, asked.payload, asked.parameters, asked.seal)
+            request = Request(asked.key, asked.payload, asked.parameters, asked.attachment)
             for answer in [answer for _, key, answer in self.serving if matches(key, asked.key)]:
                 try:
-                    payload, seal = answer(request)
+                    payload, attachment = answer(request)
                 except Unanswered:
                     continue
-                arrived += self.carried(SealedMessage("answer", asked.key, payload, seal))
+                arrived += self.carried(SignedMessage("answer", asked.key, payload, attachment))
         return arrived
 
-    def tell(self, packet: SealedMessage) -> None:
+    def tell(self, packet: SignedMessage) -> None:
         """Deliver a publication to all subscribers, as it arrives there."""
         for arrived in self.carried(packet):
             for pattern, heard in list(self.hearing):
                 if matches(pattern, arrived.key):
-                    heard(arrived.key, arrived.payload, arrived.seal)
+                    heard(arrived.key, arrived.payload, arrived.attachment)
 
 
 class MemoryLink:
     """One end of a switchboard."""
 
-    def __init__(self, board: Switchboard, seals: Seals = NO_SEALS) -> None:
+    def __init__(self, board: Switchboard, signing: MessageSigning = NO_SIGNING) -> None:
         self._board = board
-        self._seals = seals
+        self._signing = signing
         self._announced: list[str] = []
 
     @property
     def distrusted(self) -> str:
-        return self._seals.distrusted
+        return self._signing.distrusted
 
     def serve(self, key: str, answer: Answering) -> None:
         # The end that served a key last answers first.
-        self._board.serving.insert(0, (self, key, self._seals.seal_answers(answer)))
+        self._board.serving.insert(0, (self, key, self._signing.sign_answers(answer)))
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
         return lambda payload: self._board.tell(
-            SealedMessage("told", key, payload, self._seals.seal_publication(key, payload))
+            SignedMessage("told", key, payload, self._signing.sign_publication(key, payload))
         )
 
     def announce(self, key: str) -> None:
@@ -109,13 +109,17 @@ class MemoryLink:
         return self._answers(key, payload, {})
 
     def _answers(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> list[bytes]:
-        question = self._seals.seal_question(key, payload, parameters)
-        arrived = self._board.answers(SealedMessage("question", key, payload, question.seal, parameters))
-        opened = (self._seals.verify_answer(question, packet.payload, packet.seal) for packet in arrived)
+        question = self._signing.sign_question(key, payload, parameters)
+        arrived = self._board.answers(
+            SignedMessage("question", key, payload, question.attachment, parameters)
+        )
+        opened = (
+            self._signing.verify_answer(question, packet.payload, packet.attachment) for packet in arrived
+        )
         return [payload for payload in opened if payload is not None]
 
     def hear(self, key: str, heard: Hearing) -> None:
-        self._board.hearing.append((key, self._seals.verify_publications(heard)))
+        self._board.hearing.append((key, self._signing.verify_publications(heard)))
 
     def watch_presence(self, key: str, changed: Presence) -> None:
         for alive in sorted(self._board.alive):

@@ -24,7 +24,7 @@ import zenoh
 from stopgo.bridge.link.admission import Admission, can_admit, inner_endpoints, listening_socket
 from stopgo.bridge.link.keys import HeldKeys, now_utc
 from stopgo.bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, endpoints_in
-from stopgo.bridge.link.seals import NO_SEALS, KeySeals, Seals
+from stopgo.bridge.link.signatures import NO_SIGNING, KeySigning, MessageSigning
 from stopgo.mission.errors import InputError
 
 LEASE_MS = 2000
@@ -80,11 +80,11 @@ class Guard:
     """Folder of a robot in which the newest revoked list is stored."""
 
     @property
-    def seals(self) -> Seals:
+    def signing(self) -> MessageSigning:
         """Signatures of messages on a link with this protection."""
         if self.keys is None:
-            return NO_SEALS
-        return KeySeals(self.keys, boot_id=self.boot_id, refused=self.refused, state=self.state)
+            return NO_SIGNING
+        return KeySigning(self.keys, boot_id=self.boot_id, refused=self.refused, state=self.state)
 
 
 UNGUARDED = Guard()
@@ -179,7 +179,7 @@ def _opened(settings: dict[str, Any], endpoint: str, guard: Guard) -> Iterator[Z
     except zenoh.ZError as error:
         raise InputError(f"{endpoint}: cannot be opened ({_short(error)}); is the address free?") from None
     with session:
-        link = ZenohLink(session, guard.seals)
+        link = ZenohLink(session, guard.signing)
         try:
             with _silent_after(link, guard.keys):
                 yield link
@@ -206,9 +206,9 @@ def _silent_after(link: ZenohLink, keys: HeldKeys | None) -> Iterator[None]:
 class ZenohLink:
     """One open zenoh session."""
 
-    def __init__(self, session: zenoh.Session, seals: Seals = NO_SEALS) -> None:
+    def __init__(self, session: zenoh.Session, signing: MessageSigning = NO_SIGNING) -> None:
         self._session = session
-        self._seals = seals
+        self._signing = signing
         # A token or subscriber without a reference is garbage collected, and undeclared.
         self._declared: list[Any] = []
         self._publishers: list[zenoh.Publisher] = []
@@ -219,7 +219,7 @@ class ZenohLink:
 
     @property
     def distrusted(self) -> str:
-        return self._seals.distrusted
+        return self._signing.distrusted
 
     def await_others(self, count: int, within_s: float) -> None:
         """Wait until `count` others are connected, or the time is over."""
@@ -235,20 +235,22 @@ class ZenohLink:
             _undeclare(self._declared)
 
     def serve(self, key: str, answer: Answering) -> None:
-        sealed = self._seals.seal_answers(answer)
+        signed = self._signing.sign_answers(answer)
         if self.admission is not None and "*" not in key:
-            self.admission.answers[key] = sealed
+            self.admission.answers[key] = signed
 
         def answered(query: zenoh.Query) -> None:
             with query:
                 payload = b"" if query.payload is None else query.payload.to_bytes()
                 parameters = _parameters(query.parameters)
                 try:
-                    reply, seal = sealed(Request(str(query.key_expr), payload, parameters, _seal_of(query)))
+                    reply, attachment = signed(
+                        Request(str(query.key_expr), payload, parameters, _attachment_of(query))
+                    )
                 except Unanswered:
                     return
                 # The answer has the priority of the question: zenoh offers no other.
-                query.reply(query.key_expr, reply, encoding=JSON, attachment=seal or None)
+                query.reply(query.key_expr, reply, encoding=JSON, attachment=attachment or None)
 
         self._declared.append(self._session.declare_queryable(key, answered, complete=True))
 
@@ -261,7 +263,7 @@ class ZenohLink:
 
         def publish(payload: bytes) -> None:
             if not self._silent:
-                publisher.put(payload, attachment=self._seals.seal_publication(key, payload) or None)
+                publisher.put(payload, attachment=self._signing.sign_publication(key, payload) or None)
 
         return publish
 
@@ -288,11 +290,11 @@ class ZenohLink:
         """Yield the verified answers, as they come."""
         if self._silent:
             return
-        question = self._seals.seal_question(key, payload, parameters)
+        question = self._signing.sign_question(key, payload, parameters)
         replies = self._session.get(
             zenoh.Selector(key, dict(parameters)),
             payload=payload,
-            attachment=question.seal or None,
+            attachment=question.attachment or None,
             encoding=JSON,
             target=zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
@@ -303,15 +305,17 @@ class ZenohLink:
         )
         for reply in replies:
             if reply.ok is not None:
-                opened = self._seals.verify_answer(question, reply.ok.payload.to_bytes(), _seal_of(reply.ok))
+                opened = self._signing.verify_answer(
+                    question, reply.ok.payload.to_bytes(), _attachment_of(reply.ok)
+                )
                 if opened is not None:
                     yield opened
 
     def hear(self, key: str, heard: Hearing) -> None:
-        judged = self._seals.verify_publications(heard)
+        judged = self._signing.verify_publications(heard)
 
         def sampled(sample: zenoh.Sample) -> None:
-            judged(str(sample.key_expr), sample.payload.to_bytes(), _seal_of(sample))
+            judged(str(sample.key_expr), sample.payload.to_bytes(), _attachment_of(sample))
 
         self._declared.append(self._session.declare_subscriber(key, sampled))
 
@@ -371,7 +375,7 @@ def _parameters(parameters: zenoh.Parameters) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
-def _seal_of(message: zenoh.Query | zenoh.Sample) -> bytes:
+def _attachment_of(message: zenoh.Query | zenoh.Sample) -> bytes:
     return b"" if message.attachment is None else message.attachment.to_bytes()
 
 

@@ -79,11 +79,11 @@ def reports(
     the robot has a telemetry log of its runs.
     """
     watched = WatchedLink(keep)
-    received = _subscribe(link, keys)
+    received = subscribe(link, keys)
     follower = RunFollower(link, keys, recorded)
     yield from _taken(follower, watched.ask())
     while not follower.ended:
-        item = _next(received, 0.0 if follower.poses.behind else AGAIN_S)
+        item = next_report(received, 0.0 if follower.poses.behind else AGAIN_S)
         if item is None and follower.poses.behind:
             yield from follower.poses.catch_up()
         silent_s = watched.take(item)
@@ -94,7 +94,7 @@ def reports(
         yield from _taken(follower, item if watched.is_news else None)
         yield from follower.catch_up()
         yield from watched.missing(follower)
-    yield from _late_poses(received, follower)
+    yield from late_poses(received, follower)
 
 
 def _taken(follower: RunFollower, item: LiveReport | None) -> Iterator[Followed]:
@@ -350,7 +350,7 @@ def log_page(
     return None if reply is None else read_events(reply, since=since, robot=keys.robot)
 
 
-def _subscribe(link: Link, keys: KeyExpressions) -> queue.SimpleQueue[LiveReport]:
+def subscribe(link: Link, keys: KeyExpressions) -> queue.SimpleQueue[LiveReport]:
     """Return a queue of live reports; the subscription comes before the first query, so no gap is left."""
     received: queue.SimpleQueue[LiveReport] = queue.SimpleQueue()
     link.hear(keys.event, lambda key, payload: _put(received, payload, event_of))
@@ -360,7 +360,8 @@ def _subscribe(link: Link, keys: KeyExpressions) -> queue.SimpleQueue[LiveReport
     return received
 
 
-def _next(received: queue.SimpleQueue[LiveReport], wait_s: float) -> LiveReport | None:
+def next_report(received: queue.SimpleQueue[LiveReport], wait_s: float) -> LiveReport | None:
+    """Return the next report of a queue; `None` if none comes in time."""
     try:
         return received.get(timeout=wait_s) if wait_s else received.get_nowait()
     except queue.Empty:
@@ -380,7 +381,7 @@ _POSE = partial(decode, kind=PoseReport)
 _STATE = partial(decode, kind=StateReport)
 
 
-def _late_poses(received: queue.SimpleQueue[LiveReport], follower: RunFollower) -> Iterator[Followed]:
+def late_poses(received: queue.SimpleQueue[LiveReport], follower: RunFollower) -> Iterator[Followed]:
     """Yield the poses of the run that are still in flight, up to the first after its end."""
     end_ns = follower.end.robot_ns if follower.end else 0
     patience_s = follower.poses.patience_s
@@ -399,6 +400,6 @@ def _late(
     """Yield the next pose, live or missed."""
     if follower.poses.behind:
         yield from follower.poses.catch_up()
-    item = _next(received, min(wait_s, AGAIN_S))
+    item = next_report(received, min(wait_s, AGAIN_S))
     if isinstance(item, PoseReport | Health):
         yield from follower.take(item)

@@ -44,10 +44,11 @@ from stopgo.bridge.link.tls_probe import why_no_link
 from stopgo.bridge.station import follow
 from stopgo.bridge.station.robot_replies import read_reply
 from stopgo.bridge.station.window import Window, windowed
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.mission_json import parse
 from stopgo.mission.run.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
+from stopgo.mission.run.lease import Lease, remaining_s
 from stopgo.mission.run.run_commands import FREE_VERBS, LONGEST_VALID_S, Answer, RunCommand, Verb
 from stopgo.mission.run.tolerance import stops_outside
 
@@ -130,6 +131,10 @@ class Station:
         self.held = held
         self.capabilities: tuple[str, ...] = ()
         """Capabilities that the robot reported last."""
+        self.lease: Lease | None = None
+        """Lease that the robot reported last; it may have ended."""
+        self.lease_left_s = 0.0
+        """Time that the lease still lasted then."""
         self.asked_at = time.monotonic()
         """Time of the last query for the robot's state: its answer is no older than that."""
         self.direct: Callable[..., DirectQuestion] | None = None
@@ -207,7 +212,8 @@ class Station:
             self._pause_duplicates(tuple(infos.values()))
         info = next(iter(infos.values()), None)
         if info is not None:
-            self.capabilities = info.capabilities
+            self.capabilities, self.lease = info.capabilities, info.lease
+            self.lease_left_s = remaining_s(info.lease, info.clock_ns) if info.lease else 0.0
         return info
 
     def _pause_duplicates(self, infos: tuple[Info, ...]) -> NoReturn:
@@ -265,7 +271,7 @@ class Station:
         """
         self._check_role("push")
         # A file may have 0 for 0.0, and the digest of that; the robot computes the digest of the numbers.
-        mission = sealed(mission)
+        mission = with_digest(mission)
         document = msgspec.json.encode(mission)
         manifest = Manifest(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),

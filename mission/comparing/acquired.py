@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Literal
 
 from stopgo.mission.geometry import BoolArray
-from stopgo.mission.stages.figures import Share, Shares, how_bad
+from stopgo.mission.stages.figures import CoverageByGroup, CoveragePair, GroupCoverage, how_bad
 from stopgo.mission.stages.sight import Sight
 
 Certainty = Literal["yes", "no", "unknown"]
@@ -29,27 +29,27 @@ class Acquired:
     """Scanned stops without visibility data: more was seen than is counted."""
 
     @cached_property
-    def shares(self) -> Shares:
-        return self.sight.totals.shares(self.seen)
+    def coverage(self) -> CoverageByGroup:
+        return self.sight.totals.coverage(self.seen)
 
     @cached_property
-    def elements(self) -> tuple[Share, ...]:
+    def elements(self) -> tuple[GroupCoverage, ...]:
         """Every element with targets, in the floor's order."""
         return self.sight.totals.by_element(self.seen)
 
     @property
-    def planned(self) -> Shares:
+    def planned(self) -> CoverageByGroup:
         return self.sight.planned
 
     @cached_property
-    def rooms(self) -> tuple[tuple[Share, Share], ...]:
+    def rooms(self) -> tuple[CoveragePair, ...]:
         """Rooms with targets as planned and as acquired, least seen first; last, units in no room."""
         totals = self.sight.totals
         planned, acquired = totals.rooms_seen(self.sight.all_seen), totals.rooms_seen(self.seen)
         return (*_paired(planned[:-1], acquired[:-1]), *_paired(planned[-1:], acquired[-1:]))
 
     @cached_property
-    def kinds(self) -> tuple[tuple[Share, Share], ...]:
+    def kinds(self) -> tuple[CoveragePair, ...]:
         """The same of every kind of element."""
         totals = self.sight.totals
         return _paired(totals.kinds_seen(self.sight.all_seen), totals.kinds_seen(self.seen))
@@ -57,13 +57,15 @@ class Acquired:
     @cached_property
     def answer(self) -> Certainty:
         """Answer to: is all seen that was required, of the whole, every room and every kind?"""
-        if not self.shares.short:
+        if not self.coverage.short:
             return "yes"
-        if self.unknown or not self.sight.totals.shares(self.perhaps).short:
+        if self.unknown or not self.sight.totals.coverage(self.perhaps).short:
             return "unknown"
         return "no"
 
 
-def _paired(planned: tuple[Share, ...], acquired: tuple[Share, ...]) -> tuple[tuple[Share, Share], ...]:
+def _paired(
+    planned: tuple[GroupCoverage, ...], acquired: tuple[GroupCoverage, ...]
+) -> tuple[CoveragePair, ...]:
     pairs = [(before, after) for before, after in zip(planned, acquired, strict=True) if after.total]
     return tuple(sorted(pairs, key=lambda pair: how_bad(pair[1])))

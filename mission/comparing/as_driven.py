@@ -7,7 +7,7 @@ from functools import cached_property
 
 from stopgo.mission.geometry import BoolArray
 from stopgo.mission.stages.coverage_totals import CoverageTotals
-from stopgo.mission.stages.figures import Share, Shares
+from stopgo.mission.stages.figures import CoverageByGroup, CoveragePair, GroupCoverage
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,25 +22,25 @@ class AsDriven:
     """True for units that enough of the robot's standstills see (n,)."""
 
     @cached_property
-    def shares(self) -> Shares:
-        return self.totals.shares(self.driven)
+    def coverage(self) -> CoverageByGroup:
+        return self.totals.coverage(self.driven)
 
     @cached_property
-    def pairs(self) -> tuple[tuple[Share, Share], ...]:
+    def pairs(self) -> tuple[CoveragePair, ...]:
         """Fractions of the whole, of every kind and of every room with targets: as planned, and as driven."""
-        planned = {share.name: share for share in _all(self.totals.shares(self.planned))}
-        return tuple((planned[share.name], share) for share in _all(self.shares))
+        planned = {group.name: group for group in _all(self.totals.coverage(self.planned))}
+        return tuple((planned[group.name], group) for group in _all(self.coverage))
 
     @cached_property
-    def elements(self) -> tuple[Share, ...]:
+    def elements(self) -> tuple[GroupCoverage, ...]:
         """Every element with targets, in the floor's order, as driven."""
         return self.totals.by_element(self.driven)
 
     @property
     def enough(self) -> bool:
         """True if all that was required was visible."""
-        return not self.shares.short
+        return not self.coverage.short
 
 
-def _all(shares: Shares) -> tuple[Share, ...]:
-    return (shares.whole, *shares.kinds, *shares.rooms)
+def _all(groups: CoverageByGroup) -> tuple[GroupCoverage, ...]:
+    return (groups.whole, *groups.kinds, *groups.rooms)

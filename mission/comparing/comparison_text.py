@@ -9,7 +9,7 @@ from stopgo.mission.comparing.comparison import COLUMNS, Comparison
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.console.table import duration, printable, table
 from stopgo.mission.run.events import JUMPED_OVER, Aborted, Finished
-from stopgo.mission.stages.figures import Share, pair_cells
+from stopgo.mission.stages.figures import GroupCoverage, pair_cells
 from stopgo.mission.stages.network import apart_in_words, network_of
 
 FOLLOW_UP = "stopgo replay RECORDING --mission mission.json --floor FLOOR --top-up next.json"
@@ -56,7 +56,7 @@ def _jumped_lines(comparison: Comparison) -> list[str]:
     if not jumped:
         return []
     return [
-        f"not scanned, {JUMPED_OVER}: {', '.join(jumped)}; for a follow-up mission: {FOLLOW_UP};"
+        f"not scanned, {JUMPED_OVER} somebody: {', '.join(jumped)}; for a follow-up mission: {FOLLOW_UP};"
         " to drive the whole mission again: stopgo start --again"
     ]
 
@@ -73,9 +73,9 @@ def _millimetres(metres: float | None) -> str:
 
 
 def _coverage_lines(acquired: Acquired) -> list[str]:
-    whole = (acquired.planned.whole, acquired.shares.whole)
+    whole = (acquired.planned.whole, acquired.coverage.whole)
     pairs = [whole, *acquired.kinds, *acquired.rooms[:MOST_ROOMS]]
-    rows = [(*pair_cells(planned, share), "" if share.met else "too little") for planned, share in pairs]
+    rows = [(*pair_cells(planned, group), "" if group.met else "too little") for planned, group in pairs]
     lines = [table(("coverage", "planned %", "acquired %", "required %", ""), rows)]
     rest = len(acquired.rooms) - MOST_ROOMS
     return [*lines, f"and {rest} more rooms, with higher coverage"] if rest > 0 else lines
@@ -147,9 +147,9 @@ def _pieces(comparison: Comparison) -> list[list[str]] | None:
 def _acquired_json(acquired: Acquired) -> dict[str, Any]:
     return {
         "rule": acquired.sight.totals.rule,
-        "asked": acquired.shares.whole.required,
+        "asked": acquired.coverage.whole.required,
         "planned": acquired.planned.whole.coverage,
-        "acquired": acquired.shares.whole.coverage,
+        "acquired": acquired.coverage.whole.coverage,
         "unknown_stops": list(acquired.unknown),
         "rooms": [_pair_json(*pair) for pair in acquired.rooms],
         "kinds": [_pair_json(*pair) for pair in acquired.kinds],
@@ -159,12 +159,12 @@ def _acquired_json(acquired: Acquired) -> dict[str, Any]:
     }
 
 
-def _pair_json(planned: Share, share: Share) -> dict[str, Any]:
-    seen = {"visible": share.visible, "seen": share.seen, "acquired": share.coverage}
+def _pair_json(planned: GroupCoverage, group: GroupCoverage) -> dict[str, Any]:
+    seen = {"visible": group.visible, "seen": group.seen, "acquired": group.coverage}
     return {
-        "name": share.name,
+        "name": group.name,
         **seen,
         "planned": planned.coverage,
-        "asked": share.required,
-        "met": share.met,
+        "asked": group.required,
+        "met": group.met,
     }

@@ -9,10 +9,23 @@ import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
 from stopgo.mission.stages.coverage_totals import CoverageTotals
-from stopgo.mission.stages.figures import Shares
+from stopgo.mission.stages.figures import CoverageByGroup
 
 LEAST_VISIBLE = 0.5
 """Metres, or units, of an element that must have been visible before it is called absent."""
+LEAST_EMPTY = 0.9
+"""Fraction of its visible part without a point, from which on an element may be absent."""
+
+
+@dataclass(frozen=True)
+class Absent:
+    """An element of the plan that the clouds hardly show, though it was visible."""
+
+    id: str
+    visible: float
+    """Fraction of the element that was visible from the scans."""
+    empty: float
+    """Fraction of the visible part without a point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +36,8 @@ class Unplanned:
     """Convex, a little wider than the points."""
     hits: int
     """Number of sweeps that hit it, at its most visible position."""
+    sweeps: int
+    """Number of all sweeps."""
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -72,21 +87,25 @@ class Measured:
         count = f"{len(off)} of {len(self.misplaced_m or ())} clouds"
         return f"{count} do not lie on the floor ({how}); give clouds in the drawing's frame"
 
-    def absent(self, visible: BoolArray) -> tuple[str, ...]:
-        """Return the elements without a point, though much of them was visible: units (n,)."""
-        amount = np.where(visible & self.totals.visible, self.totals.weight, 0)
-        size = len(self.totals.elements)
-        could = np.bincount(self.totals.element, amount, minlength=size) * self.totals.scale
-        did = np.bincount(self.totals.element, amount * self.hit, minlength=size)
+    def absent(self, visible: BoolArray) -> tuple[Absent, ...]:
+        """Return the elements that hardly have a point, though much of them was visible: units (n,)."""
+        totals, size = self.totals, len(self.totals.elements)
+
+        def amounts(mask: BoolArray) -> FloatArray:
+            weight = np.where(mask, totals.weight, 0).astype(float)
+            return np.asarray(np.bincount(totals.element, weight, minlength=size) * totals.scale, np.float64)
+
+        could, did = amounts(visible & totals.visible), amounts(visible & totals.visible & self.hit)
+        whole = amounts(totals.visible)
         return tuple(
-            item.id
-            for k, item in enumerate(self.totals.elements)
-            if could[k] >= LEAST_VISIBLE and did[k] == 0
+            Absent(item.id, float(could[k] / whole[k]), float(1 - did[k] / could[k]))
+            for k, item in enumerate(totals.elements)
+            if could[k] >= LEAST_VISIBLE and did[k] <= (1 - LEAST_EMPTY) * could[k]
         )
 
     @cached_property
-    def shares(self) -> Shares:
-        return self.totals.shares(self.hit)
+    def coverage(self) -> CoverageByGroup:
+        return self.totals.coverage(self.hit)
 
     @cached_property
     def deviations(self) -> tuple[tuple[str, int, float, float], ...]:

@@ -95,16 +95,16 @@ def _missing_evidence(comparison: Comparison) -> Iterator[str]:
 
 
 def _coverage(acquired: Acquired) -> Iterator[str]:
-    whole, planned = acquired.shares.whole, acquired.planned.whole
+    whole, planned = acquired.coverage.whole, acquired.planned.whole
     asked = "" if whole.required is None else f"{percent(whole.required)} was required, "
     least = "at least " if acquired.unknown else ""
     yield (
         f"{least}{percent(whole.coverage)} of what is visible was scanned; "
         f"{asked}{percent(planned.coverage)} planned."
     )
-    for share in [share for share in acquired.shares.short if share is not whole][:MOST_NAMED]:
-        covered, required = percent(share.coverage), percent(share.required)
-        yield f"Of {share.name}, {covered} was scanned; {required} was required."
+    for group in [group for group in acquired.coverage.short if group is not whole][:MOST_NAMED]:
+        covered, required = percent(group.coverage), percent(group.required)
+        yield f"Of {group.name}, {covered} was scanned; {required} was required."
     if acquired.unknown:
         yield f"Coverage of {named(acquired.unknown)} is unknown: no plan of that revision was given."
 

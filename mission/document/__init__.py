@@ -69,7 +69,7 @@ class LimitsSpec(Document, frozen=True):
     """Number of stops that must see it."""
 
 
-class MissionShare(Document, frozen=True):
+class MissionAllocation(Document, frozen=True):
     """Part of this mission in a floor that several missions cover together."""
 
     kind: Literal["robot", "tour"]
@@ -99,6 +99,17 @@ class Sees(Document, frozen=True):
     """Those of them that count as seen from this stop of the route on."""
 
 
+class PositionError(Document, frozen=True):
+    """Predicted error of a scan's position in the frame of its network: the standard error ellipse."""
+
+    major_m: float
+    """Standard deviation in the worst direction, metres."""
+    minor_m: float
+    """Standard deviation across it, metres."""
+    direction: float
+    """Worst direction, radians counter-clockwise from +x, from 0 to π."""
+
+
 class Stop(Document, frozen=True):
     id: str
     x: float
@@ -113,6 +124,8 @@ class Stop(Document, frozen=True):
     approach: tuple[Point, ...]
     """Polyline from the previous stop (or the start) to this stop, both ends included."""
     sees: Sees
+    error: PositionError | UnsetType = UNSET
+    """Absent if no network holds the scan; 0 for the scan whose frame the network has."""
 
 
 class Overlap(Document, frozen=True):
@@ -159,7 +172,7 @@ class Mission(Document, frozen=True, kw_only=True):
     scanner: ScannerSpec
     limits: LimitsSpec | UnsetType = UNSET
     """Absent if there are no limits."""
-    share: MissionShare | UnsetType = UNSET
+    share: MissionAllocation | UnsetType = UNSET
     """Absent if this mission alone covers its part of the floor."""
     start: Start
     stops: tuple[Stop, ...]
@@ -208,18 +221,22 @@ def _add_stops(hashed: hashlib._Hash, stops: tuple[Stop, ...]) -> None:
     hashed.update(b"]" if stops else b"[]")
 
 
-def sealed(mission: Mission) -> Mission:
+def with_digest(mission: Mission) -> Mission:
     """Return the same mission with its `digest` set."""
     return msgspec.structs.replace(mission, digest=digest_of(mission))
+
+
+BY_HAND = ("use", "avoid")
+"""Parameters by which a person moves, adds or forbids single stops."""
 
 
 def mission_id(source: FloorSource, settings: Settings, version: str, part: int = 0) -> str:
     """Return the hash of floor, parameters, version and part: known before planning, and the recording id.
 
-    Parameters of the floor's reader are hashed as part of the source.
+    Parameters of the floor's reader are hashed as part of the source. Stops that are required or forbidden
+    by hand make another revision, not another mission.
     """
-    parameters = {
-        key: value for key, value in recorded_values(settings).items() if key not in FLOOR_PARAMETERS
-    }
+    recorded = recorded_values(settings) | {name: [] for name in BY_HAND}
+    parameters = {key: value for key, value in recorded.items() if key not in FLOOR_PARAMETERS}
     basis = [source.basis, parameters, version, part]
     return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

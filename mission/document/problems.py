@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import UNSET
 
-from stopgo.mission.document import Mission, Point, Start, Stop
+from stopgo.mission.document import Mission, Point, PositionError, Start, Stop
 from stopgo.mission.frames.geodesy import out_of_reach
 
 JOIN = 1e-3
@@ -114,6 +114,8 @@ def _stop(path: str, stop: Stop) -> Iterator[Problem]:
     if not 0 <= stop.sees.new_units <= stop.sees.units:
         seen = stop.sees
         yield Problem(f"{path}.sees", f"{seen.new_units} new units of {seen.units}; new is a part of all")
+    if stop.error is not UNSET:
+        yield from _error(f"{path}.error", stop.error)
 
 
 def _legs(mission: Mission) -> Iterator[Problem]:
@@ -183,6 +185,16 @@ def _network(mission: Mission) -> Iterator[Problem]:
         pairs.add(pair)
         for key in ("common_m", "share", "hold_m"):
             yield from _not_negative(f"{path}.{key}", getattr(item, key))
+
+
+def _error(path: str, error: PositionError) -> Iterator[Problem]:
+    """Half axes that are none, or in the wrong order, and a direction that is none."""
+    yield from _not_negative(f"{path}.major_m", error.major_m)
+    yield from _not_negative(f"{path}.minor_m", error.minor_m)
+    if error.minor_m > error.major_m:
+        yield Problem(f"{path}.minor_m", f"is {error.minor_m:g}, more than major_m, {error.major_m:g}")
+    if not 0 <= error.direction <= math.pi:
+        yield Problem(f"{path}.direction", f"is {error.direction:g}; it is from 0 to π radians")
 
 
 def _pose(path: str, point: Point, heading: float) -> Iterator[Problem]:

@@ -18,7 +18,7 @@ from stopgo.mission.floor import Element
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import Route, Targets
 from stopgo.mission.stages.covered_intervals import runs_of, seen_units
-from stopgo.mission.stages.figures import Figures, Share
+from stopgo.mission.stages.figures import Figures, GroupCoverage
 from stopgo.mission.stages.network import network_of, network_table
 from stopgo.mission.stages.seen_area import SeenSurface
 
@@ -146,7 +146,7 @@ def coverage_json(
         "rule": space.settings.coverage_rule,
         "total": counts.summary(targets),
         "kinds": {kind: counts.summary(rows) for kind, rows in sorted(by_kind.items())},
-        **({} if figures is None else {"rooms": [_room(share) for share in figures.rooms]}),
+        **({} if figures is None else {"rooms": [_room(group) for group in figures.rooms]}),
         **({} if surface is None else {"surface": surface.as_json()}),
         **network_table(network_of(mission)),
     }
@@ -190,22 +190,22 @@ class _Counts:
         metres = self.metres[rows].sum(axis=0)
         length, visible_m, seen_m = (round(float(number), 4) for number in metres)
         part, whole = (seen, visible) if self.by_units else (float(metres[2]), float(metres[1]))
-        share = part / whole if whole else None
+        fraction = part / whole if whole else None
         summary = {
             **{"units": units, "visible": visible, "seen": seen},
             **{"length_m": length, "visible_m": visible_m, "seen_m": seen_m},
-            "coverage": None if share is None else round(share, DIGITS),
+            "coverage": None if fraction is None else round(fraction, DIGITS),
         }
         return {"elements": len(rows), **summary} if with_elements else summary
 
 
-def _room(share: Share) -> dict[str, Any]:
+def _room(group: GroupCoverage) -> dict[str, Any]:
     """Return a room's row, in the plan's unit."""
-    numbers = (share.total, share.visible, share.seen)
+    numbers = (group.total, group.visible, group.seen)
     total, visible, seen = (round(number, 4) for number in numbers)
-    coverage = None if share.coverage is None else round(share.coverage, DIGITS)
-    row = {"room": share.name, "total": total, "visible": visible, "seen": seen, "coverage": coverage}
-    return {**row, "required": share.required, "why": share.why}
+    coverage = None if group.coverage is None else round(group.coverage, DIGITS)
+    row = {"room": group.name, "total": total, "visible": visible, "seen": seen, "coverage": coverage}
+    return {**row, "required": group.required, "why": group.why}
 
 
 def _named(element: Element) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from stopgo.mission.document import SCHEMA, VERSION, Mission, canonical, digest_of, sealed
+from stopgo.mission.document import SCHEMA, VERSION, Mission, canonical, digest_of, with_digest
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.given_file import bytes_of
@@ -57,7 +57,7 @@ def encode(mission: Mission) -> bytes:
     InputError
         When a number is not finite: JSON cannot hold it.
     """
-    document = msgspec.to_builtins(sealed(mission))
+    document = msgspec.to_builtins(with_digest(mission))
     _check_values(document, name="mission")
     return (_indented(document, "") + "\n").encode()
 

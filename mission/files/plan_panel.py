@@ -21,11 +21,13 @@ from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
 from stopgo.mission.geometry import polyline_length
 from stopgo.mission.stages import Route, Selection
-from stopgo.mission.stages.figures import Figures, Share
-from stopgo.mission.stages.network import network_of
+from stopgo.mission.stages.figures import Figures, GroupCoverage
+from stopgo.mission.stages.network import magnified_errors, network_of
 from stopgo.mission.stages.plan_results import PlanResults
 
 BODY = 2.5
+ERROR = "predicted error"
+"""Legend of the error ellipses; the sheet's magnification follows it."""
 LINE = 4.2
 """Height of a line of the title block and of the legend."""
 TITLE_HEAD = 15.0
@@ -88,8 +90,8 @@ def _time(seconds: float) -> str:
 def _whose(mission: Mission, shared: Sequence[Mission]) -> list[tuple[str, str]]:
     """The mission, or those that its stops are divided among."""
     if shared:
-        return [(letter(k), f"{share_in_words(item)}: {item.id[:12]}") for k, item in enumerate(shared)]
-    own = [] if mission.share is UNSET else [("Share", share_in_words(mission))]
+        return [(letter(k), f"{allocation_in_words(item)}: {item.id[:12]}") for k, item in enumerate(shared)]
+    own = [] if mission.share is UNSET else [("Share", allocation_in_words(mission))]
     return [
         *own,
         ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
@@ -97,10 +99,10 @@ def _whose(mission: Mission, shared: Sequence[Mission]) -> list[tuple[str, str]]
     ]
 
 
-def share_in_words(mission: Mission) -> str:
+def allocation_in_words(mission: Mission) -> str:
     """Return the number of this mission among those that cover a floor together."""
-    share = mission.share
-    return "" if share is UNSET else f"{share.kind} {share.number} of {share.of}"
+    allocation = mission.share
+    return "" if allocation is UNSET else f"{allocation.kind} {allocation.number} of {allocation.of}"
 
 
 def _stops(mission: Mission, selection: Selection) -> str:
@@ -137,8 +139,8 @@ def _least_time(route: Route, shared: Sequence[Mission]) -> list[tuple[str, str]
     return [("Least time", told)]
 
 
-def _required(share: float) -> str:
-    return f"required {100 * share:g} %"
+def _required(fraction: float) -> str:
+    return f"required {100 * fraction:g} %"
 
 
 def legend_height(entries: list[tuple[str, str]]) -> float:
@@ -159,7 +161,7 @@ def legend_entries(route: Route, mission: Mission, shared: Sequence[Mission] = (
         ("stop", "stop, and its heading", bool(mission.stops)),
         ("doorway", "stop in a doorway", any(stop.doorway for stop in mission.stops)),
         ("start", "start", True),
-        *((f"way {k}", f"{letter(k)}: {share_in_words(item)}", True) for k, item in enumerate(shared)),
+        *((f"way {k}", f"{letter(k)}: {allocation_in_words(item)}", True) for k, item in enumerate(shared)),
         ("way", "route", bool(mission.stops) and not shared),
         ("back", _back_words(route), mission.return_ is not None and not shared),
         ("thin", "its path back", any(item.return_ is not None for item in shared)),
@@ -176,6 +178,7 @@ def _network_entries(mission: Mission) -> list[tuple[str, str, bool]]:
     return [
         ("pair", "scans that register", len(network.overlaps) > len(network.bridges)),
         ("bridge", "their only connection", bool(network.bridges)),
+        ("error", ERROR, magnified_errors(mission, most_m=1.0) is not None),
     ]
 
 
@@ -188,7 +191,9 @@ def legend(entries: list[tuple[str, str]], mission: Mission, sheet: PaperSheet) 
     box = sheet.legend
     rows = math.ceil(len(entries) / 2)
     items = [text(box.x + 3, box.y + 4.6, "Legend", size=2.6, font_weight="bold")]
-    for index, (symbol, words) in enumerate(entries):
+    errors = route_look.errors_of(mission, sheet)
+    for index, (symbol, name) in enumerate(entries):
+        words = f"{name} × {errors.factor:g}" if symbol == "error" and errors is not None else name
         x = box.x + 3 + (index // rows) * (COLUMN / 2)
         y = box.y + 8.5 + LINE * (index % rows)
         items += [_symbol(symbol, x, y), text(x + 9, y + 0.8, words, size=BODY)]
@@ -209,6 +214,9 @@ def _symbol(name: str, x: float, y: float) -> str:
         return line(x, y, x + 7, y, **floor_look.BLOCKED) + mark
     if name == "start":
         return circle(x + 3.5, y, 1.9, fill="#111111") + _centred("S", x + 3.5, y, fill="#ffffff")
+    if name == "error":
+        turn = np.linspace(0, 2 * np.pi, 25)
+        return polygon(place + np.stack([3.2 * np.cos(turn), 1.3 * np.sin(turn)], axis=1), **route_look.ERROR)
     if name in ("stop", "doorway"):
         outer = circle(x + 3.5, y, 1.9, fill="#fff", stroke=route_look.INK, stroke_width=0.2)
         inner = circle(x + 3.5, y, 1.5, fill="#fff", stroke=route_look.INK, stroke_width=0.3)
@@ -244,8 +252,8 @@ def _scale_bar(sheet: PaperSheet, *, x: float, y: float) -> str:
         for index, fill in enumerate(("#000", "#fff", "#000", "#fff", "#000"))
     ]
     ends = [
-        text(x + share * 5 * field, y - 1.2, f"{metres * share:g}", size=BODY, text_anchor="middle")
-        for share in (0, 0.2, 1)
+        text(x + part * 5 * field, y - 1.2, f"{metres * part:g}", size=BODY, text_anchor="middle")
+        for part in (0, 0.2, 1)
     ]
     words = text(x, y - 5.5, f"Scale 1:{sheet.scale}", size=2.8, font_weight="bold")
     return "".join((*fields, *ends, words, text(x + 5 * field + 3, y - 1.2, "m", size=BODY)))
@@ -284,11 +292,11 @@ class Row:
 
 
 STOP_EDGES = (8.0, 25.0, 42.0, 58.0, 70.0, 81.0, 98.0)
-SHARE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
+COVERAGE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
 STOP_COLUMNS = ("x m", "y m", "heading °", "units", "new", "arrives")
 STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 
-SHARE_HEAD = Row(("coverage", "all", "visible", "covered", "%"), SHARE_EDGES, bold=True, to_left=True)
+COVERAGE_HEAD = Row(("coverage", "all", "visible", "covered", "%"), COVERAGE_EDGES, bold=True, to_left=True)
 
 
 def shared_rows(missions: Sequence[Mission]) -> list[Row]:
@@ -296,7 +304,7 @@ def shared_rows(missions: Sequence[Mission]) -> list[Row]:
     rows: list[Row] = []
     for k, mission in enumerate(missions):
         taken = duration(schedule(mission).total_s)
-        told = f"{letter(k)}: {share_in_words(mission)}, {len(mission.stops)} stops, {taken}"
+        told = f"{letter(k)}: {allocation_in_words(mission)}, {len(mission.stops)} stops, {taken}"
         rows += [_words(told, bold=True), *stop_rows(mission, before=letter(k))]
     return rows
 
@@ -315,10 +323,10 @@ def stop_rows(mission: Mission, *, before: str = "") -> list[Row]:
 
 def figure_rows(figures: Figures) -> list[Row]:
     """Yield the coverage of the whole, of every kind and every room; the unreached rooms; the findings."""
-    shares = [figures.whole, *figures.kinds, *figures.rooms]
+    groups = [figures.whole, *figures.kinds, *figures.rooms]
     rows = [
-        replace(SHARE_HEAD, cells=("coverage", f"all {figures.unit}", *SHARE_HEAD.cells[2:])),
-        *(_share_row(share) for share in shares[:MOST_ROWS]),
+        replace(COVERAGE_HEAD, cells=("coverage", f"all {figures.unit}", *COVERAGE_HEAD.cells[2:])),
+        *(_coverage_row(group) for group in groups[:MOST_ROWS]),
     ]
     if figures.unreached:
         rows.append(_words("not reached", bold=True))
@@ -329,8 +337,8 @@ def figure_rows(figures: Figures) -> list[Row]:
     return rows
 
 
-def _share_row(share: Share) -> Row:
-    return Row((shortened(share.name, size=BODY, width=42), *share.cells), SHARE_EDGES, to_left=True)
+def _coverage_row(group: GroupCoverage) -> Row:
+    return Row((shortened(group.name, size=BODY, width=42), *group.cells), COVERAGE_EDGES, to_left=True)
 
 
 def _words(content: str, *, bold: bool = False) -> Row:
@@ -347,7 +355,7 @@ def _chunk(rows: list[Row], chunk: Chunk) -> str:
     shown = rows[chunk.first : chunk.first + chunk.count]
     lines = [_frame(box)]
     first = shown[1] if len(shown) > 1 and shown[1].edges == STOP_EDGES else shown[0]
-    head = {STOP_EDGES: STOP_HEAD, SHARE_EDGES: SHARE_HEAD}.get(first.edges)
+    head = {STOP_EDGES: STOP_HEAD, COVERAGE_EDGES: COVERAGE_HEAD}.get(first.edges)
     if head is not None and not first.bold:
         lines.append(_row(head, box.x, box.y + HEADER - 1.5))
     for index, row in enumerate(shown):

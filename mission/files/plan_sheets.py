@@ -270,9 +270,9 @@ FIGURE_COLUMNS = (("", 0.0), ("all", 90.0), ("visible", 112.0), ("covered", 134.
 
 def _figure_lines(figures: Figures) -> Iterator[ListLine]:
     begins = [begin for _, begin in FIGURE_COLUMNS]
-    for share in (figures.whole, *figures.kinds, *figures.rooms):
-        cells = (shortened(share.name, size=LIST_SIZE, width=86), *share.cells)
-        yield tuple((begin, cell, share is figures.whole) for begin, cell in zip(begins, cells, strict=True))
+    for item in (figures.whole, *figures.kinds, *figures.rooms):
+        cells = (shortened(item.name, size=LIST_SIZE, width=86), *item.cells)
+        yield tuple((begin, cell, item is figures.whole) for begin, cell in zip(begins, cells, strict=True))
     parts = (
         ("Rooms left out", [item.text for item in figures.unreached]),
         ("To be checked before driving", [item.message for item in figures.grave]),

@@ -11,7 +11,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import building, targets
 from stopgo.mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
-from stopgo.mission.files.route_drawing import STOP, network, rings, route, stops
+from stopgo.mission.files.route_drawing import STOP, errors, network, rings, route, stops
 from stopgo.mission.files.shared_drawing import shared_routes, shared_stops
 from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
 from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
@@ -95,6 +95,7 @@ def drawing_of(
         shared_routes(shared, sheet) if shared else route(mission, sheet),
         network(mission, sheet),
         [room_labels(space.floor.rooms, sheet, avoid=_busy(missions, space.floor, sheet))],
+        [errors(mission, sheet)],
         shared_stops(shared, sheet) if shared else stops(mission, sheet),
     )
     return tuple(part for part in parts if part)

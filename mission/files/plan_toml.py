@@ -47,6 +47,20 @@ def read_settings(
     return settings
 
 
+def recorded_settings(parameters: dict[str, Any]) -> Settings:
+    """Settings from the parameters that a mission records, also from one of an earlier version.
+
+    Scans of missions without `register` must register only if they give an overlap ratio.
+
+    Raises
+    ------
+    InputError
+        As in `read_settings`.
+    """
+    earlier = {} if "register" in parameters else {"register": bool(parameters.get("overlap"))}
+    return read_settings(None, {**parameters, **earlier})
+
+
 _NAMES = {**{item.key: name for name, item in PARAMETERS.items()}, **{name: name for name in PARAMETERS}}
 """Names in missions, by these names and by the words for people."""
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.sheet import PaperSheet
-from stopgo.mission.files.svg import circle, group, line, line_data, path, polygon, rect, text
+from stopgo.mission.files.svg import circle, group, line, line_data, path, polygon, rect, ring_data, text
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.stages.network import network_of, predicted_error_m
+from stopgo.mission.stages.network import MagnifiedErrors, magnified_errors, network_of, predicted_error_m
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """Line of the leg to each stop."""
@@ -20,6 +20,10 @@ PAIR: dict[str, object] = {"stroke": "#1f8a70", "stroke_width": 0.25, "stroke_da
 """Two stops whose scans register with one another."""
 BRIDGE: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.5, "stroke_dasharray": "0.6 0.9"}
 """Line of a pair without which the scans are not connected."""
+ERROR: dict[str, object] = {"stroke": "#0b6e99", "stroke_width": 0.3, "fill": "none"}
+"""Outline of a scan's predicted error."""
+LARGEST_ERROR = 14.0
+"""Millimetres of the largest half axis of a drawn error ellipse."""
 THIN: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.2}
 STOP = 2.6
 """Radius in millimetres of a stop's disc."""
@@ -70,6 +74,18 @@ def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
         error = f"{1000 * predicted_error_m(weakest.hold_m):.1f} mm"
         held = text(x, y + 0.75, error, size=1.9, fill=BRIDGE["stroke"], text_anchor="middle")
         yield group("weakest", [rect(x - 3.6, y - 1.4, 7.2, 2.8, fill="#ffffff", **THIN), held])
+
+
+def errors_of(mission: Mission, sheet: PaperSheet) -> MagnifiedErrors | None:
+    """Return the predicted errors of the scans, magnified for this sheet."""
+    return magnified_errors(mission, most_m=LARGEST_ERROR / sheet.length(1.0))
+
+
+def errors(mission: Mission, sheet: PaperSheet) -> str:
+    """Draw the predicted error of each scan as an ellipse."""
+    found = errors_of(mission, sheet)
+    outlines = [] if found is None else [sheet.on_paper(line) for line in found.outlines.values()]
+    return group("errors", [path([ring_data(line)]) for line in outlines], **ERROR)
 
 
 def stops(mission: Mission, sheet: PaperSheet, *, letter: str = "") -> Iterator[str]:

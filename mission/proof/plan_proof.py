@@ -13,7 +13,7 @@ from stopgo.mission.geometry import BoolArray, FloatArray
 from stopgo.mission.stages import Targets
 from stopgo.mission.stages.figures import percent
 
-ALLOWED_SHARE = 0.01
+ALLOWED_FRACTION = 0.01
 """Tolerated loss against the plan's coverage: targets grazed by rays fall between two rays."""
 ALLOWED_UNITS = 3
 """Tolerated units of a stop without a line of sight, or a fiftieth: rays that touch corners."""
@@ -69,12 +69,12 @@ class Simulation:
 
 
 @dataclass(frozen=True)
-class PromisedShare:
+class PromisedCoverage:
     """Promised coverage of some targets, in metres or units, and its simulated part."""
 
     name: str
     promised: float
-    kept: float
+    acquired: float
     """Promised amount that has simulated points."""
     beyond: float
     """Amount with points that was not promised."""
@@ -84,14 +84,14 @@ class PromisedShare:
 
     @property
     def missed(self) -> float:
-        return self.promised - self.kept
+        return self.promised - self.acquired
 
     @property
     def simulated(self) -> float | None:
         """The coverage that was reached."""
         if self.coverage is None:
             return None
-        return self.coverage * (self.kept / self.promised if self.promised else 1.0)
+        return self.coverage * (self.acquired / self.promised if self.promised else 1.0)
 
 
 @dataclass(frozen=True)
@@ -221,9 +221,9 @@ class PlanProof:
     """`m` or `units`."""
     grain: float
     """Largest amount of one unit, in that unit."""
-    whole: PromisedShare
-    rooms: tuple[PromisedShare, ...]
-    kinds: tuple[PromisedShare, ...]
+    whole: PromisedCoverage
+    rooms: tuple[PromisedCoverage, ...]
+    kinds: tuple[PromisedCoverage, ...]
     stops: tuple[StopScan, ...]
     quality: CloudQuality
     network: ScanNetwork
@@ -247,12 +247,12 @@ class PlanProof:
 def _short_whole(proof: PlanProof) -> list[str]:
     whole = proof.whole
     if whole.simulated is not None and whole.coverage is not None:
-        if whole.simulated >= whole.coverage - ALLOWED_SHARE:
+        if whole.simulated >= whole.coverage - ALLOWED_FRACTION:
             return []
         return [f"coverage: promised {percent(whole.coverage)}, simulated {percent(whole.simulated)}"]
-    if whole.kept >= whole.promised * (1 - ALLOWED_SHARE):
+    if whole.acquired >= whole.promised * (1 - ALLOWED_FRACTION):
         return []
-    return [f"targets: {whole.promised:.0f} {proof.unit} promised, {whole.kept:.0f} acquired"]
+    return [f"targets: {whole.promised:.0f} {proof.unit} promised, {whole.acquired:.0f} acquired"]
 
 
 def _short_parts(proof: PlanProof) -> list[str]:
@@ -261,7 +261,7 @@ def _short_parts(proof: PlanProof) -> list[str]:
         for item in (*proof.rooms, *proof.kinds)
         if item.required is not None
         and item.simulated is not None
-        and item.simulated < min(item.required, item.coverage or 0.0) - ALLOWED_SHARE
+        and item.simulated < min(item.required, item.coverage or 0.0) - ALLOWED_FRACTION
         and item.missed > ALLOWED_UNITS_OF_PART * proof.grain
     ]
 

@@ -8,14 +8,14 @@ from typing import Any
 import msgspec
 
 from stopgo.mission.console.table import printable
-from stopgo.mission.document import MissionShare
+from stopgo.mission.document import MissionAllocation
 from stopgo.mission.proof.plan_proof import (
-    ALLOWED_SHARE,
+    ALLOWED_FRACTION,
     REGISTERED_DEG,
     REGISTERED_M,
     CloudQuality,
     PlanProof,
-    PromisedShare,
+    PromisedCoverage,
     ProvenArea,
     ScanNetwork,
     ScanPair,
@@ -39,9 +39,9 @@ def proof_json(proof: PlanProof) -> dict[str, Any]:
         "met": proof.met,
         "unmet": list(proof.unmet),
         "unit": proof.unit,
-        "total": _share(proof.whole),
-        "rooms": [_share(item) for item in proof.rooms],
-        "kinds": [_share(item) for item in proof.kinds],
+        "total": _coverage(proof.whole),
+        "rooms": [_coverage(item) for item in proof.rooms],
+        "kinds": [_coverage(item) for item in proof.kinds],
         "missed": proof.missed,
         "stops": [msgspec.to_builtins(item) for item in proof.stops],
         "surface": _surface_json(proof.quality),
@@ -77,10 +77,11 @@ def _network_json(network: ScanNetwork) -> dict[str, Any]:
     }
 
 
-def _share(item: PromisedShare) -> dict[str, Any]:
-    amounts = {name: round(getattr(item, name), 4) for name in ("promised", "kept", "beyond")}
+def _coverage(item: PromisedCoverage) -> dict[str, Any]:
+    amounts = {"promised": item.promised, "kept": item.acquired, "beyond": item.beyond}
+    rounded = {name: round(amount, 4) for name, amount in amounts.items()}
     simulated = None if item.simulated is None else round(item.simulated, 6)
-    return {"name": item.name, **amounts, "coverage": item.coverage, "simulated": simulated}
+    return {"name": item.name, **rounded, "coverage": item.coverage, "simulated": simulated}
 
 
 def _pair(item: ScanPair) -> dict[str, Any]:
@@ -112,10 +113,10 @@ def verdict(proof: PlanProof) -> str:
     return f"The plan's promise is met: {coverage_words(proof.whole, proof.unit)}."
 
 
-def coverage_words(whole: PromisedShare, unit: str) -> str:
+def coverage_words(whole: PromisedCoverage, unit: str) -> str:
     """Return the promised and the acquired coverage."""
     if whole.coverage is None:
-        return f"{whole.promised:.0f} {unit} promised, {whole.kept:.0f} acquired"
+        return f"{whole.promised:.0f} {unit} promised, {whole.acquired:.0f} acquired"
     return f"{percent(whole.coverage)} promised, {percent(whole.simulated)} acquired"
 
 
@@ -138,9 +139,9 @@ def missed_words(proof: PlanProof) -> list[str]:
 def surface_words(proof: PlanProof) -> list[str]:
     """Return the lines on density and incidence of the points on the surfaces."""
     quality = proof.quality
-    spacing = (f"{percent(share)} at {limit} mm" for limit, share in quality.by_spacing_mm.items())
-    angles = (f"{percent(share)} at {limit}°" for limit, share in quality.by_incidence_deg.items())
-    stops = (f"{percent(share)} from {least}" for least, share in quality.by_stops.items() if least > 1)
+    spacing = (f"{percent(fraction)} at {limit} mm" for limit, fraction in quality.by_spacing_mm.items())
+    angles = (f"{percent(fraction)} at {limit}°" for limit, fraction in quality.by_incidence_deg.items())
+    stops = (f"{percent(fraction)} from {least}" for least, fraction in quality.by_stops.items() if least > 1)
     return [
         f"points on {quality.seen_m2:.0f} of {quality.total_m2:.0f} m² of targets",
         f"spacing at most: {', '.join(spacing)}",
@@ -164,8 +165,8 @@ def network_words(proof: PlanProof) -> list[str]:
     network = proof.network
     components = f"the scans are in {len(network.pieces)} components"
     connected = "all scans are connected" if network.closed else components
-    if isinstance(share := proof.mission.share, MissionShare):
-        connected = f"of this mission, one of {share.of}, {connected}"
+    if isinstance(allocation := proof.mission.share, MissionAllocation):
+        connected = f"of this mission, one of {allocation.of}, {connected}"
     lines = [f"{connected}: {network.registered} of {len(network.pairs)} pairs with common surfaces register"]
     if network.closing_m is not None:
         lines.append(
@@ -218,5 +219,5 @@ def assumed_words(simulation: Simulation) -> list[str]:
         f"scanner level at {simulation.height_m:g} m, {cone}",
         walls.rstrip("; "),
         f"{start}; registered: from both sides under {1000 * REGISTERED_M:g} mm and {REGISTERED_DEG:g}°",
-        f"a promise is met within {100 * ALLOWED_SHARE:g} percentage point",
+        f"a promise is met within {100 * ALLOWED_FRACTION:g} percentage point",
     ]

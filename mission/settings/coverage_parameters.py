@@ -8,13 +8,13 @@ from typing import Annotated, Literal
 
 from stopgo.mission.settings.parameter import Pair, Parameter, millimetres
 
-LEAST_SHARE = 0.7
+LEAST_FRACTION = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
 OVERLAP_RANGE_M = 20.0
 """Scanners reach much farther than the range within which targets are seen well enough."""
 
 _plan = partial(Parameter, "plan", group="Quality")
-_share = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_SHARE:g}; none by units")
+_fraction = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_FRACTION:g}; none by units")
 _limit = partial(_plan, quiet=True)
 
 
@@ -33,8 +33,8 @@ class CoverageParameters:
         float,
         _plan("Minimum fraction of all that is visible", first=True, above=0, most=1, why="0.9 is 90 %"),
     ] = 0.9
-    room_coverage: Annotated[float | None, _share("Minimum fraction in each room")] = None
-    kind_coverage: Annotated[float | None, _share("Minimum fraction of each kind of element")] = None
+    room_coverage: Annotated[float | None, _fraction("Minimum fraction in each room")] = None
+    kind_coverage: Annotated[float | None, _fraction("Minimum fraction of each kind of element")] = None
     views: Annotated[
         int | None,
         _plan(
@@ -71,8 +71,7 @@ class CoverageParameters:
         bool | None,
         _plan(
             "Choose stops whose scans register with one another, all in one network",
-            undecided="yes with --overlap, else no",
-            quiet=True,
+            undecided="yes; no with --coverage-rule paper",
         ),
     ] = None
     overlap: Annotated[
@@ -124,12 +123,12 @@ class CoverageParameters:
     def _least(self, given: float | None) -> float | None:
         if self.coverage_rule == "paper":
             return None
-        return LEAST_SHARE if given is None else given
+        return LEAST_FRACTION if given is None else given
 
     @property
     def registers(self) -> bool:
         """True if stops are chosen so that their scans register."""
-        return self.least_overlap > 0 if self.register is None else self.register
+        return self.coverage_rule != "paper" if self.register is None else self.register
 
     @property
     def least_overlap(self) -> float:

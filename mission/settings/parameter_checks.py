@@ -61,12 +61,17 @@ def _check_coverage(settings: Settings) -> None:
 def _check_registration(settings: Settings) -> None:
     """Refuse an overlap ratio of scans that need not register."""
     if settings.least_overlap > 0 and not settings.registers:
-        _refuse(settings, "overlap", "has no effect with --no-register; leave one of them out")
+        _refuse(settings, "overlap", f"has no effect with {_unjoined(settings)}; leave one of them out")
     for key in ("accuracy", "control"):
         if getattr(settings, key) and not settings.registers:
-            _refuse(settings, key, "is of scans that register; give --register too")
+            _refuse(settings, key, f"has no effect with {_unjoined(settings)}; leave one of them out")
     if settings.accuracy is not None and settings.minimise == "time":
         _refuse(settings, "accuracy", "does not work with --minimise time; leave one of them out")
+
+
+def _unjoined(settings: Settings) -> str:
+    """The option by which scans need not register."""
+    return "--no-register" if settings.register is False else "--coverage-rule paper"
 
 
 def _check_scanner(settings: Settings) -> None:

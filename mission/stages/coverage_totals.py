@@ -11,7 +11,7 @@ import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.stages import NavigableSpace, Visibility, weights_of
-from stopgo.mission.stages.figures import Share, Shares, worst_first
+from stopgo.mission.stages.figures import CoverageByGroup, GroupCoverage, worst_first
 
 OUTSIDE = "in no room"
 """Name of the units that face no room."""
@@ -63,44 +63,44 @@ class CoverageTotals:
         """Return True for units that count as seen, for these numbers of views (n,)."""
         return frozen(views >= self.asked, np.bool_)
 
-    def shares(self, seen: BoolArray) -> Shares:
+    def coverage(self, seen: BoolArray) -> CoverageByGroup:
         """Return the coverage of a mask of units (n,); rooms and kinds with targets, least seen first."""
         *rooms, outside = self.rooms_seen(seen)
         listed = (*worst_first(rooms), outside)
-        return Shares(
-            self.share(Group("all", self.required), np.ones(len(self.weight), dtype=bool), seen),
-            tuple(share for share in listed if share.total),
-            worst_first([share for share in self.kinds_seen(seen) if share.total]),
+        return CoverageByGroup(
+            self.coverage_of(Group("all", self.required), np.ones(len(self.weight), dtype=bool), seen),
+            tuple(group for group in listed if group.total),
+            worst_first([group for group in self.kinds_seen(seen) if group.total]),
         )
 
-    def rooms_seen(self, seen: BoolArray) -> tuple[Share, ...]:
+    def rooms_seen(self, seen: BoolArray) -> tuple[GroupCoverage, ...]:
         """Return the coverage of every room, in order, and last of the units that face none."""
-        rooms = [self.share(group, self.room == k, seen) for k, group in enumerate(self.rooms)]
-        return (*rooms, self.share(Group(OUTSIDE), self.room < 0, seen))
+        rooms = [self.coverage_of(group, self.room == k, seen) for k, group in enumerate(self.rooms)]
+        return (*rooms, self.coverage_of(Group(OUTSIDE), self.room < 0, seen))
 
-    def kinds_seen(self, seen: BoolArray) -> tuple[Share, ...]:
+    def kinds_seen(self, seen: BoolArray) -> tuple[GroupCoverage, ...]:
         """Return the coverage of every kind of element, by name."""
         return tuple(
-            self.share(Group(kind, self.kind_required), self._kind == k, seen)
+            self.coverage_of(Group(kind, self.kind_required), self._kind == k, seen)
             for k, kind in enumerate(self._kinds)
         )
 
-    def by_element(self, seen: BoolArray) -> tuple[Share, ...]:
+    def by_element(self, seen: BoolArray) -> tuple[GroupCoverage, ...]:
         """Return the coverage of every element with targets, in the floor's order."""
         size = len(self.elements)
         masks = (None, self.visible, self.visible & seen)
         sums = [np.bincount(self.element, self._counted(mask), minlength=size) * self.scale for mask in masks]
         return tuple(
-            Share(item.id, total=float(sums[0][k]), visible=float(sums[1][k]), seen=float(sums[2][k]))
+            GroupCoverage(item.id, total=float(sums[0][k]), visible=float(sums[1][k]), seen=float(sums[2][k]))
             for k, item in enumerate(self.elements)
             if sums[0][k]
         )
 
-    def share(self, group: Group, member: BoolArray, seen: BoolArray) -> Share:
+    def coverage_of(self, group: Group, member: BoolArray, seen: BoolArray) -> GroupCoverage:
         """Return the coverage of a mask of units (n,)."""
         visible = member & self.visible
         total, could, did = (self.amount(mask) for mask in (member, visible, visible & seen))
-        return Share(group.name, total, could, did, required=group.required, why=group.why)
+        return GroupCoverage(group.name, total, could, did, required=group.required, why=group.why)
 
     def amount(self, units: BoolArray) -> float:
         """Return the amount of a mask of units (n,), in metres or units."""

@@ -12,7 +12,7 @@ from stopgo.mission.stages import Unreached
 
 
 @dataclass(frozen=True)
-class Share:
+class GroupCoverage:
     """Coverage of some targets: their visible part, and what the chosen stops see of it.
 
     Counted in metres of boundary, or in units by the paper's rule.
@@ -36,7 +36,7 @@ class Share:
         return self.seen / self.visible if self.visible else None
 
     @property
-    def visible_share(self) -> float:
+    def visible_fraction(self) -> float:
         """Fraction of the total that is visible."""
         return self.visible / self.total if self.total else 0.0
 
@@ -51,28 +51,32 @@ class Share:
         return self.required is None or self.seen >= (self.required - 1e-9) * self.visible
 
 
-def pair_cells(planned: Share, share: Share) -> tuple[str, str, str, str]:
+CoveragePair = tuple[GroupCoverage, GroupCoverage]
+"""Planned and present coverage of one group."""
+
+
+def pair_cells(planned: GroupCoverage, group: GroupCoverage) -> tuple[str, str, str, str]:
     """Return name, planned, present and required coverage in percent, as tables print them."""
     before, now, least = (
-        percent(value).removesuffix(" %") for value in (planned.coverage, share.coverage, share.required)
+        percent(value).removesuffix(" %") for value in (planned.coverage, group.coverage, group.required)
     )
-    return share.name, before, now, least
+    return group.name, before, now, least
 
 
 @dataclass(frozen=True)
-class Shares:
+class CoverageByGroup:
     """Coverage of all targets, by room and kind."""
 
-    whole: Share
-    rooms: tuple[Share, ...]
+    whole: GroupCoverage
+    rooms: tuple[GroupCoverage, ...]
     """Every room with targets, the one least seen first."""
-    kinds: tuple[Share, ...]
+    kinds: tuple[GroupCoverage, ...]
     """Every kind of target, the one least seen first."""
 
     @property
-    def short(self) -> tuple[Share, ...]:
+    def short(self) -> tuple[GroupCoverage, ...]:
         """Those with less coverage than required."""
-        return tuple(share for share in (self.whole, *self.rooms, *self.kinds) if not share.met)
+        return tuple(group for group in (self.whole, *self.rooms, *self.kinds) if not group.met)
 
 
 @dataclass(frozen=True)
@@ -109,8 +113,10 @@ class Quality:
 
     def text(self, unit: str) -> str:
         """Return the possible part in words."""
-        share = percent(self.possible / self.in_sight if self.in_sight else None)
-        return f"{share} of the {self.in_sight:.0f} {unit} in line of sight can be covered within the limits"
+        possible = percent(self.possible / self.in_sight if self.in_sight else None)
+        return (
+            f"{possible} of the {self.in_sight:.0f} {unit} in line of sight can be covered within the limits"
+        )
 
 
 @dataclass(frozen=True)
@@ -119,10 +125,10 @@ class Figures:
 
     rule: Literal["length", "paper"]
     """`length`: fractions of metres. `paper`: fractions of units."""
-    whole: Share
-    rooms: tuple[Share, ...]
+    whole: GroupCoverage
+    rooms: tuple[GroupCoverage, ...]
     """Every room with targets, the one least seen first."""
-    kinds: tuple[Share, ...]
+    kinds: tuple[GroupCoverage, ...]
     """Every kind of target, the one least seen first."""
     rooms_m2: float
     """Floor area of all rooms, with the floor outside every room."""
@@ -152,19 +158,19 @@ class Figures:
 LEG_OVER_IGNORED = "leg_over_ignored"
 
 
-def worst_first(shares: Sequence[Share]) -> tuple[Share, ...]:
+def worst_first(groups: Sequence[GroupCoverage]) -> tuple[GroupCoverage, ...]:
     """Sort by coverage, then by name; without visible targets last."""
-    return tuple(sorted(shares, key=how_bad))
+    return tuple(sorted(groups, key=how_bad))
 
 
-def how_bad(share: Share) -> tuple[bool, float, str]:
+def how_bad(group: GroupCoverage) -> tuple[bool, float, str]:
     """Return the sort key of `worst_first`."""
-    return share.coverage is None, share.coverage or 0.0, share.name
+    return group.coverage is None, group.coverage or 0.0, group.name
 
 
-def percent(share: float | None, *, digits: int = 1) -> str:
+def percent(fraction: float | None, *, digits: int = 1) -> str:
     """Format a fraction, cut and not rounded up, so that 89.96 % is not printed as 90.0 %."""
-    if share is None:
+    if fraction is None:
         return "-"
     steps = 10**digits
-    return f"{math.floor(100 * share * steps + 1e-9) / steps:.{digits}f} %"
+    return f"{math.floor(100 * fraction * steps + 1e-9) / steps:.{digits}f} %"

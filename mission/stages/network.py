@@ -9,13 +9,17 @@ from functools import cached_property
 from typing import Any
 
 import msgspec
+import numpy as np
 from msgspec.structs import replace
 
-from stopgo.mission.document import Mission, Overlap
+from stopgo.mission.document import Mission, Overlap, Stop
+from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages.figures import percent
 
 NOISE_M = 0.33e-3
 """Registration error of one metre of wall, metres (standard deviation, times the root of the metres)."""
+ELLIPSE_POINTS = 49
+"""Points of a drawn ellipse, the first again at the end."""
 FLOOR_M = 0.4e-3
 """Registration error that no length of wall averages out: that of the thinned cloud, metres."""
 
@@ -70,6 +74,53 @@ class Network:
             tuple(stop for stop in self.stops if stop in stops),
             tuple(item for item in self.overlaps if item.a in stops and item.b in stops),
         )
+
+
+@dataclass(frozen=True)
+class MagnifiedErrors:
+    """Predicted error ellipses of a mission's scans, drawn so large that they can be seen."""
+
+    factor: float
+    """Times as large as they are."""
+    outlines: dict[str, FloatArray]
+    """Closed outline (n, 2) of each stop's ellipse, metres on the floor."""
+    words: dict[str, str]
+    """Each ellipse in words."""
+
+
+def magnified_errors(mission: Mission, *, most_m: float) -> MagnifiedErrors | None:
+    """Return the standard error ellipses, with half axes of at most `most_m`; None if there are none."""
+    claimed = {stop: stop.error for stop in mission.stops if not isinstance(stop.error, msgspec.UnsetType)}
+    largest = max((error.major_m for error in claimed.values()), default=0.0)
+    if not 0 < largest < math.inf:
+        return None
+    factor = _round_below(most_m / largest)
+    turn = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS)
+    outlines, words = {}, {}
+    for stop, error in claimed.items():
+        half = factor * np.array([error.major_m, error.minor_m])
+        x, y = half[:, None] * np.array([np.cos(turn), np.sin(turn)])
+        cos, sin = math.cos(error.direction), math.sin(error.direction)
+        outlines[stop.id] = np.stack([stop.x + cos * x - sin * y, stop.y + sin * x + cos * y], axis=1)
+        words[stop.id] = error_in_words(stop)
+    return MagnifiedErrors(factor, outlines, words)
+
+
+def error_in_words(stop: Stop) -> str:
+    """Return the predicted error of a stop's scan; an empty string if it claims none."""
+    error = stop.error
+    if isinstance(error, msgspec.UnsetType):
+        return ""
+    if error.major_m == 0:
+        return f"{stop.id}: the other scans' errors are in its frame"
+    axes = f"{1000 * error.major_m:.1f} × {1000 * error.minor_m:.1f} mm"
+    return f"{stop.id}: predicted error {axes} (standard deviations)"
+
+
+def _round_below(value: float) -> float:
+    """Return the greatest number 1, 2 or 5 times a power of ten that is at most this."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9))
 
 
 def network_of(mission: Mission) -> Network | None:

@@ -12,7 +12,7 @@ from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
 from stopgo.mission.stages import Route, Targets
 from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
-from stopgo.mission.stages.figures import Figures, Shares
+from stopgo.mission.stages.figures import CoverageByGroup, Figures
 
 SAME_PLACE_M = 1e-6
 """Within this distance of a planned stop, a stop of another revision sees the same."""
@@ -47,9 +47,9 @@ class Sight:
     last: IntArray
 
     @cached_property
-    def planned(self) -> Shares:
+    def planned(self) -> CoverageByGroup:
         """Coverage by all stops."""
-        return self.totals.shares(self.all_seen)
+        return self.totals.coverage(self.all_seen)
 
     @cached_property
     def all_seen(self) -> BoolArray:
@@ -89,9 +89,9 @@ class Sight:
         np.add.at(change, self.last[runs] + 1, -1)
         return np.asarray(np.cumsum(change[:-1]) > 0)
 
-    def shares(self, stops: Collection[str]) -> Shares:
+    def coverage(self, stops: Collection[str]) -> CoverageByGroup:
         """Return the coverage by these stops."""
-        return self.totals.shares(self.seen_units(stops))
+        return self.totals.coverage(self.seen_units(stops))
 
     def brings(self, stop: str, views: IntArray) -> float:
         """Return the gain of this stop, as a fraction of all visible, after views from others (n,)."""

@@ -10,7 +10,7 @@ import numpy as np
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Route, Visibility, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE, CoverageTotals, totals_of_plan
-from stopgo.mission.stages.figures import Share, percent
+from stopgo.mission.stages.figures import GroupCoverage, percent
 
 NEARLY = 0.8
 """A runner-up must have seen at least this fraction of what the chosen candidate newly saw …"""
@@ -56,7 +56,7 @@ class StopReason:
     """All visible from any candidate."""
     coverage: float
     """Coverage of the whole, after it was chosen."""
-    rooms: tuple[Share, ...]
+    rooms: tuple[GroupCoverage, ...]
     """The rooms that lose without it, as seen then; the greatest loss first."""
     lost: tuple[float, ...]
     """Loss of each of these rooms."""
@@ -65,12 +65,12 @@ class StopReason:
     unit: str = "m"
 
     @property
-    def lost_share(self) -> float:
+    def lost_fraction(self) -> float:
         """Loss without it, as a fraction of all visible."""
         return self.alone / self.visible if self.visible else 0.0
 
     @property
-    def short(self) -> tuple[Share, ...]:
+    def short(self) -> tuple[GroupCoverage, ...]:
         """Rooms with less coverage than required without it."""
         return tuple(room for room in self.rooms if not room.met)
 
@@ -104,7 +104,7 @@ class StopReason:
         more = f" and {len(losses) - MOST_ROOMS} more rooms" if len(losses) > MOST_ROOMS else ""
         return (
             f"It alone sees {self.alone_units} units, {self.alone:.1f} {self.unit} or"
-            f" {percent(self.lost_share)} of what is visible; lost without it: {where}{more}."
+            f" {percent(self.lost_fraction)} of what is visible; lost without it: {where}{more}."
         )
 
 
@@ -239,17 +239,17 @@ class _Rooms:
             np.bincount(totals.room % size, np.where(m, weight, 0.0), minlength=size) for m in masks
         ]
 
-    def without(self, units: IntArray) -> tuple[tuple[Share, ...], tuple[float, ...]]:
+    def without(self, units: IntArray) -> tuple[tuple[GroupCoverage, ...], tuple[float, ...]]:
         """Return the rooms that lose, as seen without these units, and each room's loss."""
         size, scale = len(self._sums[0]), self._totals.scale
         lost = np.bincount(self._room[units] % size, self._totals.weight[units], minlength=size)
         losing = sorted(np.flatnonzero(lost).tolist(), key=lambda k: (-lost[k], k))
-        shares = tuple(self._share(k, float(lost[k])) for k in losing)
-        return shares, tuple(float(lost[k]) * scale for k in losing)
+        coverages = tuple(self._coverage_of(k, float(lost[k])) for k in losing)
+        return coverages, tuple(float(lost[k]) * scale for k in losing)
 
-    def _share(self, k: int, lost: float) -> Share:
+    def _coverage_of(self, k: int, lost: float) -> GroupCoverage:
         groups, scale = self._totals.rooms, self._totals.scale
         total, visible, seen = (float(column[k]) * scale for column in self._sums)
         name = groups[k].name if k < len(groups) else OUTSIDE
         required = groups[k].required if k < len(groups) else None
-        return Share(name, total, visible, max(seen - lost * scale, 0.0), required=required)
+        return GroupCoverage(name, total, visible, max(seen - lost * scale, 0.0), required=required)

@@ -9,7 +9,7 @@ from stopgo.mission.floor import Finding, Rank
 from stopgo.mission.stages import Candidates, Route, Selection
 from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.covered_intervals import seen_units
-from stopgo.mission.stages.figures import Figures, Shares
+from stopgo.mission.stages.figures import CoverageByGroup, Figures
 from stopgo.planner.appraisal.plausibility import floor_of_rooms, near_legs, plausibility_findings
 from stopgo.planner.appraisal.quality import FEWER_VIEWS, NOT_MET, fewer_views, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
@@ -30,12 +30,12 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     network = (*scans_apart(route), *inaccurate(route))
     doubts = (*plausibility_findings(route, reached_m2=reached), *views, *network)
     findings = (*space.findings, *doubts)
-    shares = shares_of(selection, why={item.room: item.why for item in left_out})
+    groups = coverage_by_group(selection, why={item.room: item.why for item in left_out})
     return Figures(
         rule=settings.coverage_rule,
-        whole=shares.whole,
-        rooms=shares.rooms,
-        kinds=shares.kinds,
+        whole=groups.whole,
+        rooms=groups.rooms,
+        kinds=groups.kinds,
         rooms_m2=sum(floor_of_rooms(space)),
         reached_m2=reached,
         unreached=left_out,
@@ -46,24 +46,24 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
 
 def figures_of_share(route: Route, whole: Figures) -> Figures:
     """Return the figures of one of several missions; the required coverage applies to all together."""
-    shares = shares_of(route.selection, why={item.room: item.why for item in whole.unreached})
+    groups = coverage_by_group(route.selection, why={item.room: item.why for item in whole.unreached})
     space = route.space
     doubts = plausibility_findings(route, reached_m2=whole.reached_m2)
     of_all = (item for item in whole.findings if item.code in (NOT_MET, FEWER_VIEWS, *SCANS_APART))
     findings = (*space.findings, *doubts, *of_all)
     return replace(
         whole,
-        whole=replace(shares.whole, required=None),
-        rooms=tuple(replace(share, required=None) for share in shares.rooms),
-        kinds=tuple(replace(share, required=None) for share in shares.kinds),
+        whole=replace(groups.whole, required=None),
+        rooms=tuple(replace(group, required=None) for group in groups.rooms),
+        kinds=tuple(replace(group, required=None) for group in groups.kinds),
         findings=ranked(findings, near_legs(findings, route)),
         quality=None,
     )
 
 
-def shares_of(selection: Selection, *, why: Mapping[str, str] | None = None) -> Shares:
+def coverage_by_group(selection: Selection, *, why: Mapping[str, str] | None = None) -> CoverageByGroup:
     """Return the coverage of the whole, of every room and of every kind, the lowest first."""
-    return totals_of_plan(selection.visibility, why).shares(seen_units(selection))
+    return totals_of_plan(selection.visibility, why).coverage(seen_units(selection))
 
 
 def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]:

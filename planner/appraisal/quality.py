@@ -68,8 +68,8 @@ def not_met(selection: Selection) -> Iterator[Finding]:
     if not limits:
         return
     totals = replace(totals_of_plan(seen), visible=_in_sight(seen).visible)
-    shares = totals.shares(_possible(seen))
-    short = [f"{item.name} {percent(item.coverage)}" for item in shares.short]
+    groups = totals.coverage(_possible(seen))
+    short = [f"{item.name} {percent(item.coverage)}" for item in groups.short]
     if short:
         more = f" and {len(short) - MOST_NAMED} more" if len(short) > MOST_NAMED else ""
         yield Finding(

@@ -169,8 +169,8 @@ def _shortfalls(counted: Recount) -> Iterator[Problem]:
         yield Problem("$.origin.parameters.coverage", f"is {least:g}, but the stops see {counted.in_words()}")
     if counted.visible is None:
         return
-    shares = totals_of(counted.space, counted.visible, frozen([1], np.int64)).shares(counted.seen)
-    for key, groups in (("room_coverage", shares.rooms), ("kind_coverage", shares.kinds)):
+    found = totals_of(counted.space, counted.visible, frozen([1], np.int64)).coverage(counted.seen)
+    for key, groups in (("room_coverage", found.rooms), ("kind_coverage", found.kinds)):
         for item in (item for item in groups if not item.met):
             text = f"is {item.required:g}, but the stops see {percent(item.coverage)} of {item.name}"
             yield Problem(f"$.origin.parameters.{key}", f"{text}, counted line by line")

@@ -5,7 +5,7 @@ Every line of sight to the boundary is tested against every wall, as in `stopgo.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import msgspec
 import numpy as np
@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.document import Mission, Stop, mission_id
 from stopgo.mission.document.problems import Problem
-from stopgo.mission.geometry import IntArray
+from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import network_of
 from stopgo.planner.candidates.added_scans import with_scans
@@ -23,7 +23,13 @@ from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
 from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
 from stopgo.planner.overlap.control import seen_control
-from stopgo.planner.overlap.network_error import information_of, network_errors
+from stopgo.planner.overlap.network_error import (
+    error_ellipses,
+    information_of,
+    network_errors,
+    scan_covariances,
+    worst_errors,
+)
 from stopgo.planner.overlap.pairs import Overlaps
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door
@@ -31,6 +37,8 @@ from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 ROUNDED = 1e-5
 """Tolerance of a pair's figures, which are sums of rounded lengths."""
+ERROR_SLACK, ERROR_SLACK_M = 0.01, 1e-5
+"""Tolerance of a predicted error: a fraction of it, and metres, to which missions round it."""
 REQUIRED = "the plan's parameters require scans that register with one another"
 LEAST = {"common_m": LEAST_COMMON_M, "hold_m": LEAST_HOLD_M}
 
@@ -38,6 +46,7 @@ LEAST = {"common_m": LEAST_COMMON_M, "hold_m": LEAST_HOLD_M}
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
     """Every pair that registers less well than claimed or required, and pairs that are missing."""
     required = space.settings.registers
+    yield from _understated_errors(mission, space)
     if isinstance(mission.network, msgspec.UnsetType):
         if required and len(mission.stops) > 1:
             yield Problem("$.network", f"is missing, but {REQUIRED}")
@@ -73,17 +82,47 @@ def _inaccurate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Probl
     asked, network = space.settings.accuracy, network_of(mission)
     if asked is None or network is None or not network.overlaps:
         return
-    overlaps, origin = _overlaps(mission, space), local_origin(space.floor)
-    row = {stop: k for k, stop in enumerate(network.stops)}
-    ends = [(row[pair.a], row[pair.b]) for pair in network.overlaps]
-    xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - origin
-    information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
-    errors, _ = network_errors(xy, ends, information, seen_control(space, xy))
+    errors = worst_errors(_covariances(mission, space, ()))
     found = CONFIDENCE * 1000 * np.where(np.isfinite(errors), errors, 0.0)
     worst = int(np.argmax(found))
     if found[worst] > asked * (1 + ROUNDED):
         text = f"is {asked:g} mm, but the predicted error of {network.stops[worst]} is {found[worst]:.1f} mm"
         yield Problem("$.origin.parameters.accuracy", f"{text}, counted line by line")
+
+
+def _understated_errors(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+    """Every scan with a greater predicted error than claimed, in the frame of the scan without error."""
+    claimed = {k: stop.error for k, stop in enumerate(mission.stops) if stop.error is not msgspec.UNSET}
+    if not claimed:
+        return
+    exact = [k for k, error in claimed.items() if error.major_m == 0]
+    counted = error_ellipses(_covariances(mission, space, exact if len(exact) == 1 else ()))
+    for k, error in claimed.items():
+        for axis, key in enumerate(("major_m", "minor_m")):
+            claim, found = getattr(error, key), counted[k, axis]
+            path = f"$.stops[{k}].error.{key}"
+            if not np.isfinite(found):
+                yield Problem(path, f"is {claim:g}, but no pair of the network holds {mission.stops[k].id}")
+            elif found > claim * (1 + ERROR_SLACK) + ERROR_SLACK_M:
+                yield Problem(path, f"is {claim:g}, but the network gives {found:.5f}, counted line by line")
+
+
+def _covariances(mission: Mission, space: NavigableSpace, anchors: Sequence[int]) -> FloatArray:
+    """Covariance of each scan's position by the mission's pairs (n, 2, 2).
+
+    It is in the frame of the anchors; without any in that of the control points, or of a scan in the middle.
+    """
+    network = network_of(mission)
+    overlaps, origin = _overlaps(mission, space), local_origin(space.floor)
+    row = {stop.id: k for k, stop in enumerate(mission.stops)}
+    pairs = [(row[pair.a], row[pair.b]) for pair in (network.overlaps if network else ())]
+    xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - origin
+    moments = {pair: overlaps.normal_matrix(*pair) for pair in pairs}
+    ends = [pair for pair in pairs if np.linalg.matrix_rank(moments[pair]) == 3]
+    information = [information_of(moments[a, b], xy[b]) for a, b in ends]
+    if anchors:
+        return scan_covariances(xy, ends, information, anchors)
+    return network_errors(xy, ends, information, seen_control(space, xy))[0]
 
 
 def _is_whole(mission: Mission, space: NavigableSpace) -> bool:

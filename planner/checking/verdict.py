@@ -9,7 +9,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.document.problems import Problem
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage
-from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.planner.checking.claims import Recount, overclaims, recount
 from stopgo.planner.checking.fit import misfits_on, other_machine
 from stopgo.planner.checking.model_clearance import too_near
@@ -35,7 +35,7 @@ def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
         If the file cannot be read as a floor.
     """
     try:
-        settings = read_settings(None, mission.origin.parameters)
+        settings = recorded_settings(mission.origin.parameters)
     except InputError as error:
         return Verdict((Problem("$.origin.parameters", f"are not those of a plan: {error}"),))
     floor = read_floor(path, options_of(settings))

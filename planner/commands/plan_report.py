@@ -18,7 +18,7 @@ from stopgo.mission.document.schedule import schedule
 from stopgo.mission.floor import Finding, Rank
 from stopgo.mission.plan import PartPlan
 from stopgo.mission.stages import Route
-from stopgo.mission.stages.figures import Figures, Share, percent
+from stopgo.mission.stages.figures import Figures, GroupCoverage, percent
 from stopgo.mission.stages.network import Network, network_lines, network_of, network_table
 from stopgo.mission.stages.seen_area import SeenSurface
 from stopgo.planner.overlap.registered import predicted_errors
@@ -237,13 +237,13 @@ def coverage_table(figures: Figures) -> dict[str, Any]:
     return {
         "rule": figures.rule,
         "total": _row(figures.whole),
-        "rooms": [_row(share) for share in figures.rooms],
-        "kinds": [_row(share) for share in figures.kinds],
+        "rooms": [_row(group) for group in figures.rooms],
+        "kinds": [_row(group) for group in figures.kinds],
     }
 
 
-def _row(share: Share) -> dict[str, Any]:
-    return _attributes(share, "name", "total", "visible", "seen", "coverage", "required", "why")
+def _row(group: GroupCoverage) -> dict[str, Any]:
+    return _attributes(group, "name", "total", "visible", "seen", "coverage", "required", "why")
 
 
 def _attributes(source: object, *names: str) -> dict[str, Any]:
@@ -255,11 +255,11 @@ def coverage_lines(figures: Figures) -> list[str]:
     """The coverage table: the whole, then kinds and rooms, the one least seen first."""
     whole, unit = figures.whole, figures.unit
     lines = [
-        f"  coverage    {percent(whole.coverage)} of the {percent(whole.visible_share)} that is visible "
+        f"  coverage    {percent(whole.coverage)} of the {percent(whole.visible_fraction)} that is visible "
         f"(covered {whole.seen:.0f} of visible {whole.visible:.0f} of all {whole.total:.0f} {unit})"
     ]
-    lines += [_line("kind", share, unit) for share in figures.kinds]
-    lines += [_line("room", share, unit) for share in figures.rooms[:MOST_ROOMS]]
+    lines += [_line("kind", group, unit) for group in figures.kinds]
+    lines += [_line("room", group, unit) for group in figures.rooms[:MOST_ROOMS]]
     rest = figures.rooms[MOST_ROOMS:]
     if rest:
         lines.append(
@@ -268,9 +268,9 @@ def coverage_lines(figures: Figures) -> list[str]:
     return lines
 
 
-def _line(group: str, share: Share, unit: str) -> str:
-    seen = f"{share.seen:.1f} of {share.visible:.1f} of {share.total:.1f} {unit}"
-    return f"    {group:<9} {printable(share.name):<24} {percent(share.coverage):>7}  {seen}"
+def _line(kind: str, group: GroupCoverage, unit: str) -> str:
+    seen = f"{group.seen:.1f} of {group.visible:.1f} of {group.total:.1f} {unit}"
+    return f"    {kind:<9} {printable(group.name):<24} {percent(group.coverage):>7}  {seen}"
 
 
 def finding_lines(findings: Sequence[Finding]) -> list[str]:

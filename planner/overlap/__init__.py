@@ -36,11 +36,13 @@ def registers(pairs: Pairs, *, share: float) -> IntArray:
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
     overlaps, share = overlaps_of(candidates), candidates.settings.least_overlap
-    every = (overlaps.after(row) for row in range(overlaps.rows))
-    near = [pairs.other[registers(pairs, share=share)] for pairs in every]
-    pointer = np.cumsum([0, *map(len, near)])
-    columns = np.concatenate([np.empty(0, np.int64), *near])
-    later = csr_array((np.ones(len(columns), np.int64), columns, pointer), shape=(overlaps.rows,) * 2)
+    rows, others = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    for pairs in overlaps.later():
+        good = registers(pairs, share=share)
+        rows.append(pairs.row[good])
+        others.append(pairs.other[good])
+    ends = np.concatenate(rows), np.concatenate(others)
+    later = csr_array((np.ones(len(ends[0]), np.int64), ends), shape=(overlaps.rows,) * 2)
     return (later + later.T).tocsr()
 
 

@@ -41,28 +41,50 @@ def network_errors(
     information: Sequence[FloatArray],
     seen: Sequence[SeenPoint] = (),
 ) -> tuple[FloatArray, int | None]:
-    """The `scan_errors`, and the scan whose frame they are in; None for that of the control points.
+    """The `scan_covariances`, and the scan whose frame they are in; None for that of the control points.
 
     Control points hold the frame if the largest component sees two of them. Else it is that of the scan,
     of three in the middle of this component, with the least worst error.
     """
     largest = max(_components(len(xy), ends), key=len, default=[])
     if set(_held(len(xy), ends, seen)) & set(largest):
-        return scan_errors(xy, ends, information, [], seen), None
+        return scan_covariances(xy, ends, information, [], seen), None
     away = np.hypot(*(xy[largest] - xy[largest].mean(axis=0)).T)
-    middle = [largest[k] for k in np.argsort(away, kind="stable")[:MOST_FRAMES].tolist()]
-    tried = [(scan_errors(xy, ends, information, [k]), k) for k in middle]
-    return min(tried, key=lambda one: float(np.max(one[0][np.isfinite(one[0])], initial=0.0)))
+    nearest = np.argsort(np.round(away, 3), kind="stable")[:MOST_FRAMES]
+    middle = [largest[k] for k in nearest.tolist()]
+    tried = [(scan_covariances(xy, ends, information, [k]), k) for k in middle]
+    return min(tried, key=lambda one: _worst(worst_errors(one[0])))
 
 
-def scan_errors(
+def _worst(errors: FloatArray) -> float:
+    """The greatest finite error, rounded so that float noise prefers no frame."""
+    return round(float(np.max(errors[np.isfinite(errors)], initial=0.0)), 6)
+
+
+def worst_errors(covariances: FloatArray) -> FloatArray:
+    """Standard deviation of each scan's position in its worst direction, metres (n,)."""
+    return np.array([major for major, _, _ in error_ellipses(covariances)])
+
+
+def error_ellipses(covariances: FloatArray) -> FloatArray:
+    """Standard error ellipse of each scan's position (n, 3): half axes in metres, and radians from +x."""
+    found = np.full((len(covariances), 3), np.inf)
+    held = np.isfinite(covariances).all(axis=(1, 2))
+    if held.any():
+        variance, axes = np.linalg.eigh(covariances[held])
+        found[held, :2] = np.sqrt(np.maximum(variance[:, ::-1], 0.0))
+        found[held, 2] = np.arctan2(axes[:, 1, 1], axes[:, 0, 1]) % np.pi
+    return found
+
+
+def scan_covariances(
     xy: FloatArray,
     ends: Sequence[tuple[int, int]],
     information: Sequence[FloatArray],
     anchors: Sequence[int],
     seen: Sequence[SeenPoint] = (),
 ) -> FloatArray:
-    """Standard deviation of each scan's position in its worst direction, metres (n,).
+    """Covariance of each scan's position, square metres (n, 2, 2).
 
     Parameters
     ----------
@@ -74,19 +96,20 @@ def scan_errors(
         Scans whose poses are known.
     seen
         Scans, and the control points that they see. Two points hold all scans that pairs join to these.
-        A scan that nothing holds has the error infinity.
+        A scan that nothing holds has an infinite variance.
     """
     count = len(xy)
     joined = _joined(count, ends, [*anchors, *_held(count, ends, seen)])
     free = [k for k in range(count) if joined[k] and k not in anchors]
     normal = _normal_matrix({k: 3 * place for place, k in enumerate(free)}, ends, information, seen)
     covariance = np.linalg.inv(normal) if free else normal
-    errors = np.where(joined, 0.0, np.inf)
+    found = np.zeros((count, 2, 2))
+    found[~np.array(joined, dtype=bool)] = np.inf
     for place, k in enumerate(free):
         own = covariance[3 * place : 3 * place + 3, 3 * place : 3 * place + 3]
         there = np.array([[1.0, 0.0, -xy[k, 1]], [0.0, 1.0, xy[k, 0]]])
-        errors[k] = np.sqrt(np.linalg.eigvalsh(there @ own @ there.T)[-1])
-    return errors
+        found[k] = there @ own @ there.T
+    return found
 
 
 def _normal_matrix(

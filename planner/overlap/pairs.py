@@ -11,6 +11,7 @@ weakest direction is NOISE_M / √hold_m, by independent errors along the walls,
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +29,8 @@ EDGE_M = 0.14
 thinned to one per 7.5 cm: nearer to an edge they are of two surfaces."""
 LEAST_STRETCH_M = 2 * EDGE_M
 """Least width of a common stretch. Narrower ones, such as door jambs, have no direction of their own."""
+BLOCK = 64
+"""Rows whose pairs are computed at a time."""
 DIGITS = 6
 """Decimals of a pair's figures, so that both stops of a pair have equal figures."""
 
@@ -37,10 +40,12 @@ EPSILON_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """One row with every other row that sees some of the same boundary."""
+    """Rows with other rows that see some of the same boundary."""
 
+    row: IntArray
+    """Ascending (n,)."""
     other: IntArray
-    """Rows, ascending (n,)."""
+    """Ascending for each row (n,)."""
     common_m: FloatArray
     """Metres of boundary that both see (n,)."""
     share: FloatArray
@@ -73,17 +78,19 @@ class Overlaps:
     def of(self, row: int) -> Pairs:
         """A row with every other row; cached."""
         if row not in self._by_row:
-            self._by_row[row] = self._pairs(row, first=0)
+            self._by_row[row] = self._pairs(np.array([row]), np.array([0]))
         return self._by_row[row]
 
-    def after(self, row: int) -> Pairs:
-        """A row with every later row; not cached, since a large floor would take gigabytes."""
-        return self._pairs(row, first=row + 1)
+    def later(self) -> Iterator[Pairs]:
+        """All rows with every later row, in blocks; not cached, since a large floor would take gigabytes."""
+        for begin in range(0, self.rows, BLOCK):
+            rows = np.arange(begin, min(begin + BLOCK, self.rows))
+            yield self._pairs(rows, rows + 1)
 
     def middle_of_common(self, row: int, other: int) -> FloatArray:
         """The middle of the longest stretch of boundary that two rows see, local metres (2,)."""
         seen = self._seen
-        there, begin, end = self._common(row)
+        _, there, begin, end = self._common(np.array([row]), np.array([0]))
         own = np.flatnonzero(self._row[there] == other)
         longest = own[int(np.argmax((end - begin)[own]))]
         face = seen.face[there[longest]]
@@ -93,7 +100,7 @@ class Overlaps:
 
     def normal_matrix(self, row: int, other: int) -> FloatArray:
         """N of a pair about the local origin (3, 3), without the lever."""
-        there, begin, end = self._common(row)
+        _, there, begin, end = self._common(np.array([row]), np.array([0]))
         own = self._row[there] == other
         index = np.zeros(int(own.sum()), dtype=np.int64)
         found: FloatArray = self._moments(
@@ -108,29 +115,33 @@ class Overlaps:
         move: FloatArray = axes[:, 0]
         return move
 
-    def _common(self, row: int, *, first: int = 0) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Stretches that a row and another (from `first` on) both see: the other's stretch, begin, end."""
+    def _common(self, rows: IntArray, first: IntArray) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+        """Stretches that rows (n,) and others both see: stretches of both (m,) (m,), begin, end.
+
+        The others of each row are those from `first` on (n,).
+        """
         seen = self._seen
-        own = np.arange(seen.pointer[row], seen.pointer[row + 1])
-        begin = np.searchsorted(self._place, seen.face[own] * self.rows + first)
+        many = seen.pointer[rows + 1] - seen.pointer[rows]
+        own = ranges(seen.pointer[rows], many)
+        begin = np.searchsorted(self._place, seen.face[own] * self.rows + np.repeat(first, many))
         counts = np.searchsorted(self._place, (seen.face[own] + 1) * self.rows) - begin
         there, mine = self._order[ranges(begin, counts)], np.repeat(own, counts)
         low = np.maximum(seen.begin[mine], seen.begin[there])
         high = np.minimum(seen.end[mine], seen.end[there])
-        both = (high - low > LEAST_STRETCH_M - EPSILON_M) & (self._row[there] != row)
-        return there[both], low[both], high[both]
+        both = (high - low > LEAST_STRETCH_M - EPSILON_M) & (self._row[there] != self._row[mine])
+        return mine[both], there[both], low[both], high[both]
 
-    def _pairs(self, row: int, *, first: int) -> Pairs:
+    def _pairs(self, rows: IntArray, first: IntArray) -> Pairs:
         seen = self._seen
-        there, begin, end = self._common(row, first=first)
-        other, index = np.unique(self._row[there], return_inverse=True)
-        moments = self._moments(seen.face[there], begin + EDGE_M, end - EDGE_M, index, len(other))
-        common = np.bincount(index, end - begin, len(other))
+        mine, there, begin, end = self._common(rows, first)
+        both, index = np.unique(self._row[mine] * self.rows + self._row[there], return_inverse=True)
+        row, other = np.divmod(both, max(1, self.rows))
+        moments = self._moments(seen.face[there], begin + EDGE_M, end - EDGE_M, index, len(both))
+        common = np.bincount(index, end - begin, len(both))
         least = np.minimum(self.shown_m[row], self.shown_m[other])
-        here = np.repeat(seen.xy[row][None], len(other), axis=0)
-        hold = np.minimum(_least_hold(moments, here), _least_hold(moments, seen.xy[other]))
+        hold = np.minimum(_least_hold(moments, seen.xy[row]), _least_hold(moments, seen.xy[other]))
         share = common / np.maximum(least, 1e-12)
-        return Pairs(other, *(np.round(figure, DIGITS) for figure in (common, share, hold)))
+        return Pairs(row, other, *(np.round(figure, DIGITS) for figure in (common, share, hold)))
 
     def _moments(
         self, face: IntArray, begin: FloatArray, end: FloatArray, index: IntArray, many: int

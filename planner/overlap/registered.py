@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from msgspec import UNSET, UnsetType
 
-from stopgo.mission.document import Overlap, stop_names
+from stopgo.mission.document import Overlap, PositionError, stop_names
 from stopgo.mission.document.specs import rounded
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, IntArray
@@ -22,7 +23,7 @@ from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.control import seen_control
-from stopgo.planner.overlap.network_error import information_of, network_errors
+from stopgo.planner.overlap.network_error import error_ellipses, information_of, network_errors
 from stopgo.planner.overlap.pairs import error_of
 
 
@@ -43,14 +44,20 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PredictedErrors:
-    """Standard deviations of a network's scans, and their frame."""
+    """Standard error ellipses of a network's scans, and their frame."""
 
-    m: FloatArray
-    """Of each stop's scan in its worst direction, metres, in the order of driving (n,)."""
+    ellipses: FloatArray
+    """Of each stop's scan in the order of driving (n, 3): half axes in metres, and radians from +x."""
     frame: str
     """The stop that holds the frame, or "control points"."""
 
+    @property
+    def m(self) -> FloatArray:
+        """Standard deviation of each scan in its worst direction, metres (n,)."""
+        return self.ellipses[:, 0]
 
+
+@instance_cached
 def predicted_errors(route: Route) -> PredictedErrors:
     """Predict the error of every stop's scan; a scan that nothing holds has the error infinity."""
     overlaps, stops = _overlaps_of_stops(route), _names(route)
@@ -58,8 +65,22 @@ def predicted_errors(route: Route) -> PredictedErrors:
     ends = [(number[pair.a], number[pair.b]) for pair in registered_pairs(route)]
     xy = route.xy - local_origin(route.space.floor)
     information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
-    errors, frame = network_errors(xy, ends, information, seen_control(route.space, xy))
-    return PredictedErrors(errors, "control points" if frame is None else stops[frame])
+    covariances, frame = network_errors(xy, ends, information, seen_control(route.space, xy))
+    ellipses = error_ellipses(covariances)
+    return PredictedErrors(ellipses, "control points" if frame is None else stops[frame])
+
+
+def error_of_stop(route: Route, k: int) -> PositionError | UnsetType:
+    """The predicted error of the k-th stop's scan in driving order; none if no pair or point holds it."""
+    major, minor, direction = predicted_errors(route).ellipses[k].tolist()
+    if not math.isfinite(major) or len(route.order) < 2:
+        return UNSET
+    round_ = major - minor < ROUND_M
+    return PositionError(
+        major_m=round(major, ERROR_DIGITS),
+        minor_m=round(minor, ERROR_DIGITS),
+        direction=0.0 if round_ else round(direction, DIRECTION_DIGITS) % round(math.pi, DIRECTION_DIGITS),
+    )
 
 
 def inaccurate(route: Route) -> Iterator[Finding]:
@@ -97,6 +118,10 @@ def _settings(route: Route) -> Settings:
     return route.settings
 
 
+ERROR_DIGITS, DIRECTION_DIGITS = 5, 2
+"""Decimals of an error ellipse in a mission: metres, and radians."""
+ROUND_M = 5e-5
+"""Difference of the half axes below which an ellipse is a circle without direction."""
 SCANS_APART = ("scans_apart", "scans_not_joined")
 """Codes of findings about scans that are not connected: with a required overlap, and without."""
 
@@ -108,10 +133,11 @@ def scans_apart(route: Route) -> Iterator[Finding]:
     _, *others = Network(tuple(names), registered_pairs(route)).pieces or ((),)
     if not settings.registers:
         if others:
+            how = "without --no-register" if settings.register is False else "with --register"
             yield Finding(
                 "scans_not_joined",
                 f"the scans fall into {len(others) + 1} components that no common surfaces connect; set up "
-                "target spheres, or plan with --register",
+                f"target spheres, or plan {how}",
             )
         return
     called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]

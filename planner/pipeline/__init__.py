@@ -100,7 +100,7 @@ UNDIVIDED = -1
 
 def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) -> Plan:
     """Plan one part, and divide its stops among robots or tours."""
-    from stopgo.mission.document import MissionShare
+    from stopgo.mission.document import MissionAllocation
     from stopgo.mission.plan import DividedPlan, PartPlan, Plan
     from stopgo.planner.appraisal.figures_of_route import figures_of_share
     from stopgo.planner.routing.assemble import assemble
@@ -111,8 +111,8 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     whole = _part(driven, UNDIVIDED, planned, observe)
     shares = []
     for k, route in enumerate(division.routes):
-        share = MissionShare(kind=division.kind, number=k + 1, of=len(division.routes))
-        mission = assemble(route, part=k, share=share)
+        allocation = MissionAllocation(kind=division.kind, number=k + 1, of=len(division.routes))
+        mission = assemble(route, part=k, allocation=allocation)
         shares.append(PartPlan(route, figures_of_share(route, whole.figures), mission))
     made = DividedPlan(division.kind, whole, tuple(shares), division.limit_s, division.bound, division.method)
     observe(made)

@@ -16,11 +16,11 @@ from msgspec import UNSET
 from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.as_driven import AsDriven
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.own_floor import must_be_own_floor
-from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 from stopgo.mission.settings import Settings
@@ -85,7 +85,7 @@ def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
         When the file cannot be read.
     """
     must_be_own_floor(path, mission)
-    settings = read_settings(None, mission.origin.parameters)
+    settings = recorded_settings(mission.origin.parameters)
     return PlannedFloor(read_floor(path, options_of(settings)), settings, mission)
 
 
@@ -179,7 +179,8 @@ def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(totals_of_plan(known.seen), asked=frozen([1], np.int64))
     return (
-        once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage or 0.0
+        once.coverage(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage
+        or 0.0
     )
 
 
@@ -237,9 +238,9 @@ def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float
     asked = {"coverage": math.floor(coverage * 1e6) / 1e6, "room_coverage": 0.0, "kind_coverage": 0.0}
     parameters = {**mission.origin.parameters, **asked}
     parameters.pop("views", None)
-    settings = read_settings(None, parameters)
+    settings = recorded_settings(parameters)
     basis = f"{before.id}:{before.revision}:{evidence}:{mission.digest}"
-    return sealed(
+    return with_digest(
         changed(
             mission,
             id=hashlib.sha256(basis.encode()).hexdigest()[:32],

@@ -81,7 +81,7 @@ class _SweepCounts:
         along = targets.b - targets.a
         self._along = along / np.maximum(np.hypot(*along.T), 1e-12)[:, None]
         self.hit: BoolArray = np.zeros(targets.total, bool)
-        self.points = 0
+        self.points, self.sweeps = 0, 0
         self.edges = np.linspace(-WIDEST_M, WIDEST_M, BINS + 1)
         self.histogram: IntArray = np.zeros((len(space.floor.elements), BINS), np.int64)
         rings = [polygon.exterior for polygon in space.floor.outline]
@@ -93,7 +93,7 @@ class _SweepCounts:
 
     def add(self, points: FloatArray) -> None:
         points = points[np.isfinite(points).all(axis=1)]
-        self.points += len(points)
+        self.points, self.sweeps = self.points + len(points), self.sweeps + 1
         if not len(points):
             return
         distance, unit = self.units.query(
@@ -143,5 +143,5 @@ def _unplanned(counts: _SweepCounts, space: NavigableSpace, least: int) -> list[
                 + np.concatenate([own, own + 1, own + np.array([0, 1]), own + np.array([1, 0])]) * CELL_M
             )
             hits = int(counts.cells[tuple(own.T)].max())
-            found.append(Unplanned(hull_of(corners, margin=MARGIN_M), hits))
+            found.append(Unplanned(hull_of(corners, margin=MARGIN_M), hits, counts.sweeps))
     return sorted(found, key=lambda item: -item.hits)

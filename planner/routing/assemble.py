@@ -13,14 +13,14 @@ from stopgo.mission import __version__
 from stopgo.mission.document import (
     Frame,
     Mission,
-    MissionShare,
+    MissionAllocation,
     Point,
     Sees,
     Start,
     Stop,
     mission_id,
-    sealed,
     stop_names,
+    with_digest,
 )
 from stopgo.mission.document.specs import (
     DECIMALS,
@@ -39,34 +39,34 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace, Route
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.overlap.registered import registered_pairs
+from stopgo.planner.overlap.registered import error_of_stop, registered_pairs
 from stopgo.planner.routing import GRAPHS
 from stopgo.planner.space.gaps import CLEAR_SLACK, Walls, keeps_clear
 from stopgo.planner.space.reach import walls_of
 
 
 def assemble(
-    route: Route, *, part: int = 0, revision: int = 1, share: MissionShare | UnsetType = UNSET
+    route: Route, *, part: int = 0, revision: int = 1, allocation: MissionAllocation | UnsetType = UNSET
 ) -> Mission:
     """The mission of a route; `part` numbers the missions of a floor that has several.
 
-    `share` identifies it among several missions that together reach the coverage of the floor's plan.
+    `allocation` identifies it among several missions that together reach the coverage of the floor's plan.
     """
     space = route.space
     settings, floor = space.settings, space.floor
     check_legs(route)
-    return sealed(
+    return with_digest(
         Mission(
             id=mission_id(floor.source, settings, __version__, part),
             revision=revision,
-            name=_name(floor.name, part, share),
+            name=_name(floor.name, part, allocation),
             digest="",
             frame=Frame(name="map", to_map=SAME) if floor.on_robots_map else Frame(name="site"),
             georeference=_georeference(space),
             robot=robot_of(settings),
             scanner=scanner_of(settings),
             limits=limits_spec_of(settings),
-            share=share,
+            share=allocation,
             start=Start(
                 x=rounded(route.start[0]),
                 y=rounded(route.start[1]),
@@ -82,9 +82,9 @@ def assemble(
     )
 
 
-def _name(floor: str, part: int, share: MissionShare | UnsetType) -> str:
-    if share is not UNSET:
-        return f"{floor} {share.kind} {share.number} of {share.of}"
+def _name(floor: str, part: int, allocation: MissionAllocation | UnsetType) -> str:
+    if allocation is not UNSET:
+        return f"{floor} {allocation.kind} {allocation.number} of {allocation.of}"
     return floor if part <= 0 else f"{floor}-{part + 1}"
 
 
@@ -110,7 +110,9 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
         sees = Sees(units=len(units), new_units=new)
         doorway = int(row) in doorways
         stops.append(_stop(name, approach, heading, sees, settings, doorway=doorway))
-    return tuple(stops)
+    if not settings.registers:
+        return tuple(stops)
+    return tuple(msgspec.structs.replace(stop, error=error_of_stop(route, k)) for k, stop in enumerate(stops))
 
 
 def _scan_heading(candidates: Candidates, row: int, arrival: float) -> float:

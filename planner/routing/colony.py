@@ -67,15 +67,15 @@ def _walks(attraction: FloatArray, random: np.random.Generator) -> IntArray:
         tours[:, step] = at
         left[ants, at] = False
         if step + 1 < n:
-            share = np.cumsum(np.where(left, attraction[at], 0.0), axis=1)
-            drawn = random.random(len(ants)) * share[:, -1]
-            at = _first_above(share, drawn, left)
+            fraction = np.cumsum(np.where(left, attraction[at], 0.0), axis=1)
+            drawn = random.random(len(ants)) * fraction[:, -1]
+            at = _first_above(fraction, drawn, left)
     return tours
 
 
-def _first_above(share: FloatArray, drawn: FloatArray, left: IntArray) -> IntArray:
+def _first_above(fraction: FloatArray, drawn: FloatArray, left: IntArray) -> IntArray:
     """The point of each draw; the first point left if all fractions are too small to distinguish."""
-    found = np.argmax(share > drawn[:, None], axis=1)
+    found = np.argmax(fraction > drawn[:, None], axis=1)
     seen = ~left[np.arange(len(found)), found]
     found[seen] = np.argmax(left[seen], axis=1)
     return found

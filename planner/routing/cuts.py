@@ -17,13 +17,13 @@ LITTLE = 1e-6
 """Fractions and violations below this are the solver's noise."""
 
 
-def violated_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
+def violated_cuts(points: int, edges: IntArray, fraction: FloatArray) -> list[Cut]:
     """Cuts violated by the fractions (m,) of the edges (m, 2); none if this cheap search finds none."""
-    labels = _components(points, edges[share > LITTLE])
+    labels = _components(points, edges[fraction > LITTLE])
     if labels.max() > 0:
         sets = [labels == k for k in range(int(labels.max()) + 1)]
         return [_leave_twice(edges, inside) for inside in sets]
-    return _small_cuts(points, edges, share) or _odd_cuts(points, edges, share)
+    return _small_cuts(points, edges, fraction) or _odd_cuts(points, edges, fraction)
 
 
 def _components(points: int, edges: IntArray) -> IntArray:
@@ -40,15 +40,15 @@ def _leave_twice(edges: IntArray, inside: BoolArray) -> Cut:
     return Cut(_leaving(edges, inside).astype(np.int64), 2)
 
 
-def _small_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
+def _small_cuts(points: int, edges: IntArray, fraction: FloatArray) -> list[Cut]:
     """Cuts of sets that fewer than two edges leave (Stoer and Wagner, J. ACM 1997).
 
     Points joined by a whole edge are merged: some smallest cut does not separate them.
     """
-    group = _components(points, edges[share > 1 - LITTLE])
+    group = _components(points, edges[fraction > 1 - LITTLE])
     m = int(group.max()) + 1
     weight = np.zeros((m, m))
-    np.add.at(weight, (group[edges[:, 0]], group[edges[:, 1]]), share)
+    np.add.at(weight, (group[edges[:, 0]], group[edges[:, 1]]), fraction)
     weight += weight.T
     np.fill_diagonal(weight, 0.0)
     members = [group == k for k in range(m)]
@@ -79,20 +79,20 @@ def _most_tightly(weight: FloatArray, left: list[int]) -> tuple[int, int, float]
     return before, last, value
 
 
-def _odd_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
+def _odd_cuts(points: int, edges: IntArray, fraction: FloatArray) -> list[Cut]:
     """Blossom cuts of sets that an odd number of edges leaves: components of fractional edges."""
-    partly = (share > LITTLE) & (share < 1 - LITTLE)
+    partly = (fraction > LITTLE) & (fraction < 1 - LITTLE)
     labels = _components(points, edges[partly])
     cuts = []
     for label in range(int(labels.max()) + 1):
         leaving = np.flatnonzero(_leaving(edges, labels == label))
         if not len(leaving):
             continue
-        used = share[leaving] > 0.5
+        used = fraction[leaving] > 0.5
         if used.sum() % 2 == 0:
-            doubtful = int(np.argmin(np.abs(share[leaving] - 0.5)))
+            doubtful = int(np.argmin(np.abs(fraction[leaving] - 0.5)))
             used[doubtful] = not used[doubtful]
-        if np.where(used, 1 - share[leaving], share[leaving]).sum() < 1 - 10 * LITTLE:
+        if np.where(used, 1 - fraction[leaving], fraction[leaving]).sum() < 1 - 10 * LITTLE:
             times = np.zeros(len(edges), dtype=np.int64)
             times[leaving] = np.where(used, -1, 1)
             cuts.append(Cut(times, 1 - int(used.sum())))

@@ -80,14 +80,14 @@ def _branch_and_bound(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
     done, made = known.length, 0
     while heap and relaxation.solved < SOLVE_LIMIT:
         least, _, low, high = heapq.heappop(heap)
-        least, share = _bounded(relaxation, low, high, least, known.length)
-        whole = np.abs(share - 0.5) >= 0.5 - WHOLE
+        least, fraction = _bounded(relaxation, low, high, least, known.length)
+        whole = np.abs(fraction - 0.5) >= 0.5 - WHOLE
         if whole.all():
-            known = _better(cost, edges[share > 0.5], known)
+            known = _better(cost, edges[fraction > 0.5], known)
         if whole.all() or known.length - least <= CLOSE:
             done = min(done, least)
             continue
-        split = int(np.argmin(np.abs(share - 0.5)))
+        split = int(np.argmin(np.abs(fraction - 0.5)))
         for part in (_fixed(low, high, split, 1), _fixed(low, high, split, 0)):
             made += 1
             heapq.heappush(heap, (least, made, *part))
@@ -99,13 +99,13 @@ def _bounded(
 ) -> tuple[int, FloatArray]:
     """A bound on the tours that use each edge from `low` to `high` times, and the relaxed solution."""
     while True:
-        share = relaxation.solve(low, high)
+        fraction = relaxation.solve(low, high)
         least = max(least, relaxation.bound(low, high))
         if best - least <= CLOSE or relaxation.solved >= SOLVE_LIMIT:
-            return least, share
-        cuts = violated_cuts(relaxation.points, relaxation.edges, share)
+            return least, fraction
+        cuts = violated_cuts(relaxation.points, relaxation.edges, fraction)
         if not cuts:
-            return least, share
+            return least, fraction
         for cut in cuts:
             relaxation.add(cut)
 

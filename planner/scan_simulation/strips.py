@@ -124,9 +124,9 @@ def _pieces(solids: ExtrudedFloor, targets: Targets) -> tuple[IntArray, IntArray
         if low >= high:
             continue
         at = solids.a[f] + ((np.arange(low, high) + 0.5) * PIECE_M)[:, None] * u
-        share = (at - a) @ (b - a) / ((b - a) @ (b - a))
+        fraction = (at - a) @ (b - a) / ((b - a) @ (b - a))
         count, begin = int(targets.units[s]), int(targets.first_unit[s])
-        found = begin + np.clip((share * count).astype(np.int64), 0, count - 1)
+        found = begin + np.clip((fraction * count).astype(np.int64), 0, count - 1)
         sides = [0, 1] if not targets.occluding[s] else [0] if (b - a) @ u > 0 else [1]
         units[first[f] + low : first[f] + high, sides] = found[:, None]
     return first, units
@@ -156,8 +156,8 @@ def _patches(targets: Targets, is_beam: BoolArray, origin: FloatArray) -> tuple[
     offsets = np.arange(-UNDER_M, UNDER_M + 1e-9, PATCH_M / 2)
     key, owner = [], []
     for offset in offsets[np.argsort(np.abs(offsets), kind="stable")]:
-        for share in (0.0, -0.5, 0.5):
-            key.append(patches_at(middle + share * half * along + offset * across))
+        for fraction in (0.0, -0.5, 0.5):
+            key.append(patches_at(middle + fraction * half * along + offset * across))
             owner.append(unit)
     patches, first = np.unique(np.concatenate(key), return_index=True)
     return patches, np.concatenate(owner)[first]

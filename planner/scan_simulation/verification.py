@@ -22,7 +22,7 @@ from stopgo.mission.geometry import BoolArray, FloatArray, frozen
 from stopgo.mission.proof.plan_proof import (
     CloudQuality,
     PlanProof,
-    PromisedShare,
+    PromisedCoverage,
     ProvenArea,
     ScanCloud,
     ScanNetwork,
@@ -117,8 +117,8 @@ def _areas(
     for name, claimed in surface.kinds.items():
         own = there & (of_cell == name)
         seen = float(strips.area[own & tally.hit].sum())
-        share = claimed.seen_m2 / claimed.total_m2 if claimed.total_m2 else 1.0
-        found.append(ProvenArea(name, claimed.total_m2, share, float(strips.area[own].sum()), seen))
+        fraction = claimed.seen_m2 / claimed.total_m2 if claimed.total_m2 else 1.0
+        found.append(ProvenArea(name, claimed.total_m2, fraction, float(strips.area[own].sum()), seen))
     return tuple(found)
 
 
@@ -278,15 +278,15 @@ class _PointTally:
         incidence = np.degrees(self._incidence[hit])
         seen = float(area[hit].sum())
 
-        def share(mask: BoolArray) -> float:
+        def fraction(mask: BoolArray) -> float:
             return float(area[hit][mask].sum() / seen) if seen else 0.0
 
         return CloudQuality(
             total_m2=float(area.sum()),
             seen_m2=seen,
-            by_spacing_mm={limit: share(spacing <= limit) for limit in SPACINGS_MM},
-            by_incidence_deg={limit: share(incidence <= limit) for limit in INCIDENCES_DEG},
-            by_stops={limit: share(self._stops[hit] >= limit) for limit in STOPS},
+            by_spacing_mm={limit: fraction(spacing <= limit) for limit in SPACINGS_MM},
+            by_incidence_deg={limit: fraction(incidence <= limit) for limit in INCIDENCES_DEG},
+            by_stops={limit: fraction(self._stops[hit] >= limit) for limit in STOPS},
         )
 
 
@@ -318,24 +318,24 @@ class _PromisedCoverage:
             sum(stop.sees.new_units for stop in mission.stops),
         )
 
-    def whole(self, seen: BoolArray) -> PromisedShare:
+    def whole(self, seen: BoolArray) -> PromisedCoverage:
         every = np.ones(len(seen), dtype=bool)
         if self.units is None:
             mean = float(self.weight.mean())
             got = int(seen.sum())
-            kept, beyond = min(got, self.claimed) * mean, max(0, got - self.claimed) * mean
-            return PromisedShare("all", self.claimed * mean, kept, beyond)
+            acquired, beyond = min(got, self.claimed) * mean, max(0, got - self.claimed) * mean
+            return PromisedCoverage("all", self.claimed * mean, acquired, beyond)
         stated = None if self.coverage is None else self.coverage.total.coverage
-        return self._share(
+        return self._coverage(
             "all", every, seen, coverage=stated, required=self._required(self.space.settings.coverage)
         )
 
-    def rooms(self, seen: BoolArray) -> tuple[PromisedShare, ...]:
+    def rooms(self, seen: BoolArray) -> tuple[PromisedCoverage, ...]:
         """Rooms with promised or acquired targets, in the floor's order."""
         stated = {} if self.coverage is None else {row.room: row.coverage for row in self.coverage.rooms}
         names = [room.name for room in self.space.rooms]
-        shares = [
-            self._share(
+        groups = [
+            self._coverage(
                 name,
                 self.space.unit_room == k,
                 seen,
@@ -344,15 +344,15 @@ class _PromisedCoverage:
             )
             for k, name in enumerate(names)
         ]
-        shares.append(self._share(OUTSIDE, self.space.unit_room < 0, seen))
-        return tuple(share for share in shares if share.promised or share.kept or share.beyond)
+        groups.append(self._coverage(OUTSIDE, self.space.unit_room < 0, seen))
+        return tuple(group for group in groups if group.promised or group.acquired or group.beyond)
 
-    def kinds(self, seen: BoolArray) -> tuple[PromisedShare, ...]:
+    def kinds(self, seen: BoolArray) -> tuple[PromisedCoverage, ...]:
         targets, elements = self.space.targets, self.space.floor.elements
         kind = np.array([item.kind for item in elements])[targets.element[targets.unit_segment]]
         stated = {} if self.coverage is None else self.coverage.kinds
         return tuple(
-            self._share(
+            self._coverage(
                 str(name),
                 kind == name,
                 seen,
@@ -373,7 +373,7 @@ class _PromisedCoverage:
         masks = {reason: self.units & ~seen & sighted, HIDDEN: self.units & ~seen & ~sighted}
         return {name: float(self.weight[mask].sum()) for name, mask in masks.items() if mask.any()}
 
-    def _share(
+    def _coverage(
         self,
         name: str,
         member: BoolArray,
@@ -381,14 +381,14 @@ class _PromisedCoverage:
         *,
         coverage: float | None = None,
         required: float | None = None,
-    ) -> PromisedShare:
+    ) -> PromisedCoverage:
         promised = member & (self.units if self.units is not None else False)
 
         def amount(mask: BoolArray) -> float:
             return float(self.weight[mask].sum())
 
-        kept, beyond = amount(promised & seen), amount(member & seen & ~promised)
-        return PromisedShare(name, amount(promised), kept, beyond, coverage, required)
+        acquired, beyond = amount(promised & seen), amount(member & seen & ~promised)
+        return PromisedCoverage(name, amount(promised), acquired, beyond, coverage, required)
 
 
 def _sighted(space: NavigableSpace, solids: ExtrudedFloor, pose: ScannerPose, ceiling: float) -> BoolArray:

@@ -124,7 +124,7 @@ def _connected(
         rows, bound = connected(task, Searches.default(settings), rounds=ROUNDS)
     else:
         rows, bound = connected(task, lambda cover, *_: _solved(method, cover, settings), rounds=1)
-    if method.ours:
+    if method.ours and bound < len(rows):
         bound = max(bound, lower_bound(task.problem, found=len(rows)))
     problem = whole.after(fixed)
     others = in_greedy_order(problem, np.setdiff1d(rows, fixed))

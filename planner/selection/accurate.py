@@ -15,7 +15,7 @@ from stopgo.mission.stages import Selection
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap import CONFIDENCE, overlaps_of, registers
 from stopgo.planner.overlap.control import seen_control
-from stopgo.planner.overlap.network_error import information_of, network_errors
+from stopgo.planner.overlap.network_error import information_of, network_errors, worst_errors
 from stopgo.planner.selection import cover_problem, coverage_steps
 
 MOST_TRIED = 40
@@ -62,7 +62,7 @@ class _RowNetwork:
         pairs = [(a, b) for a in rows for b in self._registering(a) if b in number and a < b]
         ends = [(number[a], number[b]) for a, b in pairs]
         xy, information = self._xy[rows], [self._of(*pair) for pair in pairs]
-        errors, _ = network_errors(xy, ends, information, seen_control(self._space, xy))
+        errors = worst_errors(network_errors(xy, ends, information, seen_control(self._space, xy))[0])
         finite = np.where(np.isfinite(errors), errors, 0.0)
         return float(finite.max()), rows[int(np.argmax(finite))]
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.linear_programme import minimised
 
@@ -101,6 +102,7 @@ class _Priced:
         return np.where(cost < 0, 1.0, np.where(self._weight > 0, bought, 0.0))
 
 
+@instance_cached
 def relaxation_bound(cover: Cover) -> int:
     """Rounded-up optimum of: min Σ x_i, v_j y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 

@@ -45,6 +45,8 @@ class ConnectedCover:
     regions: list[IntArray] = field(init=False)
     """Connected components of the rows offered; only as many of them as are needed."""
     cuts: dict[bytes, IntArray] = field(default_factory=dict)
+    _problems: dict[int, Cover] = field(default_factory=dict)
+    """By the number of cuts, so that the same problem is the same instance; only the latest."""
 
     def __post_init__(self) -> None:
         self.regions = regions_of(self.cover, components_of(self.links, self.offered))
@@ -52,6 +54,11 @@ class ConnectedCover:
     @property
     def problem(self) -> Cover:
         """The covering problem with one demand for each separator found."""
+        if len(self.cuts) not in self._problems:
+            self._problems = {len(self.cuts): self._with_cuts()}
+        return self._problems[len(self.cuts)]
+
+    def _with_cuts(self) -> Cover:
         rows = np.sort(np.concatenate([np.empty(0, np.int64), *self.regions]))
         return self.cover.offering(rows).with_one_of_each(list(self.cuts.values()))
 

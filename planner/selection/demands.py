@@ -36,15 +36,15 @@ def demands_of(visibility: Visibility) -> Demands:
     settings, targets = space.settings, visibility.targets
     weight = np.where(visibility.visible, weights_of(targets, settings), 0)
     whole = np.zeros(targets.total, dtype=np.int64)
-    room_share, kind_share = settings.least_of_room, settings.least_of_kind
-    if room_share is None or kind_share is None:
+    room_fraction, kind_fraction = settings.least_of_room, settings.least_of_kind
+    if room_fraction is None or kind_fraction is None:
         return Demands(frozen(weight, np.int64), whole[None, :], frozen([settings.coverage]))
     kinds = sorted({item.kind for item in space.floor.elements})
     kind_of = np.array([kinds.index(item.kind) for item in space.floor.elements], dtype=np.int64)
     rooms = len(space.rooms)
     kind = 1 + rooms + kind_of[targets.element[targets.unit_segment]]
     room = np.where(space.unit_room >= 0, 1 + space.unit_room, -1)
-    fraction = [settings.coverage, *[room_share] * rooms, *[kind_share] * len(kinds)]
+    fraction = [settings.coverage, *[room_fraction] * rooms, *[kind_fraction] * len(kinds)]
     return Demands(frozen(weight, np.int64), np.stack([whole, room, kind]), frozen(fraction))
 
 

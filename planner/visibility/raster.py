@@ -100,11 +100,11 @@ def crossed_by(edges: FloatArray) -> IntArray:
     every = np.arange(len(edges))
     cuts = [(every, np.zeros(len(edges))), (every, np.ones(len(edges)))]
     cuts += [_border_cuts(edges[:, :, axis]) for axis in range(2)]
-    edge, share = (np.concatenate(column) for column in zip(*cuts, strict=True))
-    order = np.lexsort((share, edge))
-    edge, share = edge[order], share[order]
+    edge, fraction = (np.concatenate(column) for column in zip(*cuts, strict=True))
+    order = np.lexsort((fraction, edge))
+    edge, fraction = edge[order], fraction[order]
     same = np.flatnonzero(np.diff(edge) == 0)
-    edge, middle = edge[same], (share[same] + share[same + 1]) / 2
+    edge, middle = edge[same], (fraction[same] + fraction[same + 1]) / 2
     start, end = edges[edge, 0], edges[edge, 1]
     return _cells(start + middle[:, None] * (end - start), 1.0)
 

@@ -209,8 +209,8 @@ def _heights_at(t: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     for a, b in ((0, 1), (1, 2), (2, 0)):
         span = t[:, b] - t[:, a]
         level = np.abs(span) < 1e-9
-        share = np.clip(-t[:, a] / np.where(level, 1.0, span), 0.0, 1.0)
-        at = z[:, a] + share * (z[:, b] - z[:, a])
+        fraction = np.clip(-t[:, a] / np.where(level, 1.0, span), 0.0, 1.0)
+        at = z[:, a] + fraction * (z[:, b] - z[:, a])
         on = (
             ~level
             & (np.minimum(t[:, a], t[:, b]) <= ON_FACE_M)
@@ -289,14 +289,16 @@ class _MarkedColumns:
         clear = np.ones(z.shape, dtype=bool)
         for step in np.arange(STEP_M, float(before.max(initial=0.0)), STEP_M):
             on = np.flatnonzero(before > step)
-            share = step / away[on]
-            at = np.floor((starts[on] + share[:, None] * rays[on] - self._low) / self._side).astype(np.int64)
+            fraction = step / away[on]
+            at = np.floor((starts[on] + fraction[:, None] * rays[on] - self._low) / self._side).astype(
+                np.int64
+            )
             at = np.clip(at, 0, np.array(self._shape) - 1)
             pattern = self._bits[at[:, 0] * self._shape[1] + at[:, 1]]
             met = np.flatnonzero(pattern)
             if len(met):
                 rows = on[met]
-                level = np.floor((height + (z[rows] - height) * share[met, None]) / self._tall)
+                level = np.floor((height + (z[rows] - height) * fraction[met, None]) / self._tall)
                 level = np.clip(level, 0, LEVELS - 1).astype(np.uint64)
                 clear[rows] &= (pattern[met, None] >> level) & np.uint64(1) == 0
         return clear

@@ -213,7 +213,7 @@ def _run(comparison: Comparison) -> IndexedRun:
         scanned=comparison.scanned,
         asked=len(comparison.asked),
         deviation_m=comparison.greatest_deviation_m,
-        coverage=None if acquired is None else acquired.shares.whole.coverage,
+        coverage=None if acquired is None else acquired.coverage.whole.coverage,
         answer=judge(comparison).answer,
     )
 

@@ -83,8 +83,8 @@ def _coverage_table(figures: Figures | None) -> list[str]:
         return []
     unit = figures.unit
     lines = ["## Coverage", "", f"| | all, {unit} | visible | covered | coverage |", "|---|---|---|---|---|"]
-    for share in (figures.whole, *figures.kinds, *figures.rooms):
-        lines.append(f"| {' | '.join((plain(share.name), *share.cells))} |")
+    for group in (figures.whole, *figures.kinds, *figures.rooms):
+        lines.append(f"| {' | '.join((plain(group.name), *group.cells))} |")
     if figures.quality is not None:
         lines += ["", f"{figures.quality.text(unit)}:", ""]
         lines += [f"- {item.words}: {item.text}" for item in figures.quality.costs]

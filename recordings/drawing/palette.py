@@ -82,6 +82,7 @@ RAY: Colour = (235, 215, 110, 70)
 EYE: Colour = (255, 235, 120, 255)
 PAIR: Colour = (60, 190, 150, 160)
 BRIDGE: Colour = VERMILION
+ERROR: Colour = (90, 180, 230, 220)
 WITHDRAWN: Colour = (112, 112, 122, 255)
 ROUTE: Colour = YELLOW
 RETURN: Colour = (158, 150, 60, 255)

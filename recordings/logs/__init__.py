@@ -54,7 +54,8 @@ READERS = (
         loader("stopgo.recordings.logs.telemetry_log:read_telemetry_log"),
     ),
     LogFormat(
-        "trajectory", (".tum", ".txt", ".csv", ".tsv"), (), loader("stopgo.recordings.logs.tables:read_table")
+        "trajectory", (".tum", ".kitti", ".txt", ".csv", ".tsv"), (),
+        loader("stopgo.recordings.logs.tables:read_table"),
     ),
 )  # fmt: skip
 """Formats that can be read; a folder is a rosbag2."""

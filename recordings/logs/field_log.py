@@ -209,6 +209,10 @@ def poses_of(
     )  # fmt: skip
 
 
+WALL_S = 1e9
+"""Times from September 2001 on count as seconds since 1970."""
+LATEST_S = 9e9
+"""Limit of times: more nanoseconds have no int64."""
 FARTHEST = 1e9
 """Limit of coordinates in metres, as in a plan's parameters."""
 GAP_S = 1.0

@@ -5,12 +5,14 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.recordings.logs import foxglove
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Sweep, fixes_of, poses_of
 from stopgo.recordings.logs.files import digest_of
 from stopgo.recordings.logs.ros_bag import Bag, Damaged, Topic, UnknownType, files_of, salvaged_bag, whole_bag
@@ -18,8 +20,10 @@ from stopgo.recordings.logs.ros_poses import TYPES, WITH_CHILD, PoseColumns, hea
 from stopgo.recordings.logs.ros_sweeps import SWEEPS
 from stopgo.recordings.logs.transforms import TransformTree
 
-TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
-FIX, BATTERY = "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/BatteryState"
+POSES = (*TYPES, *foxglove.POSES)
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage", *foxglove.TRANSFORMS)
+FIXES = ("sensor_msgs/msg/NavSatFix", *foxglove.FIXES)
+BATTERY = "sensor_msgs/msg/BatteryState"
 SIMULATED_BELOW_NS = 10**18
 """Times before September 2001 are simulated, or count from a start."""
 NOT_THE_ROBOT = ("goal", "target", "setpoint", "initialpose", "plan", "desired", "reference")
@@ -40,11 +44,22 @@ def read_ros(path: Path, reading: Reading) -> FieldLog:
         with whole_bag(path) as bag:
             return _read_bag(path, bag, reading)
     except Damaged as damage:
-        with salvaged_bag(path, str(damage)) as bag:
+        with _readable_bag(path, damage) as bag:
             found = _read_bag(path, bag, reading)
-    if not found.messages:
+    if not found.messages and not found.oddities:
         raise InputError(f"{path}: nothing in it can be read ({found.lost}); incomplete copy?")
     return found
+
+
+@contextmanager
+def _readable_bag(path: Path, damage: Damaged) -> Iterator[Bag]:
+    """Open a bag that rosbags does not read: one with JSON, else the readable part of a damaged one."""
+    with foxglove.json_bag(files_of(path)) as bag:
+        if bag is not None:
+            yield bag
+            return
+    with salvaged_bag(path, str(damage)) as bag:
+        yield bag
 
 
 def _read_bag(path: Path, bag: Bag, reading: Reading) -> FieldLog:
@@ -71,13 +86,13 @@ def _read_bag(path: Path, bag: Bag, reading: Reading) -> FieldLog:
         mounts=sorter.mounts(),
         sweeps=lambda: _sweeps(path, reading),
         lost=bag.lost(),
-        oddities=sorter.oddities(),
+        oddities=(*bag.notes, *sorter.oddities()),
     )
 
 
 def _format(path: Path, bag: Bag) -> str:
-    if not bag.ros2:
-        return "ROS 1 bag"
+    if bag.form or not bag.ros2:
+        return bag.form or "ROS 1 bag"
     kinds = sorted({file.name.removesuffix(".zstd").rpartition(".")[2] for file in files_of(path)})
     return f"ROS 2 bag ({', '.join(kinds)})"
 
@@ -106,7 +121,7 @@ class _TopicSorter:
     """First and last time."""
 
     def wants(self, topic: Topic) -> bool:
-        return topic.msgtype in (*TYPES, *TRANSFORMS, FIX, BATTERY)
+        return topic.msgtype in (*POSES, *TRANSFORMS, *FIXES, BATTERY)
 
     def take(self, topic: Topic, ns: int, raw: bytes) -> None:
         self.counts[topic] += 1
@@ -125,11 +140,13 @@ class _TopicSorter:
             self.faults[f"{topic.name}: bytes that are not a {topic.msgtype}"] += 1
 
     def _handler_of(self, topic: Topic) -> Callable[[Topic, int, bytes], None] | None:
-        if topic.msgtype in TYPES:
+        if topic.msgtype in POSES:
             return self._pose
         if topic.msgtype in TRANSFORMS:
             return self._transforms
-        return {FIX: self._fix, BATTERY: self._charge}.get(topic.msgtype)
+        if topic.msgtype in FIXES:
+            return self._fix
+        return self._charge if topic.msgtype == BATTERY else None
 
     def _pose(self, topic: Topic, ns: int, raw: bytes) -> None:
         if topic.name not in self.columns:
@@ -259,7 +276,7 @@ def _sweeps(path: Path, reading: Reading) -> Iterator[Sweep]:
             for _ in bag.messages(bag.topics):  # damage is found only by reading
                 pass
     except Damaged as damage:
-        with salvaged_bag(path, str(damage)) as bag:
+        with _readable_bag(path, damage) as bag:
             yield from _sweeps_of(bag, reading)
         return
     with whole_bag(path) as bag:

@@ -45,6 +45,10 @@ class Bag:
     """Decoder of a message into an object; raises UnknownType for unknown types."""
     lost: Callable[[], str] = lambda: ""
     """Unreadable part of the bag; complete only after all messages were read."""
+    form: str = ""
+    """Name of its format, if it is no ROS bag."""
+    notes: tuple[str, ...] = ()
+    """Content that is not read, one line each."""
 
 
 class UnknownType(Exception):

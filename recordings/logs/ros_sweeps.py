@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray
+from stopgo.recordings.logs.foxglove import on_mount
 
 
 def _of_laser_scan(message: Any) -> FloatArray:
@@ -47,8 +48,15 @@ def _of_point_cloud(message: Any) -> FloatArray:
     return xyz[np.isfinite(xyz).all(axis=1)]
 
 
+def _mounted(points: Callable[[Any], FloatArray]) -> Callable[[Any], FloatArray]:
+    """Return the function for a message that also has the pose of its scanner."""
+    return lambda message: on_mount(points(message), message.mount)
+
+
 SWEEPS: dict[str, Callable[[Any], FloatArray]] = {
     "sensor_msgs/msg/LaserScan": _of_laser_scan,
     "sensor_msgs/msg/PointCloud2": _of_point_cloud,
+    "foxglove.LaserScan": _mounted(_of_laser_scan),
+    "foxglove.PointCloud": _mounted(_of_point_cloud),
 }
 """Function per type that returns its points (n, 3)."""

@@ -38,6 +38,8 @@ class BagConnection(NamedTuple):
     msgtype: str
     """Message type with `/msg/` in the middle, as ROS 2 writes it."""
     definition: str
+    encoding: str = ""
+    """Encoding of the messages, where the bag names it: `cdr`, `json`, `protobuf`."""
 
 
 @dataclass
@@ -64,7 +66,7 @@ class _Loss:
     def __str__(self) -> str:
         more = len(self.lines) - LOSSES_NAMED
         rest = [f"and {more} more losses"] if more > 0 else []
-        return "; ".join([self.why, *self.lines[:LOSSES_NAMED], *rest])
+        return "; ".join(line for line in (self.why, *self.lines[:LOSSES_NAMED], *rest) if line)
 
 
 LOSSES_NAMED = 3
@@ -111,6 +113,12 @@ def _shifted(record: BagConnection | Raw, by: int) -> BagConnection | Raw:
     if isinstance(record, BagConnection):
         return record._replace(number=record.number + by)
     return (record[0] + by, *record[1:])
+
+
+def is_mcap(path: Path) -> bool:
+    """True if a file begins as MCAP does."""
+    with path.open("rb") as file:
+        return file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
 
 
 def _part(path: Path) -> _FoundChunk:
@@ -261,7 +269,8 @@ def _mcap_record(
     elif operation == 0x04:
         number, schema = struct.unpack_from("<HH", body)
         kind, definition = schemas.get(schema, ("", ""))
-        yield BagConnection(number, _text(body, 4)[0], kind, definition)
+        topic, at = _text(body, 4)
+        yield BagConnection(number, topic, kind, definition, _text(body, at)[0])
     elif operation == 0x06:
         compression, at = _text(body, 28)
         plain = _unpacked(compression, body[at + 8 :])

@@ -1,4 +1,4 @@
-"""Reader of trajectories as text: TUM (`t x y z qx qy qz qw`), and tables separated by , ; or tabs."""
+"""Reader of trajectories as text: TUM (`t x y z qx qy qz qw`), KITTI, and tables with , ; or tabs."""
 
 from __future__ import annotations
 
@@ -14,27 +14,37 @@ import numpy as np
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import separator_of
-from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, fixes_of, poses_of
+from stopgo.recordings.logs.field_log import (
+    LATEST_S,
+    WALL_S,
+    Channel,
+    FieldLog,
+    Poses,
+    Reading,
+    fixes_of,
+    poses_of,
+)
 from stopgo.recordings.logs.files import digest_of
+from stopgo.recordings.logs.kitti import COLUMNS as KITTI_COLUMNS
+from stopgo.recordings.logs.kitti import read_kitti
 from stopgo.recordings.logs.ros_poses import headings_of
 
 Numbers = tuple[float, ...]
 TUM_COLUMNS = 8
-WALL_S = 1e9
-"""Times from September 2001 on count as seconds since 1970."""
-LATEST_S = 9e9
-"""Limit of times: more nanoseconds have no int64."""
 
 
 def read_table(path: Path, reading: Reading) -> FieldLog:
-    """Read a trajectory in TUM's format, or a table with a header.
+    """Read a trajectory in TUM's or KITTI's format, or a table with a header.
 
     Raises
     ------
     InputError
-        When it is neither, or no line of it can be read.
+        When it is none of them, or no line of it can be read.
     """
-    return read_tum(path, reading) if _looks_like_tum(path) else read_csv(path, reading)
+    columns = _first_numbers(path)
+    if columns == KITTI_COLUMNS:
+        return read_kitti(path)
+    return read_tum(path, reading) if columns == TUM_COLUMNS else read_csv(path, reading)
 
 
 def read_tum(path: Path, reading: Reading) -> FieldLog:
@@ -212,14 +222,14 @@ def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: n
     )
 
 
-def _looks_like_tum(path: Path) -> bool:
-    """True if the first line that is not a comment has eight numbers."""
+def _first_numbers(path: Path) -> int:
+    """Return how many numbers the first line has that is not a comment; 0 if it has other words."""
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in _first_lines(file):
             words = line.split("#")[0].replace(",", " ").split()
             if words:
-                return len(words) == TUM_COLUMNS and _numbers(words) is not None
-    return False
+                return len(words) if _numbers(words) is not None else 0
+    return 0
 
 
 def _first_lines(file: io.TextIOBase) -> Iterator[str]:

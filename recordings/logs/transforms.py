@@ -82,16 +82,21 @@ class TransformTree:
         """Return times (n,), positions (n, 2) and headings (n,) of the chain's end in its beginning.
 
         The times are those of the most frequent edge, where all others are known; between their times, the
-        others are interpolated, as in tf.
+        others are interpolated, as in tf. An edge that the log gives once does not move.
         """
         tables = [self.edges[edge].table() for edge in edges_down]
-        moving = [table for table, edge in zip(tables, edges_down, strict=True) if edge not in self.static]
+        moving = [
+            table
+            for table, edge in zip(tables, edges_down, strict=True)
+            if edge not in self.static and len(table[0]) > 1
+        ] or [table for table, edge in zip(tables, edges_down, strict=True) if edge not in self.static]
         ns = max(moving, key=lambda table: len(table[0]))[0]
         begin, end = max(times[0] for times, _ in moving), min(times[-1] for times, _ in moving)
         ns = np.unique(ns[(ns >= begin) & (ns <= end)])
         x, y, heading = np.zeros(len(ns)), np.zeros(len(ns)), np.zeros(len(ns))
         for (times, values), edge in zip(tables, edges_down, strict=True):
-            step = values[-1:].repeat(len(ns), 0) if edge in self.static else at_times(times, values, ns)
+            fixed = edge in self.static or len(times) == 1
+            step = values[-1:].repeat(len(ns), 0) if fixed else at_times(times, values, ns)
             x, y, heading = composed((x, y, heading), (step[:, 0], step[:, 1], step[:, 2]))
         return ns, np.stack([x, y], axis=-1), heading
 

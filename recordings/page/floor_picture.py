@@ -19,7 +19,8 @@ from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.settings.element_kinds import kind_of
 from stopgo.mission.stages import Targets
 from stopgo.mission.stages.covered_intervals import runs_of
-from stopgo.recordings.page.style import BLUE, GREY, INK, PURPLE, VERMILION, YELLOW
+from stopgo.mission.stages.network import MagnifiedErrors, magnified_errors
+from stopgo.recordings.page.style import BLUE, ERROR, GREY, INK, PURPLE, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import shown, tag
 
@@ -53,6 +54,7 @@ def plan_picture(
         *_coverage(subject, comparison, frame),
         *_paths(mission, comparison, frame),
         *beneath(frame),
+        *_errors(mission, frame),
         *_marks(mission, comparison, frame),
         *_scale_bar(frame),
         *_north(mission, frame),
@@ -265,6 +267,21 @@ def _marks(mission: Mission, comparison: Comparison | None, frame: PictureFrame)
                 frame,
                 over=over,
             )
+
+
+def _errors(mission: Mission, frame: PictureFrame) -> Iterator[str]:
+    """Yield the predicted error of each scan as an ellipse, magnified."""
+    found = errors_in_picture(mission)
+    if found is None:
+        return
+    for stop, line in found.outlines.items():
+        ellipse = stroke(frame.path([line], close=True), ERROR, 1.4)
+        yield tag("g", tag("title", shown(found.words[stop])), ellipse)
+
+
+def errors_in_picture(mission: Mission) -> MagnifiedErrors | None:
+    """Return the error ellipses as the picture draws them."""
+    return magnified_errors(mission, most_m=0.6 * _spacing(mission))
 
 
 OUTLINE: dict[str, Any] = {"stroke": INK, "stroke_width": 1.5, "vector_effect": "non-scaling-stroke"}

@@ -8,7 +8,7 @@ import numpy as np
 
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.proof.plan_proof import CloudQuality, PlanProof, PromisedShare, ScanPair
+from stopgo.mission.proof.plan_proof import CloudQuality, PlanProof, PromisedCoverage, ScanPair
 from stopgo.mission.proof.proof_text import (
     assumed_words,
     coverage_words,
@@ -59,7 +59,7 @@ def _band(proof: PlanProof) -> str:
 
 def _tiles(proof: PlanProof) -> str:
     network, quality, whole = proof.network, proof.quality, proof.whole
-    acquired = f"{whole.kept:.0f} {proof.unit}" if whole.simulated is None else percent(whole.simulated)
+    acquired = f"{whole.acquired:.0f} {proof.unit}" if whole.simulated is None else percent(whole.simulated)
     drift = f"worst stop {1000 * network.adrift_m:.1f} mm error" if network.registered else "none registers"
     scans = "one network" if network.closed else f"{len(network.pieces)} components"
     tiles = [
@@ -122,8 +122,8 @@ def lines_of(floor: FloorPlan) -> FloorLines:
 def _tables(proof: PlanProof) -> Iterator[str]:
     yield section("Acquired", _listed([coverage_words(proof.whole, proof.unit), *missed_words(proof)]))
     columns = [
-        section("Rooms", _shares(proof.rooms, "room", proof.unit)),
-        tag("div", section("Kinds", _shares(proof.kinds, "kind", proof.unit)), _quality(proof.quality)),
+        section("Rooms", _coverage(proof.rooms, "room", proof.unit)),
+        tag("div", section("Kinds", _coverage(proof.kinds, "kind", proof.unit)), _quality(proof.quality)),
         section("Stops", _stops(proof)),
     ]
     yield tag("div", *columns, class_="columns")
@@ -138,18 +138,18 @@ def _listed(lines: Sequence[str]) -> str:
     return tag("ul", *(tag("li", shown(line)) for line in lines))
 
 
-def _shares(shares: Sequence[PromisedShare], what: str, unit: str) -> str:
+def _coverage(groups: Sequence[PromisedCoverage], what: str, unit: str) -> str:
     rows = [
         row(
             [
                 shown(item.name),
                 number(item.promised),
-                number(item.kept),
+                number(item.acquired),
                 percent(item.coverage),
                 percent(item.simulated),
             ]
         )
-        for item in shares
+        for item in groups
     ]
     return grid((what, f"promised {unit}", f"acquired {unit}", "coverage", "simulated"), rows)
 
@@ -174,14 +174,17 @@ def _stops(proof: PlanProof) -> str:
 def _quality(quality: CloudQuality) -> str:
     rows = [
         *(
-            row([f"spacing up to {limit} mm", percent(share)])
-            for limit, share in quality.by_spacing_mm.items()
+            row([f"spacing up to {limit} mm", percent(fraction)])
+            for limit, fraction in quality.by_spacing_mm.items()
         ),
         *(
-            row([f"incidence up to {limit}°", percent(share)])
-            for limit, share in quality.by_incidence_deg.items()
+            row([f"incidence up to {limit}°", percent(fraction)])
+            for limit, fraction in quality.by_incidence_deg.items()
         ),
-        *(row([f"from {least} stops or more", percent(share)]) for least, share in quality.by_stops.items()),
+        *(
+            row([f"from {least} stops or more", percent(fraction)])
+            for least, fraction in quality.by_stops.items()
+        ),
     ]
     return section("Surface with points", grid(("", "fraction"), rows))
 

@@ -70,11 +70,11 @@ class RunsTogether:
         left = f"Not scanned by any run: {named(self.left)}." if self.left else "No stop is left."
         if self.acquired is None:
             return (f"{count} an unknown coverage; the plan's recording contains it.", left)
-        whole = self.acquired.shares.whole
+        whole = self.acquired.coverage.whole
         least = "at least " if self.acquired.answer == "unknown" else ""
         asked = "" if whole.required is None else f"; {percent(whole.required)} was required"
-        short = [share for share in self.acquired.shares.short if share is not whole]
-        rooms = (f"Below the requirement: {named([share.name for share in short])}." for _ in short[:1])
+        short = [group for group in self.acquired.coverage.short if group is not whole]
+        rooms = (f"Below the requirement: {named([group.name for group in short])}." for _ in short[:1])
         return (f"{count} {least}{percent(whole.coverage)} of what is visible{asked}.", *rooms, left)
 
     def what_next(self, paths: Iterable[Path]) -> tuple[str, ...]:
@@ -92,8 +92,8 @@ class RunsTogether:
             "mission_id": self.runs[-1].mission.id,
             "runs": [run.run_id for run in self.runs],
             "names": run_names(self.runs),
-            "coverage": None if acquired is None else acquired.shares.whole.coverage,
-            "required": None if acquired is None else acquired.shares.whole.required,
+            "coverage": None if acquired is None else acquired.coverage.whole.coverage,
+            "required": None if acquired is None else acquired.coverage.whole.required,
             "answer": "unknown" if acquired is None else acquired.answer,
             "left": list(self.left),
         }

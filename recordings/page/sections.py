@@ -11,12 +11,12 @@ from stopgo.mission.document.schedule import schedule
 from stopgo.mission.files.mission_text import route_length
 from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.run.events import Scanned
-from stopgo.mission.stages.figures import Share, percent
-from stopgo.recordings.page.floor_picture import legend, line_sample, plan_picture
+from stopgo.mission.stages.figures import CoveragePair, GroupCoverage, percent
+from stopgo.recordings.page.floor_picture import errors_in_picture, legend, line_sample, plan_picture
 from stopgo.recordings.page.plots import plots
 from stopgo.recordings.page.runs_together import run_names, when_and_who
 from stopgo.recordings.page.stop_table import stop_table
-from stopgo.recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
+from stopgo.recordings.page.style import ANSWERS, BLUE, ERROR, GREY, PURPLE, STATES, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
 
@@ -70,11 +70,11 @@ def _plan_band(subject: ReportSubject) -> str:
 
 def _plan_tiles(subject: ReportSubject) -> str:
     mission, times = subject.mission, schedule(subject.mission)
-    share = None if subject.sight is None else subject.sight.planned.whole
-    visible = "" if share is None else f"{percent(share.visible_share)} of all is visible"
+    group = None if subject.sight is None else subject.sight.planned.whole
+    visible = "" if group is None else f"{percent(group.visible_fraction)} of all is visible"
     tiles = [
         tile("stops", str(len(mission.stops)), subject.results.bound_text),
-        tile("coverage", percent(None if share is None else share.coverage), visible),
+        tile("coverage", percent(None if group is None else group.coverage), visible),
         tile("route", f"{route_length(mission):.1f} m", "back to the start" if mission.return_ else "open"),
         tile("run time", duration(times.total_s), _least_time(subject, times.scan_s)),
     ]
@@ -99,14 +99,14 @@ def _plan_tables(subject: ReportSubject) -> str:
         return stops
     planned = subject.sight.planned
     tables = [
-        section("Rooms, worst first", _plan_shares(planned.rooms, "room")),
-        section("Kinds", _plan_shares(planned.kinds, "kind")),
+        section("Rooms, worst first", _plan_coverage(planned.rooms, "room")),
+        section("Kinds", _plan_coverage(planned.kinds, "kind")),
     ]
     return tag("div", stops, tag("div", *tables), class_="columns")
 
 
-def _plan_shares(shares: Sequence[Share], what: str) -> str:
-    return _share_grid([(share, share) for share in shares], what, alone=True)
+def _plan_coverage(groups: Sequence[GroupCoverage], what: str) -> str:
+    return _coverage_grid([(group, group) for group in groups], what, alone=True)
 
 
 # ---- a run ----
@@ -127,6 +127,7 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
     yield section("Stops", tag("div", _stop_grid(comparison), class_="scroll"))
     if comparison.acquired is not None:
         yield tag("div", *_coverage_tables(comparison.acquired), class_="columns")
+    yield section("Health of the vehicle", _health(comparison))
     gaps = [tag("li", shown(line)) for line in comparison.sighted.lines]
     yield section("Gaps in the poses", tag("ul", *gaps) if gaps else "")
     for title, lines in subject.more.get(comparison.run_id, ()):
@@ -149,10 +150,10 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
         "stops scanned", f"{comparison.scanned} / {len(comparison.asked)}", f"robot {comparison.log.robot}"
     )
     if comparison.acquired is not None:
-        shares, planned = comparison.acquired.shares, comparison.acquired.planned
-        required = percent(shares.whole.required)
+        groups, planned = comparison.acquired.coverage, comparison.acquired.planned
+        required = percent(groups.whole.required)
         planned_text = f"required {required}, planned {percent(planned.whole.coverage)}"
-        yield tile("coverage acquired", percent(shares.whole.coverage), planned_text)
+        yield tile("coverage acquired", percent(groups.whole.coverage), planned_text)
     yield tile("run time", driven, f"planned {duration(comparison.planned_s)}")
     limit = f"tolerance {1000 * tolerance:.0f} mm"
     yield tile("greatest position error at a stop", _millimetres(deviation_m), limit)
@@ -201,6 +202,9 @@ def _pictured(subject: ReportSubject, comparison: Comparison | None) -> str:
         if comparison.sighted.gaps:
             marks.append((line_sample(PURPLE, 1.8, "3 4"), "no poses: path unseen"))
         marks += [(cross, "not scanned"), (diamond, "stationary")]
+    mission = subject.mission if comparison is None else comparison.mission
+    if (errors := errors_in_picture(mission)) is not None:
+        marks.append((line_sample(ERROR, 1.4), f"predicted scan error × {errors.factor:g}"))
     return legend(marks) + plan_picture(subject, comparison)
 
 
@@ -227,9 +231,25 @@ def _clock(seconds: float | None) -> str:
     return "" if seconds is None else duration(seconds)
 
 
+UNRECORDED = "battery, position estimate and geofence: unknown; this log holds none of them"
+
+
+def _health(comparison: Comparison) -> str:
+    """Return the health at the run's begin, at each change and at its end; what is not known is unknown."""
+    log = comparison.log
+    if not log.health:
+        return tag("p", UNRECORDED)
+    seconds = log.seconds([words.robot_ns for words in log.health]).tolist()
+    rows = [
+        row([_clock(at), shown(words.battery), shown(words.position), shown(words.fence)])
+        for at, words in zip(seconds, log.health, strict=True)
+    ]
+    return grid(("run time", "battery", "position estimate", "geofence"), rows)
+
+
 def _coverage_tables(acquired: Acquired) -> Iterator[str]:
-    yield section("Rooms, worst first", _share_grid(acquired.rooms, "room"))
-    yield section("Kinds", _share_grid(acquired.kinds, "kind"))
+    yield section("Rooms, worst first", _coverage_grid(acquired.rooms, "room"))
+    yield section("Kinds", _coverage_grid(acquired.kinds, "kind"))
     totals = acquired.sight.totals
     planned = {item.name: item for item in totals.by_element(acquired.sight.all_seen)}
     pairs = [(planned[item.name], item) for item in acquired.elements if item.visible]
@@ -237,29 +257,29 @@ def _coverage_tables(acquired: Acquired) -> Iterator[str]:
     short = [pair for pair in worst if pair[1].seen < pair[0].seen]
     if short:
         title = f"Elements that lost most ({min(len(short), MOST_ELEMENTS)} of {len(short)})"
-        yield section(title, _share_grid(short[:MOST_ELEMENTS], "element"))
+        yield section(title, _coverage_grid(short[:MOST_ELEMENTS], "element"))
 
 
-def _share_grid(pairs: Sequence[tuple[Share, Share]], what: str, *, alone: bool = False) -> str:
+def _coverage_grid(pairs: Sequence[CoveragePair], what: str, *, alone: bool = False) -> str:
     """Return rows of planned and acquired coverage; `alone` if there is only a plan."""
-    rows = [row(_share_cells(planned, share, alone=alone)) for planned, share in pairs]
+    rows = [row(_coverage_cells(planned, group, alone=alone)) for planned, group in pairs]
     header = (what, "planned", "") if alone else (what, "planned", "acquired", "")
     return grid(header, rows) if rows else ""
 
 
-def _share_cells(planned: Share, share: Share, *, alone: bool) -> list[str]:
-    name = shown(share.name) + (tag("small", shown(f" {share.why}")) if share.why else "")
-    got = [] if alone else [tag("b", percent(share.coverage)) + ("" if share.met else " !")]
-    return [name, percent(planned.coverage), *got, _bar(share)]
+def _coverage_cells(planned: GroupCoverage, group: GroupCoverage, *, alone: bool) -> list[str]:
+    name = shown(group.name) + (tag("small", shown(f" {group.why}")) if group.why else "")
+    got = [] if alone else [tag("b", percent(group.coverage)) + ("" if group.met else " !")]
+    return [name, percent(planned.coverage), *got, _bar(group)]
 
 
-def _bar(share: Share) -> str:
+def _bar(group: GroupCoverage) -> str:
     """Return a bar of the coverage, with a mark at the required coverage."""
-    if share.coverage is None:
+    if group.coverage is None:
         return ""
-    colour = BLUE if share.met else VERMILION
-    required = "" if share.required is None else tag("i", style=f"left:{100 * share.required:.1f}%")
-    inner = tag("div", style=f"width:{100 * share.coverage:.1f}%;background:{colour}")
+    colour = BLUE if group.met else VERMILION
+    required = "" if group.required is None else tag("i", style=f"left:{100 * group.required:.1f}%")
+    inner = tag("div", style=f"width:{100 * group.coverage:.1f}%;background:{colour}")
     return tag("div", inner, required, class_="bar")
 
 
@@ -298,7 +318,7 @@ def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
     first = next((item for item in known if item is not None), None)
     if first is None:
         return ""
-    names = [share.name for share in first.sight.totals.rooms_seen(first.seen)]
+    names = [group.name for group in first.sight.totals.rooms_seen(first.seen)]
     columns = [[] if item is None else item.sight.totals.rooms_seen(item.seen) for item in known]
     return grid(header, [
         row([shown(name), *(percent(column[k].coverage) if k < len(column) else "" for column in columns)])
@@ -309,7 +329,7 @@ def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
 _ROWS = (
     ("robot", lambda run: shown(run.log.robot)),
     ("stops scanned", lambda run: f"{run.scanned} / {len(run.asked)}"),
-    ("coverage", lambda run: "" if run.acquired is None else percent(run.acquired.shares.whole.coverage)),
+    ("coverage", lambda run: "" if run.acquired is None else percent(run.acquired.coverage.whole.coverage)),
     ("run time", lambda run: _clock(run.driven_s)),
     ("greatest position error at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
     ("greatest cross-track error", _path_error),

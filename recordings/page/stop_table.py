@@ -36,7 +36,7 @@ def _row(reason: StopReason) -> str:
     return row(
         [
             *(shown(reason.stop), str(reason.step), number(reason.sees)),
-            *(number(reason.alone), percent(reason.lost_share)),
+            *(number(reason.alone), percent(reason.lost_fraction)),
             *(shown("; ".join(where)), shown(", ".join(runners))),
         ]
     )

@@ -6,6 +6,8 @@ BLUE, SKY, ORANGE, VERMILION, YELLOW, PURPLE, GREEN = (
     *("#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#F0E442", "#CC79A7", "#009E73"),
 )
 INK, GREY = "#111", "#6b6f76"
+ERROR = "#0b6e99"
+"""Ellipses of predicted errors."""
 
 STATES = {
     "RUNNING": (SKY, INK),

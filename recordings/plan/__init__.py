@@ -79,14 +79,22 @@ class PlanRecording:
     def __init__(self, recording_id: str) -> None:
         self.recording_id = recording_id
         self._results: dict[type, Any] = {}
+        self._drawn: bytes | None = None
 
     def observe(self, result: object) -> None:
         """Collect one stage result; a later one replaces an earlier one of the same type."""
         self._results[type(result)] = result
+        self._drawn = None
+
+    def draw(self) -> bytes:
+        """Draw the stage results; returns the recording in Rerun's format, the same at each call."""
+        if self._drawn is None:
+            self._drawn = _recording(self.recording_id, self._results)
+        return self._drawn
 
     def write(self, path: Path) -> None:
         """Draw the stage results into `path`, and read the file to its end."""
-        path.write_bytes(_recording(self.recording_id, self._results))
+        path.write_bytes(self.draw())
         check(path)
 
     def streamed(self) -> bytes:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.geometry import FloatArray, bounds
-from stopgo.mission.stages.network import network_of, pair_in_words
+from stopgo.mission.stages.network import magnified_errors, network_of, pair_in_words
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.blueprint import Bounds
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
@@ -27,6 +27,8 @@ from stopgo.recordings.plan.drive import Drive
 
 ABOVE_FLOOR = 0.05
 """Height in metres of 3D lines above the floor, so that the floor does not hide them."""
+LARGEST_ERROR = 1.0
+"""Metres of the largest half axis of a drawn error ellipse."""
 ARROW = 0.6
 """Length of a stop's heading, in metres."""
 MOST_NAMES = 60
@@ -41,6 +43,7 @@ def draw_mission(canvas: Canvas, mission: Mission) -> None:
     """Draw stops and route, which do not change with time."""
     _draw_route(canvas, mission)
     _draw_network(canvas, mission)
+    _draw_errors(canvas, mission)
     if mission.stops:
         _draw_stops(canvas, mission)
 
@@ -132,6 +135,22 @@ def _draw_network(canvas: Canvas, mission: Mission) -> None:
         draw_order=ORDER["route"] + 0.5,
     )
     canvas.show(entities.NETWORK, lines)
+
+
+def _draw_errors(canvas: Canvas, mission: Mission) -> None:
+    """Draw the predicted error of each scan as an ellipse, magnified."""
+    found = magnified_errors(mission, most_m=LARGEST_ERROR)
+    if found is None:
+        return
+    lines = rr.LineStrips2D(
+        canvas.strips(list(found.outlines.values())),
+        colors=palette.ERROR,
+        labels=[f"{words}; drawn {found.factor:g} times as large" for words in found.words.values()],
+        show_labels=False,
+        radii=on_screen(0.8),
+        draw_order=ORDER["route"] + 0.6,
+    )
+    canvas.show(entities.ERRORS, lines)
 
 
 def legs_of(mission: Mission) -> tuple[list[Leg], list[Colour]]:

@@ -44,7 +44,7 @@ def _answer_of_clouds(measured: Measured | None) -> Certainty:
         return "yes"
     if measured.placing_text or not measured.misplaced_m:
         return "unknown"
-    return "no" if measured.shares.short else "yes"
+    return "no" if measured.coverage.short else "yes"
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,10 @@ def _floor_sentences(replay: Replay) -> Iterator[str]:
 
 
 def _coverage_sentences(sight: AsDriven) -> Iterator[str]:
-    whole = sight.shares.whole
-    for share in (whole, *(share for share in sight.shares.short if share is not whole)):
-        name, least = share.name if share is not whole else "what is visible", percent(share.required)
-        yield f"Of {name}, {percent(share.coverage)} was visible; {least} is required."
+    whole = sight.coverage.whole
+    for group in (whole, *(group for group in sight.coverage.short if group is not whole)):
+        name, least = group.name if group is not whole else "what is visible", percent(group.required)
+        yield f"Of {name}, {percent(group.coverage)} was visible; {least} is required."
 
 
 def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str]:
@@ -116,13 +116,18 @@ def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str
     if not measured.misplaced_m:
         yield "What was measured is undecided: the clouds have too few points at the heights of walls."
         return
-    whole = measured.shares.whole
-    for share in (whole, *(share for share in measured.shares.short if share is not whole)):
-        name, least = share.name if share is not whole else "what is visible", percent(share.required)
-        yield f"Of {name}, {percent(share.coverage)} was measured; {least} is required."
-    absent = () if sight is None else measured.absent(sight.driven)
+    whole = measured.coverage.whole
+    for group in (whole, *(group for group in measured.coverage.short if group is not whole)):
+        name, least = group.name if group is not whole else "what is visible", percent(group.required)
+        yield f"Of {name}, {percent(group.coverage)} was measured; {least} is required."
+    absent = [] if sight is None else [item for item in measured.absent(sight.driven) if item.empty == 1.0]
     if absent:
-        yield f"No point lies on {named(absent)}, although it was visible: not built, or hidden."
+        least, most = (percent(pick(item.visible for item in absent)) for pick in (min, max))
+        range_text = least if least == most else f"{least} to {most}"
+        yield (
+            f"No point lies on {named([item.id for item in absent])}, although {range_text} of it was "
+            "visible: not built, hidden, or missing from the clouds."
+        )
 
 
 def _scans_text(replay: Replay) -> str:

@@ -13,7 +13,7 @@ from stopgo.recordings.page.runs_together import together
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.replay.drive_verdict import drive_verdict, missing, outside
 from stopgo.recordings.replay.path_and_time import lost_times, smoothed_track
-from stopgo.recordings.replay.replay_text import measured_lines, notes_of, path_lines, truth_lines
+from stopgo.recordings.replay.replay_text import absent_of, measured_lines, notes_of, path_lines, truth_lines
 from stopgo.recordings.replay.replayed import Replay
 
 RunLines = tuple[str, tuple[str, ...]]
@@ -72,9 +72,9 @@ def run_texts(replay: Replay) -> Iterator[RunLines]:
         yield (
             "Visible from the robot's stationary poses",
             tuple(
-                f"{share.name}: {percent(share.coverage)} (planned {percent(planned.coverage)}, "
-                f"required {percent(share.required)})"
-                for planned, share in replay.sight.pairs
+                f"{group.name}: {percent(group.coverage)} (planned {percent(planned.coverage)}, "
+                f"required {percent(group.required)})"
+                for planned, group in replay.sight.pairs
             ),
         )
     yield "Driven path", tuple(" ".join(line.split()) for line in (*path_lines(replay), *truth_lines(replay)))
@@ -94,8 +94,11 @@ def to_do(replay: Replay) -> Iterator[str]:
         yield f"{item.stop}: scan it; {item.reason or 'the robot did not reach it'}"
     for item in outside(replay):
         yield f"{item.stop}: scan it again, {1000 * (item.deviation_m or 0):.0f} mm nearer to its position"
+    for absent in absent_of(replay):
+        yield f"inspect {absent.id}: {percent(absent.empty)} of its visible part has no point"
     for found in replay.measured.unplanned if replay.measured is not None else ():
         x, y = found.middle
-        yield f"inspect the object at ({x:.2f}, {y:.2f}), {found.size_m:.1f} m wide"
+        share = f"hit in {percent(found.hits / found.sweeps)} of the scans"
+        yield f"inspect the object at ({x:.2f}, {y:.2f}), {found.size_m:.1f} m wide, {share}"
     if replay.sight is not None and not replay.sight.enough:
         yield "too little was visible: plan the follow-up mission with stopgo replay --top-up"

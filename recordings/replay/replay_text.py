@@ -9,7 +9,7 @@ from typing import Any
 
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_table
-from stopgo.mission.comparing.measured import Measured
+from stopgo.mission.comparing.measured import Absent, Measured
 from stopgo.mission.console.table import printable, table
 from stopgo.mission.stages.figures import pair_cells, percent
 from stopgo.recordings.logs.field_log import FieldLog
@@ -83,7 +83,7 @@ def _sight(replay: Replay) -> list[str]:
     """Return the visible fractions, lowest first, next to those planned."""
     if replay.sight is None:
         return []
-    rows = [pair_cells(planned, share) for planned, share in replay.sight.pairs]
+    rows = [pair_cells(planned, group) for planned, group in replay.sight.pairs]
     lines = table(("visible", "planned %", "as driven %", "required %"), rows).split("\n")
     return ["", *(f"  {line}" for line in lines), ""]
 
@@ -93,9 +93,9 @@ def measured_lines(replay: Replay) -> list[str]:
     found = replay.measured
     if found is None:
         return []
-    share = found.shares.whole
+    whole = found.coverage.whole
     lines = [
-        f"  measured   {percent(share.coverage)} of what is visible has points within "
+        f"  measured   {percent(whole.coverage)} of what is visible has points within "
         f"{1000 * found.tolerance_m:.0f} mm ({found.points} points)"
     ]
     worst = sorted(found.deviations, key=lambda item: -abs(item[2]))[:MOST_LOST]
@@ -105,10 +105,23 @@ def measured_lines(replay: Replay) -> list[str]:
     ]
     lines += [
         f"  unplanned  at ({item.middle[0]:.2f}, {item.middle[1]:.2f}), {item.size_m:.1f} m, "
-        f"hit in {item.hits} scans"
+        f"hit in {item.hits} of {item.sweeps} scans ({percent(item.hits / item.sweeps)})"
         for item in found.unplanned
     ]
+    lines += [
+        f"  absent     {item.id}: no point on {percent(item.empty)} of its visible part; "
+        f"{percent(item.visible)} of it was visible"
+        for item in absent_of(replay)
+    ]
     return [*lines, ""]
+
+
+def absent_of(replay: Replay) -> tuple[Absent, ...]:
+    """Return the elements that the scanner's clouds hardly show, though they were visible."""
+    found = replay.measured
+    if found is None or replay.sight is None or not found.decides or found.placing_text:
+        return ()
+    return found.absent(replay.sight.driven)
 
 
 def as_json(replay: Replay) -> dict[str, Any]:
@@ -130,29 +143,29 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "halts": [_standstill_json(replay, k) for k in range(len(replay.matches))],
         "true_offset_m": {stop.id: replay.true_offset_m(k) for k, stop in enumerate(replay.mission.stops)},
         "coverage": None if replay.sight is None else _sight_json(replay.sight),
-        "measured": None if replay.measured is None else _measured_json(replay.measured),
+        "measured": None if replay.measured is None else _measured_json(replay, replay.measured),
         "run": comparison_json(replay.comparison),
     }
 
 
 def _sight_json(sight: AsDriven) -> dict[str, Any]:
-    shares = {
-        share.name: {
-            "planned": planned.coverage, "as_driven": share.coverage,
-            "asked": share.required, "met": share.met,
+    groups = {
+        group.name: {
+            "planned": planned.coverage, "as_driven": group.coverage,
+            "asked": group.required, "met": group.met,
         }
-        for planned, share in sight.pairs
+        for planned, group in sight.pairs
     }  # fmt: skip
     elements = [{"id": item.name, "visible": item.visible, "seen": item.seen} for item in sight.elements]
-    return {"shares": shares, "elements": elements}
+    return {"shares": groups, "elements": elements}
 
 
-def _measured_json(found: Measured) -> dict[str, Any]:
+def _measured_json(replay: Replay, found: Measured) -> dict[str, Any]:
     return {
         "tolerance_m": found.tolerance_m,
         "points": found.points,
-        "share": found.shares.whole.coverage,
-        "required": found.shares.whole.required if found.decides else None,
+        "share": found.coverage.whole.coverage,
+        "required": found.coverage.whole.required if found.decides else None,
         "misplaced_m": [round(away, 3) if math.isfinite(away) else None for away in found.misplaced_m or ()],
         "elements": [
             {"id": name, "points": count, "mean_m": mean, "rms_m": rms}
@@ -166,9 +179,10 @@ def _measured_json(found: Measured) -> dict[str, Any]:
         },
         "unplanned": [
             {"x": item.middle[0], "y": item.middle[1], "size_m": item.size_m, "hits": item.hits,
-             "outline": item.outline.exterior.tolist()}
+             "scans": item.sweeps, "outline": item.outline.exterior.tolist()}
             for item in found.unplanned
         ],
+        "absent": [vars(item) for item in absent_of(replay)],
     }  # fmt: skip
 
 

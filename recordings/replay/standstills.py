@@ -100,7 +100,7 @@ class _Bins:
     noise: FloatArray
     """Standard deviation of a bin's x, y (metres) and heading (radians), (3,)."""
     blind: BoolArray
-    """True where the robot moved in a gap without poses (n,)."""
+    """True where the robot moved or turned in a gap without poses (n,)."""
     turns: bool
     """True if headings are used."""
 
@@ -131,7 +131,9 @@ class _Bins:
             np.stack([np.interp(every, occupied, column) for column in means.T], axis=-1)
         )
         noise = _noise(means, occupied)
-        blind = _blind(occupied, means[:, :2], step / 1e9, BLIND_M + SIGMAS * float(noise[:2].max()))
+        turn = EDGE_RAD + SIGMAS * float(noise[2]) if turns else np.inf
+        reach = np.array([BLIND_M + SIGMAS * float(noise[:2].max()), turn])
+        blind = _blind(occupied, means, step / 1e9, reach)
         return cls(int(track.ns[0]), step, filled[:, :2], filled[:, 2], noise, blind, turns)
 
     def index(self, ns: int) -> int:
@@ -150,10 +152,11 @@ def _without_spikes(values: FloatArray) -> FloatArray:
     return medians
 
 
-def _blind(occupied: IntArray, xy: FloatArray, step_s: float, reach: float) -> BoolArray:
-    """Return the bins in gaps without poses across which the robot moved."""
+def _blind(occupied: IntArray, poses: FloatArray, step_s: float, reach: FloatArray) -> BoolArray:
+    """Return the bins in gaps without poses across which the robot moved, or turned: poses (n, 3)."""
     blind = np.zeros(int(occupied[-1]) + 1, bool)
-    moved = np.hypot(*np.diff(xy, axis=0).T) > reach
+    step = np.diff(poses, axis=0)
+    moved = (np.hypot(*step[:, :2].T) > reach[0]) | (np.abs(step[:, 2]) > reach[1])
     for k in np.flatnonzero(moved & (np.diff(occupied) * step_s > BLIND_S)):
         blind[occupied[k] + 1 : occupied[k + 1]] = True
     return blind

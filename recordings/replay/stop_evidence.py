@@ -17,6 +17,7 @@ from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.document import Point
 from stopgo.mission.run.tolerance import is_outside
+from stopgo.recordings.replay.fit_error import fit_error_m
 from stopgo.recordings.replay.fitting import STRETCH
 from stopgo.recordings.replay.position_errors import PositionErrors, lasting_jump, position_errors, visits_of
 from stopgo.recordings.replay.replayed import Replay
@@ -39,8 +40,29 @@ class StopEvidence:
 
 def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
     """Return the evidence for each stop, in the mission's order."""
-    errors = position_errors(replay)
-    return tuple(_evidence(replay, k, item, errors) for k, item in enumerate(replay.comparison.asked))
+    errors, fit_m = position_errors(replay), fit_error_m(replay)
+    found = (_evidence(replay, k, item, errors) for k, item in enumerate(replay.comparison.asked))
+    return tuple(
+        _with_error_of_fit(one, float(errors.unsure_m[k] + fit_m[k]), headings=replay.placed.turns)
+        for k, one in enumerate(found)
+    )
+
+
+def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: bool) -> StopEvidence:
+    """Return a yes as undecided if the common error of placing may exceed the tolerance."""
+    item = evidence.item
+    if evidence.answer != "yes" or not is_outside(
+        (item.deviation_m or 0.0) + unsure_m, item.tolerance_m or 0.0
+    ):
+        return evidence
+    return StopEvidence(item, "unknown", FIT if headings else NO_HEADINGS)
+
+
+NO_HEADINGS = "the log has no headings, so that a turn of the whole drive is hidden; give --map X,Y,HEADING"
+FIT = (
+    "a fit to the stops hides a shift or turn of the whole drive, and the log does not begin at the start "
+    "with its heading; give --map X,Y,HEADING"
+)
 
 
 def _evidence(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
@@ -63,7 +85,11 @@ def _evidence(replay: Replay, number: int, item: StopComparison, errors: Positio
 
 
 def _within(item: StopComparison, number: int, errors: PositionErrors) -> Certainty:
-    """Return whether the robot was within tolerance, with the uncertainty of its position."""
+    """Return whether the robot was within tolerance, with the uncertainty of its position.
+
+    A fitted drift is evidence against a stop that it does not explain, and none for the others: a robot whose
+    map is turned or stretched drives the same path, truly off its stops.
+    """
     away_m, limit_m = item.deviation_m or 0.0, item.tolerance_m or 0.0
     unsure_m = float(errors.unsure_m[number])
     if not is_outside(away_m + unsure_m, limit_m):
@@ -72,8 +98,6 @@ def _within(item: StopComparison, number: int, errors: PositionErrors) -> Certai
     if fitted is None:
         return "no" if is_outside(away_m - float(errors.most_m[number]), limit_m) else "unknown"
     left_m, sure_m = fitted
-    if not is_outside(left_m + sure_m, limit_m):
-        return "yes"
     return "no" if is_outside(left_m - sure_m, limit_m) else "unknown"
 
 

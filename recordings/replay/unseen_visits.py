@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from stopgo.mission.document import Stop
+from stopgo.mission.geometry import BoolArray
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.fitting import STRETCH
 from stopgo.recordings.replay.matching import REACH_M, Match, least_stay_s, long_enough
@@ -76,9 +77,21 @@ JUMPS = "its poses jump while it is stationary; give another source of poses"
 
 
 def possible_s(track: Track, match: Match) -> float:
-    """Return the longest time that a standstill may have taken: from the pose before it to that after."""
+    """Return the longest time that a standstill may have taken: from the pose before it to that after.
+
+    A gap that begins within a second, while the robot is still there, counts as part of it.
+    """
+    slack_ns = int(LEAST_GAP_S * 1e9)
     before = int(np.searchsorted(track.ns, match.standstill.begin_ns)) - 1
     after = int(np.searchsorted(track.ns, match.standstill.end_ns, side="right"))
+    there = np.hypot(*(track.xy - match.standstill.xy).T) <= NEAR_M
+    gaps = np.flatnonzero(np.diff(track.ns) > slack_ns)
+    ends = track.ns[gaps] - match.standstill.end_ns
+    begins = match.standstill.begin_ns - track.ns[gaps + 1]
+    for k in gaps[(ends > 0) & (ends <= slack_ns) & there[gaps]].tolist():
+        after = max(after, k + 1)
+    for k in gaps[(begins > 0) & (begins <= slack_ns) & there[gaps + 1]].tolist():
+        before = min(before, k)
     begin, end = track.ns[max(before, 0)], track.ns[min(after, len(track) - 1)]
     return float(end - begin) / 1e9
 
@@ -101,33 +114,48 @@ NEAR_M, FASTEST_M_S = 0.1, 3.0
 
 
 def _in_a_gap(replay: Replay, stop: Stop, unsure_m: float) -> str:
-    """Return the longest gap in which the robot may have driven to the stop, scanned, and driven on."""
-    speed = FASTER * replay.mission.robot.speed
-    reach = stop.tolerance_m + unsure_m
-    longest = 0.0
-    for seconds, begin, end in _gaps(replay.run.poses):
-        drive_m = sum(max(0.0, math.dist(point, (stop.x, stop.y)) - reach) for point in (begin, end))
-        if seconds >= max(LEAST_GAP_S, least_stay_s(stop)) + drive_m / speed:
-            longest = max(longest, seconds)
+    """Return the longest time without poses in which the robot may have driven to the stop and scanned.
+
+    Poses that are rare, and lie on the stop, interrupt no such time.
+    """
+    speed, track = FASTER * replay.mission.robot.speed, replay.run.poses
+    reach, least_s = stop.tolerance_m + unsure_m, max(LEAST_GAP_S, least_stay_s(stop))
+    away = np.hypot(*(track.xy - (stop.x, stop.y)).T)
+    longest, joined = 0.0, False
+    for seconds, begin, end in _unseen_times(track, away <= reach):
+        drive_m = float(np.maximum(away[[begin, end]] - reach, 0.0).sum())
+        if seconds >= least_s + drive_m / speed and seconds > longest:
+            longest, joined = seconds, end > begin + 1
     if math.isinf(longest):
         return "the robot moved while it restarted; give another source of poses"
-    return f"{longest:.0f} s without poses on the path; give another source of poses" if longest else ""
+    few = "with too few poses there" if joined else "without poses on the path"
+    return f"{longest:.0f} s {few}; give another source of poses" if longest else ""
 
 
 MOVED_M = 0.5
 """Distance from the last pose before a restart to the first one after it, from which on it was moved."""
 
 
-def _gaps(track: Track) -> Iterator[tuple[float, tuple[float, float], tuple[float, float]]]:
-    """Yield each step between poses longer than LEAST_GAP_S: seconds, and both positions."""
+def _unseen_times(track: Track, there: BoolArray) -> Iterator[tuple[float, int, int]]:
+    """Yield each step between poses longer than LEAST_GAP_S, joined where a pose between two is `there` (n,).
+
+    Each is its seconds, and the indices of the poses before and after it.
+    """
     seconds = np.diff(track.ns) / 1e9
     for restart_ns in track.restarts_ns:  # the time of a reboot is unknown, and the robot may have been moved
         k = int(np.searchsorted(track.ns, restart_ns)) - 1
         if 0 <= k < len(seconds) and math.dist(track.xy[k], track.xy[k + 1]) > MOVED_M:
             seconds[k] = math.inf
+    begin, end, total = -1, -1, 0.0
     for k in np.flatnonzero(seconds > LEAST_GAP_S).tolist():
-        (ax, ay), (bx, by) = track.xy[k].tolist(), track.xy[k + 1].tolist()
-        yield float(seconds[k]), (ax, ay), (bx, by)
+        if k == end and there[k]:
+            total, end = total + float(seconds[k]), k + 1
+            continue
+        if total:
+            yield total, begin, end
+        begin, end, total = k, k + 1, float(seconds[k])
+    if total:
+        yield total, begin, end
 
 
 def _before_or_after(replay: Replay) -> str:

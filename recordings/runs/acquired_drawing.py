@@ -52,7 +52,7 @@ class AcquiredDrawing:
 
     def sentence(self) -> str:
         """Return the coverage acquired so far, in a sentence."""
-        now, planned = self._sight.totals.shares(self._seen).whole, self._sight.planned.whole
+        now, planned = self._sight.totals.coverage(self._seen).whole, self._sight.planned.whole
         required = "" if now.required is None else f"{percent(now.required)} required, "
         acquired, planned_percent = percent(now.coverage), percent(planned.coverage)
         return f"**{acquired}** of what is visible is scanned ({required}{planned_percent} planned)"

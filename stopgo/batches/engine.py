@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import threading
 import time
 from collections import deque
@@ -17,33 +16,46 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from multiprocessing import get_context
-from typing import Any, Protocol
+from typing import Protocol
 
-from stopgo.batches.content import computed_by
+from stopgo.batches.cluster_engine import ClusterEngine
 from stopgo.batches.work import PlanOutcome, PlanTask, work
-from stopgo.mission.errors import InputError, OutcomeUnknown
 
 TRIES = 2
 TICK_S = 0.5
 PLANS_EACH = 16
 """Plans of one process; its memory grows by some megabytes with each."""
-BASE_BYTES = 350e6
-"""Memory of a process that plans a small floor."""
-BYTES_PER_BYTE = 12.0
-"""Memory per byte of the floor's file."""
 
 
 class Engine(Protocol):
     """Slots that work on one entry each."""
 
-    slots: int
-
-    def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
-        """Begin an entry on a free slot."""
+    @property
+    def slots(self) -> int:
+        """Entries at the same time; on a cluster the number may change."""
         ...
 
-    def renew(self, slot: int) -> None:
-        """Make a slot usable again after its process ended."""
+    @property
+    def memory(self) -> float:
+        """Bytes that all entries in progress may use together."""
+        ...
+
+    def submit(self, slot: int, task: PlanTask, *, roomiest: bool = False) -> Future[PlanOutcome]:
+        """Begin an entry on a free slot, or where most memory is.
+
+        Raises
+        ------
+        OutcomeUnknown
+            When the machines that work are gone.
+        """
+        ...
+
+    def renew(self, slot: int) -> bool:
+        """Make a slot usable again; False if more than the slot's own process had ended."""
+        ...
+
+    def look(self) -> None:
+        """Look at the machines that work; called while entries are in progress."""
         ...
 
     def close(self, *, at_once: bool) -> None:
@@ -56,11 +68,12 @@ class LocalEngine:
 
     def __init__(self, workers: int) -> None:
         self.slots = workers
+        self.memory = free_memory()
         self._pools: list[Executor | None] = [None] * workers
         self._worked = [0] * workers
         """Plans that each slot's process has made."""
 
-    def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
+    def submit(self, slot: int, task: PlanTask, *, roomiest: bool = False) -> Future[PlanOutcome]:
         if self._worked[slot] >= PLANS_EACH:
             self.renew(slot)
         self._worked[slot] += 1
@@ -69,11 +82,15 @@ class LocalEngine:
             pool = self._pools[slot] = worker_process()
         return pool.submit(work, task)
 
-    def renew(self, slot: int) -> None:
+    def renew(self, slot: int) -> bool:
         pool, self._pools[slot] = self._pools[slot], None
         self._worked[slot] = 0
         if pool is not None:
             pool.shutdown(wait=False, cancel_futures=True)
+        return True
+
+    def look(self) -> None:
+        """A pool itself notices that its process ended."""
 
     def close(self, *, at_once: bool) -> None:
         for pool in self._pools:
@@ -103,72 +120,11 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-class ClusterEngine:
-    """The workers of a dask cluster; all see the store and the floors under the same paths."""
-
-    def __init__(self, address: str) -> None:
-        from distributed import Client
-
-        self._address = address
-        _must_answer(address)
-        try:
-            self._client: Any = Client(address, timeout="10s")
-        except (OSError, ValueError) as error:
-            raise _not_reached(address, error) from None
-        self._refuse_others(address)
-        self._executor = self._client.get_executor(pure=False)
-
-    def _refuse_others(self, address: str) -> None:
-        """Refuse a cluster without workers, with another stopgo, or with several threads in a process."""
-        versions = self._client.run(computed_by)
-        if not versions:
-            self._client.close()
-            raise InputError(f"--scheduler {address}: has no workers; start some with: dask worker {address}")
-        own = computed_by()
-        for worker, version in versions.items():
-            if version != own:
-                self._client.close()
-                text = f"{worker}: has another stopgo ({version}) than this machine ({own})"
-                raise InputError(f"{text}; install the same on both")
-        threads = self._client.nthreads()
-        for worker, count in threads.items():
-            if count != 1:
-                self._client.close()
-                raise InputError(f"{worker}: has {count} threads; start it with --nthreads 1")
-        self.slots = len(threads)
-
-    def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
-        if self._client.status != "running":
-            raise OutcomeUnknown(f"--scheduler {self._address}: is gone; call the batch again to continue it")
-        return self._executor.submit(work, task)
-
-    def renew(self, slot: int) -> None:
-        """Dask starts its workers again itself."""
-
-    def close(self, *, at_once: bool) -> None:
-        self._executor.shutdown(wait=not at_once)
-        self._client.close()
-
-
-def _must_answer(address: str) -> None:
-    """Refuse an address at which nothing listens: the library would try for many seconds."""
-    host, _, port = address.rpartition("//")[2].rpartition(":")
-    if not port.isdigit():
-        raise InputError(f"--scheduler {address}: give an address such as tcp://127.0.0.1:8786")
-    try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=10.0).close()
-    except (OSError, OverflowError) as error:
-        raise _not_reached(address, error) from None
-
-
-def _not_reached(address: str, error: Exception) -> InputError:
-    reason = getattr(error, "strerror", None) or error
-    return InputError(f"--scheduler {address}: not reached ({reason}); start one with: dask scheduler")
-
-
 def engine_for(*, workers: int, scheduler: str | None) -> Engine:
     """Return the engine that the options choose."""
-    return LocalEngine(workers) if scheduler is None else ClusterEngine(scheduler)
+    if scheduler is None:
+        return LocalEngine(workers)
+    return ClusterEngine(scheduler)
 
 
 @dataclass
@@ -177,8 +133,6 @@ class Running:
 
     engine: Engine
     tasks: Sequence[PlanTask]
-    memory: float
-    """Bytes that all slots together may use."""
     begun: Callable[[str], None] = lambda name: None
     """Called with the name of an entry that begins."""
     waiting: Callable[[], None] = lambda: None
@@ -194,7 +148,7 @@ class Running:
 
     def outcomes(self, stopped: Callable[[], bool] = lambda: False) -> Iterator[PlanOutcome]:
         """Work on all entries, the largest files first; once `stopped`, begin no more."""
-        queue = deque(sorted(self.tasks, key=_memory_of, reverse=True))
+        queue = deque(sorted(self.tasks, key=lambda task: task.memory, reverse=True))
         alone: deque[PlanTask] = deque()
         while queue or alone or self._now:
             if stopped():
@@ -202,39 +156,45 @@ class Running:
                 alone.clear()
             self._fill(queue)
             if not queue and not self._now and alone:
-                self._start(0, alone.popleft())
+                self._start(0, alone.popleft(), roomiest=True)
             done, _ = wait(self._now, timeout=TICK_S, return_when=FIRST_COMPLETED)
             self.waiting()
+            self.engine.look()
             for future in done:
                 slot, task = self._now.pop(future)
                 outcome = self._outcome_of(future, slot, task)
-                if outcome is None:
+                if outcome is not None:
+                    yield outcome
+                elif self._tries[task.name]:
                     alone.append(task)
                 else:
-                    yield outcome
+                    queue.append(task)
 
     def _fill(self, queue: deque[PlanTask]) -> None:
         """Begin entries while there are free slots and memory; one always runs."""
         free = [slot for slot in range(self.engine.slots) if slot not in {s for s, _ in self._now.values()}]
         for slot in free:
-            used = sum(_memory_of(task) for _, task in self._now.values())
-            fitting = next((t for t in queue if not self._now or used + _memory_of(t) <= self.memory), None)
+            used = sum(task.memory for _, task in self._now.values())
+            fitting = next((t for t in queue if not self._now or used + t.memory <= self.engine.memory), None)
             if fitting is None:
                 return
             queue.remove(fitting)
             self._start(slot, fitting)
 
-    def _start(self, slot: int, task: PlanTask) -> None:
+    def _start(self, slot: int, task: PlanTask, *, roomiest: bool = False) -> None:
+        future = self.engine.submit(slot, task, roomiest=roomiest)
         self._tries[task.name] = self._tries.get(task.name, 0) + 1
         self.begun(task.name)
-        self._now[self.engine.submit(slot, task)] = (slot, task)
+        self._now[future] = (slot, task)
 
     def _outcome_of(self, future: Future[PlanOutcome], slot: int, task: PlanTask) -> PlanOutcome | None:
         """The outcome; None if the entry is to be tried again."""
         try:
             return future.result()
         except (BrokenProcessPool, CancelledError):
-            self.engine.renew(slot)
+            if not self.engine.renew(slot):
+                self._tries[task.name] -= 1  # the entry has no part in this
+                return None
         except Exception as error:  # noqa: BLE001  where the entry's process ends
             if type(error).__name__ != "KilledWorker":  # dask's word for a process that ended
                 return _failed(task, f"unexpected error ({type(error).__name__}: {error}); please report it")
@@ -246,15 +206,6 @@ class Running:
 
 def _failed(task: PlanTask, problem: str) -> PlanOutcome:
     return PlanOutcome(name=task.name, status="failed", exit_code=2, problem=f"{task.floor}: {problem}")
-
-
-def _memory_of(task: PlanTask) -> float:
-    """Estimated memory of an entry, bytes."""
-    try:
-        size = os.path.getsize(task.floor)
-    except OSError:
-        size = 0
-    return BASE_BYTES + BYTES_PER_BYTE * size
 
 
 def free_memory() -> float:

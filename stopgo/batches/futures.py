@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stopgo.batches.batch_run import Batch, expanded
-from stopgo.batches.engine import Engine, Running, engine_for, free_memory
+from stopgo.batches.engine import Engine, Running, engine_for
 from stopgo.batches.index_page import entries_table
 from stopgo.batches.record import BatchRecord, EntryRecord
 from stopgo.batches.store import ResultStore
@@ -43,6 +44,17 @@ class PlannedBatch:
 
     def _repr_html_(self) -> str:
         return entries_table(self.records())
+
+    def _ipython_display_(self) -> None:
+        """Show the table in a notebook; it grows there with every entry that is done."""
+        display = importlib.import_module("IPython.display")
+        place = display.display(display.HTML(self._repr_html_()), display_id=True)
+
+        def grow(done: object) -> None:
+            place.update(display.HTML(self._repr_html_()))
+
+        for future in self.futures.values():
+            future.add_done_callback(grow)
 
 
 def start_batch(
@@ -81,7 +93,7 @@ def _run(
         left = batch.take_kept()
         for record in batch.records():
             futures[record.name].set_result(record)
-        running = Running(engine, left, free_memory())
+        running = Running(engine, left)
         for outcome in running.outcomes(stopped.is_set):
             futures[outcome.name].set_result(batch.take(outcome))
         batch.write()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import datetime
 import io
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,12 @@ NOTHING = "nothing"
 """Status of an entry without anything that was finished since the last visit."""
 
 
+BASE_BYTES = 350e6
+"""Memory of a process that plans a small floor."""
+BYTES_PER_BYTE = 12.0
+"""Memory per byte of the floor's file."""
+
+
 class PlanTask(msgspec.Struct, frozen=True, kw_only=True):
     """One plan to be made."""
 
@@ -41,6 +48,14 @@ class PlanTask(msgspec.Struct, frozen=True, kw_only=True):
     store: Path
     all_parts: bool = False
     strict: bool = False
+
+    @property
+    def memory(self) -> float:
+        """Estimated memory, bytes."""
+        try:
+            return BASE_BYTES + BYTES_PER_BYTE * os.path.getsize(self.floor)
+        except OSError:
+            return BASE_BYTES
 
 
 class PlanOutcome(msgspec.Struct, frozen=True, kw_only=True):

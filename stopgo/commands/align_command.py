@@ -111,12 +111,12 @@ def _with_transform(mission: Path, out: Path, fit: RigidFit) -> str:
     """Write the mission with the transform in its frame; return its revision in words."""
     from msgspec.structs import replace
 
-    from stopgo.mission.document import sealed
+    from stopgo.mission.document import with_digest
     from stopgo.mission.files.mission_json import encode, next_revision, read
 
     document = read(mission)
     placed = replace(document, frame=replace(document.frame, to_map=fit.transform))
-    made = sealed(replace(placed, revision=next_revision(out, placed)))
+    made = with_digest(replace(placed, revision=next_revision(out, placed)))
     write_checked(out, encode(made))
     return f"{out}: {made.name}, revision {made.revision}"
 

@@ -211,7 +211,7 @@ def _print_entries(entries: Sequence[Entry], *, as_json: bool) -> None:
 
 def _run(batch: Batch, workers: int, scheduler: str | None, store_gb: float) -> BatchRecord:
     """Plan what the store does not have; the record is written also if that is ended."""
-    from stopgo.batches.engine import Running, engine_for, free_memory
+    from stopgo.batches.engine import Running, engine_for
     from stopgo.batches.store import ResultStore
 
     with running(f"looking up {len(batch.entries)} plans") as step:
@@ -220,7 +220,7 @@ def _run(batch: Batch, workers: int, scheduler: str | None, store_gb: float) -> 
             if left:
                 progress = BatchProgress(step, total=len(left))
                 engine = engine_for(workers=workers, scheduler=scheduler)
-                work = Running(engine, left, free_memory(), progress.begun, progress.show)
+                work = Running(engine, left, progress.begun, progress.show)
                 with work:
                     for outcome in work.outcomes():
                         progress.ended(batch.take(outcome))

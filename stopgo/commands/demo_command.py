@@ -41,7 +41,7 @@ def demo_command(
     from stopgo.mission.files.plan_toml import read_settings
 
     with as_file(files("stopgo.recordings") / "samples" / "office.dxf") as floor:
-        report = plan_files(floor, out, read_settings(None, {}))[0]
+        report = plan_files(floor, out, read_settings(None, {}), beside=True)[0]
     typer.echo(report.as_text())
     with (
         tempfile.TemporaryDirectory() as state,

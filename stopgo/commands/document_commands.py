@@ -17,7 +17,7 @@ from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult, OtherFloor
 from stopgo.mission.files.atomic import must_not_replace, write_checked
 from stopgo.mission.files.own_floor import must_be_own_floor
-from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.files.plan_toml import read_settings, recorded_settings
 from stopgo.mission.settings import PARAMETERS
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     must_be_own_floor(path, mission)
     data = path.read_bytes()
     drawing, _ = open_drawing(data, source=path)
-    options = options_of(read_settings(None, mission.origin.parameters))
+    options = options_of(recorded_settings(mission.origin.parameters))
     metres = metres_in(drawing, source=path, options=options)
     return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres)
 
@@ -327,14 +327,14 @@ def import_command(
     """
     from msgspec.structs import replace
 
-    from stopgo.mission.document import sealed
+    from stopgo.mission.document import with_digest
     from stopgo.mission.files.imports import read_mission
     from stopgo.mission.files.mission_json import encode, next_revision, read
 
     given = {"origin": origin, "start": start}
     settings = read_settings(parameters, {key: PARAMETERS[key].given(text) for key, text in given.items()})
     made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
-    mission = sealed(replace(made, revision=next_revision(out, made)))
+    mission = with_digest(replace(made, revision=next_revision(out, made)))
     write_checked(out, encode(mission))
     _print_import(read(out), out, (*track.notes, LEGS_UNCHECKED), as_json)
 

@@ -106,7 +106,7 @@ def plan_command(
 
         plan_one = partial(_plan_storey, all_parts=all_parts, strict=strict, print_options=options)
         return plan_storeys(floor, result_folder(out), settings, plan_one, as_json=as_json)
-    reports = plan_files(floor, out, settings, all_parts=all_parts, print_options=options)
+    reports = plan_files(floor, out, settings, all_parts=all_parts, print_options=options, beside=True)
     _print_reports(reports, as_json=as_json)
     return _exit_code(reports, strict=strict)
 

@@ -1,9 +1,8 @@
-"""`stopgo runs`: lists the plans and runs in a folder, in the terminal or in a browser."""
+"""`stopgo runs`: lists the plans and runs in a folder."""
 
 from __future__ import annotations
 
 import json
-import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,6 @@ import typer
 
 from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable, printable_lines
-from stopgo.mission.errors import InputError
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -22,20 +20,12 @@ def add_commands(app: typer.Typer) -> None:
 def runs(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder; those below it count too.")],
     json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
-    web: Annotated[
-        bool, typer.Option("--web", help="Show them in a browser on this machine, until Ctrl-C.")
-    ] = False,
-    port: Annotated[int | None, typer.Option(help="With --web: port to listen on; else a free one.")] = None,
 ) -> None:
     """List plans and runs in a folder, the newest run first, with what each acquired.
 
-    Keeps an index in the folder, and reads only recordings that are new or have changed.
+    Keeps an index in the folder, and reads only recordings that are new or have changed. stopgo site shows
+    them in a browser.
     """
-    if web:
-        _serve_runs(folder, port)
-        return
-    if port is not None:
-        raise InputError(f"--port {port}: needs --web; add --web or leave out --port")
     from stopgo.recordings.catalog.run_index import index_json, index_of, index_text
 
     with running(f"reading {folder}"):
@@ -44,15 +34,3 @@ def runs(
     typer.echo(text)
     for fault in index.faults():
         typer.echo(f"stopgo: {printable(fault)}", err=True)
-
-
-def _serve_runs(folder: Path, port: int | None) -> None:
-    """Serve the pages until Ctrl-C."""
-
-    from stopgo.recordings.catalog.run_site import serving
-
-    with serving(folder, port=port) as address:
-        typer.echo(
-            printable(f"{folder}: {address} shows its runs, with reports and Rerun's viewer; Ctrl-C ends")
-        )
-        threading.Event().wait()

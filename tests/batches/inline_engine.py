@@ -13,14 +13,17 @@ Work = Callable[[PlanTask], PlanOutcome]
 class InlineEngine:
     """Slots that work on an entry as soon as it is submitted."""
 
-    def __init__(self, slots: int, work: Work) -> None:
+    def __init__(self, slots: int, work: Work, memory: float = 1e12) -> None:
         self.slots = slots
+        self.memory = memory
         self.work = work
         self.begun: list[tuple[int, str]] = []
         self.renewed: list[int] = []
         self.closed = False
+        self.own_fault = True
+        """Answer of `renew`: only the slot's own process had ended."""
 
-    def submit(self, slot: int, task: PlanTask) -> Future[PlanOutcome]:
+    def submit(self, slot: int, task: PlanTask, *, roomiest: bool = False) -> Future[PlanOutcome]:
         self.begun.append((slot, task.name))
         future: Future[PlanOutcome] = Future()
         try:
@@ -29,8 +32,11 @@ class InlineEngine:
             future.set_exception(error)
         return future
 
-    def renew(self, slot: int) -> None:
+    def renew(self, slot: int) -> bool:
         self.renewed.append(slot)
+        return self.own_fault
+
+    def look(self) -> None: ...
 
     def close(self, *, at_once: bool) -> None:
         self.closed = True

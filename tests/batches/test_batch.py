@@ -6,14 +6,18 @@ import json
 import signal
 import subprocess
 import sys
+import threading
+from concurrent.futures import Future
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 import stopgo
 from stopgo.batches import engine
-from stopgo.batches.record import read_record
+from stopgo.batches.futures import PlannedBatch
+from stopgo.batches.record import EntryRecord, read_record
 from stopgo.batches.work import work
 from tests.batches.halls import batch_file, hall
 from tests.batches.inline_engine import InlineEngine
@@ -125,6 +129,26 @@ def test_a_batch_from_python_has_a_future_for_each_entry(site: Path) -> None:
     assert made.wait()
     assert "<table" in made._repr_html_()
     assert read_record(site / "out") is not None
+
+
+def test_a_notebook_shows_the_table_as_it_grows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+    place = SimpleNamespace(update=shown.append)
+
+    def display(html: str, *, display_id: bool) -> object:
+        shown.append(html)
+        return place
+
+    fake = SimpleNamespace(display=display, HTML=str)
+    monkeypatch.setitem(sys.modules, "IPython.display", cast("Any", fake))
+    futures: dict[str, Future[EntryRecord]] = {"a": Future(), "b": Future()}
+    made = PlannedBatch(futures, tmp_path, threading.Thread(), threading.Event())
+    made._ipython_display_()
+    futures["b"].set_result(EntryRecord(name="b", floor="b.dxf", place="", status="planned"))
+    futures["a"].cancel()
+    assert len(shown) == 3
+    assert ">b<" not in shown[0]
+    assert ">b<" in shown[1]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a signal that only POSIX has")

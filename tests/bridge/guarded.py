@@ -8,8 +8,8 @@ from typing import Any
 
 from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import HolderRole, now_utc, read_keys
-from stopgo.bridge.link.memory_link import SealedMessage, Switchboard
-from stopgo.bridge.link.seals import KeySeals
+from stopgo.bridge.link.memory_link import SignedMessage, Switchboard
+from stopgo.bridge.link.signatures import KeySigning
 from stopgo.bridge.station.station import Station
 from stopgo.mission.run.events import StateReport
 from tests.bridge.world import Field
@@ -33,10 +33,10 @@ class Router(Switchboard):
 
     def __init__(self) -> None:
         super().__init__()
-        self.seen: list[SealedMessage] = []
-        self.meddle: Callable[[SealedMessage], Iterable[SealedMessage]] = lambda packet: (packet,)
+        self.seen: list[SignedMessage] = []
+        self.meddle: Callable[[SignedMessage], Iterable[SignedMessage]] = lambda packet: (packet,)
 
-    def carried(self, packet: SealedMessage) -> Iterable[SealedMessage]:
+    def carried(self, packet: SignedMessage) -> Iterable[SignedMessage]:
         self.seen.append(packet)
         return self.meddle(packet)
 
@@ -52,10 +52,10 @@ class GuardedField(Field):
         self.link = self.board.link()
         self.answer_as("r1")
 
-    def seals(self, name: str, *, boot_id: str = "") -> KeySeals:
-        """What `name` seals with, on the field's clock."""
+    def signing(self, name: str, *, boot_id: str = "") -> KeySigning:
+        """How `name` signs, on the field's clock."""
         held = read_keys(self.site / name, now=now_utc())
-        return KeySeals(held, boot_id=boot_id, clock_ns=self.steady_ns)
+        return KeySigning(held, boot_id=boot_id, clock_ns=self.steady_ns)
 
     def steady_ns(self) -> int:
         """Time that no date changes."""
@@ -72,10 +72,10 @@ class GuardedField(Field):
 
     def answer_as(self, name: str) -> None:
         """Answer for the robot, with the keys of `name`."""
-        self.serve(self.seals(name, boot_id=self.controller.boot_id))
+        self.serve(self.signing(name, boot_id=self.controller.boot_id))
 
     def guarded_station(self, name: str = "alice") -> Station:
         """A station with the keys of `name`; the robot goes on answering as it does."""
         held = read_keys(self.site / name, now=now_utc())
-        link = self.board.link(self.seals(name))
+        link = self.board.link(self.signing(name))
         return Station(link, self.keys, commander=name, timeout_s=0.1, patience_s=0.1, held=held)

@@ -14,7 +14,7 @@ import msgspec
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import Commit, KeyExpressions, Manifest
-from stopgo.bridge.link.seals import NO_SEALS, Seals
+from stopgo.bridge.link.signatures import NO_SIGNING, MessageSigning
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
@@ -36,7 +36,7 @@ from stopgo.mission.document import (
     Sees,
     Start,
     Stop,
-    sealed,
+    with_digest,
 )
 from stopgo.mission.run.events import StateReport
 from stopgo.mission.run.revision import RevisionPolicy
@@ -51,7 +51,7 @@ def corridor(*, stops: int = 3, revision: int = 1, closed: bool = True, **stop_d
     """Stops every 2 m along the x axis from a start at the origin, and the way straight back."""
     made = tuple(_stop(index, **stop_details) for index in range(stops))
     end: Point = (2.0 * stops, 0.0)
-    return sealed(
+    return with_digest(
         Mission(
             id="c0ffee00c0ffee00c0ffee00c0ffee00", revision=revision, name="corridor", digest="",
             frame=Frame(name="site"), georeference=None, robot=WALKING,
@@ -113,10 +113,10 @@ class Field:
         """A station; whoever answers for the robot goes on doing so."""
         return Station(self.board.link(), self.keys, commander=commander, timeout_s=0.3)
 
-    def serve(self, seals: Seals = NO_SEALS) -> None:
+    def serve(self, signing: MessageSigning = NO_SIGNING) -> None:
         """Answer for the robot as it is since its last boot."""
         self.link.close()
-        self.link = self.board.link(seals)
+        self.link = self.board.link(signing)
         self.agent = Agent(
             keys=self.keys, link=self.link, journal=self.journal, runner=self.controller, inbox=self.inbox,
             clock=self.clock, command_clock=self.clock,

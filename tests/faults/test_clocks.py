@@ -19,7 +19,7 @@ from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.link.keys import now_utc, read_keys
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions, Rejected
-from stopgo.bridge.link.seals import KeySeals
+from stopgo.bridge.link.signatures import KeySigning
 from stopgo.bridge.robot import agent as agents
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.controller import Controller
@@ -178,7 +178,7 @@ def test_a_robot_whose_date_is_beyond_a_certificates_end_obeys_it_no_more_and_ru
     field, date = GuardedField(site), now_utc()
     robot = read_keys(site / "r1", now=date)
     field.serve(
-        KeySeals(robot, boot_id=field.controller.boot_id, now=lambda: date, clock_ns=field.clock.now_ns)
+        KeySigning(robot, boot_id=field.controller.boot_id, now=lambda: date, clock_ns=field.clock.now_ns)
     )
     station = field.guarded_station()
     station.push(corridor())

@@ -16,8 +16,10 @@ from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replaying import replay
 from tests.faults.sizes import FULL
-from tests.recordings.logs.writing import ODOMETRY, Messages, write_bag
 from tests.recordings.replay.driving import Odd, driven, logged, wandering
+from tests.recordings.truth import formats
+from tests.recordings.truth.formats import Writer
+from tests.recordings.truth.senses import Sensed
 
 LOGS = Path(__file__).parents[3] / "shared" / "data" / "logs"
 REAL = (
@@ -25,7 +27,9 @@ REAL = (
     "rover-stop-and-go.BIN", "px4.ulg",
 )  # fmt: skip
 PLACES = 56
-SUFFIXES = (".csv", ".tum", ".mcap", ".db3", ".bag")
+WHOLE: tuple[Writer, ...] = (
+    formats.csv_table, formats.tum, formats.kitti, *formats.BAGS, *formats.VEHICLES
+)  # fmt: skip
 MISSION = wandering(1)
 Damage = Callable[[bytearray, random.Random], None]
 
@@ -110,45 +114,34 @@ def test_a_damaged_log_is_read_or_refused_in_one_line(
     assert capsys.readouterr().out == ""
 
 
-def text_of(rows: np.ndarray, head: str, line: str) -> str:
-    return head + "".join(line.format(*row) for row in rows)
-
-
-def written(folder: Path, suffix: str, odd: Odd) -> Path:
+def written(folder: Path, writer: Writer, odd: Odd) -> Path:
     """A log of a drive in one format, of which every byte is known."""
     track = logged(driven(MISSION, odd))
-    rows = np.column_stack([track.ns / 1e9, track.xy, track.heading])
-    if suffix == ".csv":
-        path = folder / "whole.csv"
-        path.write_text(text_of(rows, "time,x,y,heading\n", "{:.3f},{:.4f},{:.4f},{:.5f}\n"))
-        return path
-    if suffix == ".tum":
-        path = folder / "whole.tum"
-        turns = np.column_stack([rows[:, :3], np.sin(rows[:, 3] / 2), np.cos(rows[:, 3] / 2)])
-        path.write_text(text_of(turns, "", "{:.3f} {:.4f} {:.4f} 0 0 0 {:.6f} {:.6f}\n"))
-        return path
-    messages = Messages(suffix != ".bag")
-    poses = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)
-    told = [("/odom", ODOMETRY, ns, messages.odometry(ns, (x, y, turn))) for ns, (x, y), turn in poses]
-    path = write_bag(folder / f"whole{suffix}", told)
-    return path if path.is_file() else next(path.glob(f"*{suffix}"))
+    nothing = np.zeros(len(track))
+    poses = Sensed((track.ns - track.ns[0]) / 1e9, track.ns, track.xy, track.heading, nothing, nothing)
+    return writer(folder, MISSION, poses)
 
 
-def answer(path: Path) -> str:
+def answer(path: Path, writer: Writer) -> str:
     """Verdict on the drive; `refused` if there is none."""
+    placing = Placing() if writer in formats.VEHICLES else Placing(align="first")
     try:
-        return drive_verdict(replay(read_log(path), MISSION, Placing(align="first"))).answer
+        return drive_verdict(replay(read_log(path), MISSION, placing)).answer
     except (InputError, Undecided) as error:
         assert "\n" not in str(error)
         return "refused"
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("writer", WHOLE, ids=lambda writer: writer.__name__)
 @pytest.mark.parametrize("odd, whole, never", [(Odd(), "yes", "no"), (Odd(frozenset({4})), "no", "yes")])
-def test_damage_turns_no_verdict(tmp_path: Path, suffix: str, odd: Odd, whole: str, never: str) -> None:
-    path = written(tmp_path, suffix, odd)
-    assert answer(path) == whole
-    numbers = numbers_for(SUFFIXES.index(suffix) + (whole == "no"))
-    found = [(number, answer(damaged(path, tmp_path / f"damaged{suffix}", number))) for number in numbers]
+def test_damage_turns_no_verdict(tmp_path: Path, writer: Writer, odd: Odd, whole: str, never: str) -> None:
+    path = written(tmp_path, writer, odd)
+    assert answer(path, writer) == whole
+    (tmp_path / "damaged").mkdir()
+    if (tmp_path / "times.txt").exists():
+        (tmp_path / "damaged" / "times.txt").write_bytes((tmp_path / "times.txt").read_bytes())
+    target = tmp_path / "damaged" / path.name
+    numbers = numbers_for(WHOLE.index(writer) + (whole == "no"))
+    found = [(number, answer(damaged(path, target, number), writer)) for number in numbers]
     assert [number for number, told in found if told == never] == []

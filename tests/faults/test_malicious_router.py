@@ -17,9 +17,9 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.link import Request
-from stopgo.bridge.link.memory_link import SealedMessage
+from stopgo.bridge.link.memory_link import SignedMessage
 from stopgo.bridge.link.protocol import encode
-from stopgo.bridge.link.seals import OLDEST_S
+from stopgo.bridge.link.signatures import OLDEST_S
 from stopgo.bridge.station import station as stations
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.decision import STATES
@@ -61,12 +61,12 @@ class Malice:
         self.carries = chance.choice([3, 30, 300])
         """How often, beside 35 times that it does not."""
         self.did: Counter[str] = Counter()
-        self.kept: list[SealedMessage] = []
+        self.kept: list[SignedMessage] = []
         self.honest = False
         self.withholds = ""
         """Messages on keys with this in them are all held back."""
 
-    def __call__(self, message: SealedMessage) -> Iterable[SealedMessage]:
+    def __call__(self, message: SignedMessage) -> Iterable[SignedMessage]:
         if self.honest:
             return (message,)
         self.kept.append(message)
@@ -77,11 +77,11 @@ class Malice:
         self.did[kind] += 1
         return self.done(kind, message)
 
-    def done(self, kind: str, message: SealedMessage) -> Iterable[SealedMessage]:
+    def done(self, kind: str, message: SignedMessage) -> Iterable[SignedMessage]:
         if kind == "hold back":
             later_s = 10 ** self.chance.uniform(-1.0, 2.0)
             self.field.clock.at(later_s, lambda: self.deliver(message))
-        arrives: dict[str, Callable[[], tuple[SealedMessage, ...]]] = {
+        arrives: dict[str, Callable[[], tuple[SignedMessage, ...]]] = {
             "carry": lambda: (message,),
             "replay": lambda: (message, self.any_like(message)),
             "swap": lambda: (self.any_like(message),),
@@ -90,7 +90,7 @@ class Malice:
         }
         return arrives[kind]() if kind in arrives else ()
 
-    def any_like(self, message: SealedMessage) -> SealedMessage:
+    def any_like(self, message: SignedMessage) -> SignedMessage:
         return self.chance.choice([kept for kept in self.kept if kept.kind == message.kind])
 
     def shifted(self, payload: bytes) -> bytes:
@@ -109,14 +109,14 @@ class Malice:
             }
         ).encode()
 
-    def flipped(self, message: SealedMessage) -> dict[str, bytes]:
+    def flipped(self, message: SignedMessage) -> dict[str, bytes]:
         which = self.chance.choice(["payload", "seal"])
         data = bytearray(getattr(message, which))
         if data:
             data[self.chance.randrange(len(data))] ^= 1 << self.chance.randrange(8)
         return {which: bytes(data)}
 
-    def deliver(self, message: SealedMessage) -> None:
+    def deliver(self, message: SignedMessage) -> None:
         """What was held back arrives after all; nobody waits for its answer any more."""
         if message.kind == "told":
             self.honest = True
@@ -128,7 +128,7 @@ class Malice:
 
 def impostor(field: GuardedField, name: str) -> None:
     """Somebody with other keys answers first, and says that all is well."""
-    link = field.board.link(field.seals(name, boot_id=field.controller.boot_id))
+    link = field.board.link(field.signing(name, boot_id=field.controller.boot_id))
 
     def answered(request: Request) -> bytes:
         verb = request.key.rpartition("/")[2]

@@ -24,7 +24,7 @@ from stopgo.mission.comparing.comparison import COLUMNS
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.console.table import duration
-from stopgo.mission.document import Mission, Stop, sealed
+from stopgo.mission.document import Mission, Stop, with_digest
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.geometry import frozen
 from stopgo.mission.run.events import Held, RevisionTaken
@@ -94,9 +94,9 @@ def story_of(seed: int, folder: Path) -> Story:
     chance = random.Random(seed + 20_000)
     whole = wandering(seed, stops=5, scan_s=8.0)
     policy = replace(whole.policy, link_loss="hold", link_loss_after_s=30.0)
-    mission = sealed(replace(whole, stops=whole.stops[:4], policy=policy))
+    mission = with_digest(replace(whole, stops=whole.stops[:4], policy=policy))
     stops = whole.stops[: 5 if chance.random() < 0.5 else 3]
-    revised = sealed(replace(mission, stops=stops, revision=2))
+    revised = with_digest(replace(mission, stops=stops, revision=2))
     troubles = troubles_of(seed, mission)
     changes = (chance.uniform(5, 40), revised) if chance.random() < 0.7 else None
     troubles = Troubles(

@@ -36,7 +36,7 @@ def test_a_run_with_two_stops_skipped_and_its_top_up_reach_the_coverage(
     assert {stop for stop, outcome in outcomes.items() if outcome == "skipped"} == skipped
     alone = as_driven(planned, places(first, mission))
     assert not alone.enough
-    assert told["coverage"]["shares"]["all"]["as_driven"] == alone.shares.whole.coverage
+    assert told["coverage"]["shares"]["all"]["as_driven"] == alone.coverage.whole.coverage
     top_up = read(further)
     second = run_of(top_up, Troubles(), tmp_path / "second", seed=2)
     both = as_driven(planned, np.concatenate([places(first, mission), places(second, top_up)]))

@@ -17,7 +17,7 @@ from stopgo.mission.document import (
     Sees,
     Start,
     Stop,
-    sealed,
+    with_digest,
 )
 from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
@@ -53,7 +53,7 @@ def mission_of(
     begin: tuple[float, float] = (0.0, 0.0),
 ) -> Mission:
     """A mission over `stops` from `begin`, facing +x: 1 m/s, 1 m/s², 90° a second."""
-    return sealed(Mission(
+    return with_digest(Mission(
         id="0123456789abcdef0123456789abcdef", revision=1, name="room", digest="",
         frame=Frame(name="room"), georeference=SiteOrigin(lat=51.5, lon=7.5, alt=100.0, heading_deg=0.0),
         robot=RobotSpec(radius=0.35, speed=1.0, turn_rate=math.pi / 2, acceleration=1.0),

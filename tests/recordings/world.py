@@ -16,7 +16,7 @@ from stopgo.mission.document import (
     Sees,
     Start,
     Stop,
-    sealed,
+    with_digest,
 )
 from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.document.schedule import Schedule
@@ -179,7 +179,7 @@ def mission_of(route: Route) -> Mission:
         )
         for number, (xy, leg) in enumerate(zip(route.xy, route.approaches, strict=True))
     )
-    return sealed(
+    return with_digest(
         Mission(
             id=MISSION_ID,
             revision=1,
@@ -224,4 +224,4 @@ def revised(mission: Mission) -> Mission:
         msgspec.structs.replace(second, id=name, x=x, y=y, approach=(places[k], (x, y)))
         for k, (name, (x, y)) in enumerate(zip(("S2", "S3"), places[1:], strict=True))
     ]
-    return sealed(msgspec.structs.replace(mission, revision=2, stops=(first, *later)))
+    return with_digest(msgspec.structs.replace(mission, revision=2, stops=(first, *later)))

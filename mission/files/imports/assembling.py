@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import msgspec
 
@@ -18,7 +19,7 @@ from stopgo.mission.document import (
     Start,
     Stop,
     mission_id,
-    sealed,
+    with_digest,
 )
 from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.document.problems import problems_of
@@ -51,7 +52,7 @@ def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str
     """
     legs = list(_legs(track, settings))
     start = _start(track, settings, legs[0], file)
-    mission = sealed(
+    mission = with_digest(
         Mission(
             id=mission_id(FloorSource(file, digest), settings, __version__),
             revision=1,
@@ -65,7 +66,7 @@ def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str
             stops=tuple(_stops(track.visits, legs, start.heading, settings)),
             return_=tuple(_distinct([legs[-1][-1], *track.back])) if track.back else None,
             policy=policy_of(settings),
-            origin=origin_of(settings, floor=file, digest=digest),
+            origin=origin_of(replace(settings, register=False), floor=file, digest=digest),
         )
     )
     for problem in problems_of(mission):

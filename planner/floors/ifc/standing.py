@@ -56,5 +56,5 @@ def _above(points: FloatArray, height: float, sign: float) -> FloatArray:
     up = sign * (points[:, 2] - height)
     following, up_next = np.roll(points, -1, axis=0), np.roll(up, -1)
     crossing = (up < 0) != (up_next < 0)
-    share = np.divide(up, up - up_next, out=np.zeros_like(up), where=crossing)[:, None]
-    return np.vstack([points[up >= 0], (points + share * (following - points))[crossing]])
+    fraction = np.divide(up, up - up_next, out=np.zeros_like(up), where=crossing)[:, None]
+    return np.vstack([points[up >= 0], (points + fraction * (following - points))[crossing]])

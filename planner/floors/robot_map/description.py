@@ -48,12 +48,12 @@ class MapDescription:
         written = [255 - value if self.negate else value for value in _WRITTEN_UNKNOWN[self.mode]]
         known = picture.opaque & ~np.isin(picture.grey, written)
         if self.mode == "raw":
-            share, known = grey / 100.0, known & (grey <= 100)
+            fraction, known = grey / 100.0, known & (grey <= 100)
         else:
-            share = grey / 255.0 if self.negate else 1.0 - grey / 255.0
+            fraction = grey / 255.0 if self.negate else 1.0 - grey / 255.0
         cells = np.full(grey.shape, UNKNOWN, dtype=np.uint8)
-        cells[known & (share < self.free_thresh)] = FREE
-        cells[known & (share > self.occupied_thresh)] = OCCUPIED
+        cells[known & (fraction < self.free_thresh)] = FREE
+        cells[known & (fraction > self.occupied_thresh)] = OCCUPIED
         return cells[::-1]
 
 

@@ -14,7 +14,7 @@ from stopgo.bridge.station import session_link
 from stopgo.bridge.station import station as stations
 from stopgo.bridge.station.station import Station
 from stopgo.command_line import main
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.files.mission_json import write
 from stopgo.mission.run.events import Scanned
@@ -32,7 +32,7 @@ def hostile() -> Mission:
     stops = tuple(
         msgspec.structs.replace(stop, id=name) for stop, name in zip(mission.stops, names, strict=True)
     )
-    return sealed(msgspec.structs.replace(mission, name=HOSTILE, stops=stops))
+    return with_digest(msgspec.structs.replace(mission, name=HOSTILE, stops=stops))
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import reached
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.command_line import main
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.files.imports import qgc_plan, qgc_waypoints
 from stopgo.mission.files.imports.track import ImportOptions
 from stopgo.mission.files.mission_json import write
@@ -252,7 +252,7 @@ class Stalls(Scripted):
 
 @pytest.mark.real_time
 def test_ctrl_c_cancels_and_tells_what_is_on_the_vehicle(tmp_path: Path, mission: Mission) -> None:
-    write(sealed(mission), tmp_path / "mission.json")
+    write(with_digest(mission), tmp_path / "mission.json")
     with Stalls(held(stops(3))) as stalling:
         command = [
             sys.executable,

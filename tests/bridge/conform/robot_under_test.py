@@ -9,14 +9,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from stopgo.bridge.conform.conform_robot import robot_verdicts
-from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
+from stopgo.bridge.conform.falsified_signatures import FalsifiedSigning
 from stopgo.bridge.conform.requirements import ConformVerdict
 from stopgo.bridge.conform.robot_bench import Forger, OtherStation, RobotBench
 from stopgo.bridge.link.clock import WallClock
 from stopgo.bridge.link.keys import now_utc, read_keys
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
-from stopgo.bridge.link.seals import NO_SEALS, KeySeals, Seals
+from stopgo.bridge.link.signatures import NO_SIGNING, KeySigning, MessageSigning
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.robot.controller import Controller, new_boot_id
 from stopgo.bridge.robot.inbox import Inbox
@@ -51,10 +51,10 @@ class RobotUnderTest:
         self._running = ExitStack()
         self._folder = TemporaryDirectory()
 
-    def seals(self, name: str, boot_id: str = "") -> Seals:
+    def signing(self, name: str, boot_id: str = "") -> MessageSigning:
         if self.site is None:
-            return NO_SEALS
-        return KeySeals(read_keys(self.site / name, now=now_utc()), boot_id=boot_id)
+            return NO_SIGNING
+        return KeySigning(read_keys(self.site / name, now=now_utc()), boot_id=boot_id)
 
     def slow_disk(self, seconds: float) -> None:
         self.sync_s = seconds
@@ -65,7 +65,7 @@ class RobotUnderTest:
 
     def boot(self) -> None:
         boot_id = new_boot_id()
-        link = self.board.link(self.seals("r1", boot_id))
+        link = self.board.link(self.signing("r1", boot_id))
         controller = self.controller(
             robot="r1", journal=self.journal, base=self.base, scanner=self.scanner, clock=self.clock,
             mission_taken=lambda mission: self.base.stand_at_start(pose_of(mission.start)), boot_id=boot_id,
@@ -89,11 +89,11 @@ class RobotUnderTest:
     def bench(self) -> RobotBench:
         forger = None
         if self.site is not None:
-            seals = FalsifiedSeals(self.seals("alice"))
-            forger = Forger(self.board.link(seals), seals)
-        other = OtherStation("bob", self.board.link(self.seals("bob")))
+            signing = FalsifiedSigning(self.signing("alice"))
+            forger = Forger(self.board.link(signing), signing)
+        other = OtherStation("bob", self.board.link(self.signing("bob")))
         return RobotBench(
-            self.board.link(self.seals("alice")), self.keys, commander="alice", timeout_s=2.0, other=other,
+            self.board.link(self.signing("alice")), self.keys, commander="alice", timeout_s=2.0, other=other,
             forger=forger, restart=self.restart, slow_disk=self.slow_disk,
         )  # fmt: skip
 

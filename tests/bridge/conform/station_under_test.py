@@ -14,7 +14,7 @@ from stopgo.bridge.link.keys import HeldKeys, now_utc, read_keys
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
-from stopgo.bridge.link.seals import NO_SEALS, KeySeals
+from stopgo.bridge.link.signatures import NO_SIGNING, KeySigning
 from stopgo.bridge.station.station import Station
 from stopgo.bridge.station.watch import EventLines, watch_with
 from stopgo.mission.document import Mission
@@ -37,7 +37,7 @@ class StationUnderTest:
 
     def link(self) -> Link:
         held = self.held("alice")
-        return self.board.link(NO_SEALS if held is None else KeySeals(held))
+        return self.board.link(NO_SIGNING if held is None else KeySigning(held))
 
     def does(self, what: str, mission: Mission | None) -> int:
         station = self.station(
@@ -63,8 +63,8 @@ class StationUnderTest:
     @contextmanager
     def bench(self) -> Iterator[StationBench]:
         held, boot_id = self.held("r1"), "b1"
-        forged = None if held is None else ForgedAnswers(KeySeals(held, boot_id=boot_id))
-        link = FaultyLink(self.board.link(forged or NO_SEALS), KEYS)
+        forged = None if held is None else ForgedAnswers(KeySigning(held, boot_id=boot_id))
+        link = FaultyLink(self.board.link(forged or NO_SIGNING), KEYS)
         with at_work(FakeRobot(link, KEYS, boot_id, speed_up=10.0)) as robot:
             yield StationBench(robot, self.does, forged=forged)
 

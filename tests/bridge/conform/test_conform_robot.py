@@ -23,7 +23,7 @@ from stopgo.bridge.link.protocol import (
     decode,
     encode,
 )
-from stopgo.bridge.link.seals import KeySeals, SealedAnswering, Seals
+from stopgo.bridge.link.signatures import KeySigning, MessageSigning, SignedAnswering
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
@@ -47,11 +47,11 @@ def test_our_own_robot_meets_every_requirement() -> None:
     assert {verdict.section for verdict in found if verdict.outcome == "not tried"} == {"Signatures"}
 
 
-def test_our_own_robot_with_keys_meets_what_is_said_of_seals(tmp_path: Path) -> None:
+def test_our_own_robot_with_keys_meets_what_is_said_of_signatures(tmp_path: Path) -> None:
     robot = RobotUnderTest(keys_of_site(tmp_path / "site"))
     with booted(robot):
-        seals = [one for one in REQUIREMENTS if one.section == "Signatures"]
-        found = list(tried(seals, robot.bench()))
+        signing = [one for one in REQUIREMENTS if one.section == "Signatures"]
+        found = list(tried(signing, robot.bench()))
     assert {verdict.outcome for verdict in found} == {"passed"}, failed(found)
 
 
@@ -330,22 +330,22 @@ def verdicts_on(robot: RobotUnderTest, requirement: str) -> list[ConformVerdict]
         return list(tried([one], robot.bench(), drive=True))
 
 
-class BelievesEverybody(KeySeals):
-    def seal_answers(self, answer: Answering) -> SealedAnswering:
-        sealed = super().seal_answers(answer)
+class BelievesEverybody(KeySigning):
+    def sign_answers(self, answer: Answering) -> SignedAnswering:
+        signed = super().sign_answers(answer)
         own = self
 
         def answered(request: Request) -> tuple[bytes, bytes]:
-            reply, seal = sealed(request)
+            reply, attachment = signed(request)
             if b"untrusted" not in reply:
-                return reply, seal
-            return answer(request), own.seal_publication(request.key, b"")
+                return reply, attachment
+            return answer(request), own.sign_publication(request.key, b"")
 
         return answered
 
 
-class SealsNoStates(KeySeals):
-    def seal_publication(self, key: str, payload: bytes) -> bytes:
+class SignsNoStates(KeySigning):
+    def sign_publication(self, key: str, payload: bytes) -> bytes:
         return b""
 
 
@@ -354,16 +354,16 @@ class SealsNoStates(KeySeals):
     [
         (BelievesEverybody, "a wrong signature: `untrusted`", "was answered with Info"),
         (BelievesEverybody, "a query without a signature: `untrusted`", "was answered with Info"),
-        (SealsNoStates, "states are signed, numbered and fresh", "it is not signed"),
+        (SignsNoStates, "states are signed, numbered and fresh", "it is not signed"),
     ],
 )
-def test_a_robot_that_seals_or_judges_wrongly_is_found(
-    broken: type[KeySeals], requirement: str, why: str, tmp_path: Path
+def test_a_robot_that_signs_or_judges_wrongly_is_found(
+    broken: type[KeySigning], requirement: str, why: str, tmp_path: Path
 ) -> None:
     class Robot(RobotUnderTest):
-        def seals(self, name: str, boot_id: str = "") -> Seals:
-            good = super().seals(name, boot_id)
-            assert isinstance(good, KeySeals)
+        def signing(self, name: str, boot_id: str = "") -> MessageSigning:
+            good = super().signing(name, boot_id)
+            assert isinstance(good, KeySigning)
             return broken(good._held, boot_id=boot_id) if boot_id else good
 
     (found,) = verdicts_on(Robot(keys_of_site(tmp_path / "site")), requirement)

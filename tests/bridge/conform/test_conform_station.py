@@ -18,7 +18,7 @@ from stopgo.bridge.conform.requirements import NotTried
 from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import Info, encode
-from stopgo.bridge.link.seals import KeySeals, Question
+from stopgo.bridge.link.signatures import KeySigning, Question
 from stopgo.bridge.station.follow import Followed
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
@@ -38,7 +38,7 @@ def test_our_own_station_meets_every_requirement() -> None:
     assert {one.section for one in found.values() if one.outcome == "not tried"} == {"Signatures"}
 
 
-def test_our_own_station_with_keys_meets_what_is_said_of_seals(tmp_path: Path) -> None:
+def test_our_own_station_with_keys_meets_what_is_said_of_signatures(tmp_path: Path) -> None:
     found = verdicts(StationUnderTest(keys_of_site(tmp_path / "site")), "Signatures")
     assert {text: one.reason for text, one in found.items() if one.outcome != "passed"} == {}
 
@@ -183,9 +183,9 @@ def test_a_station_may_ask_before_it_pushes() -> None:
     assert verdicts(station, whole)[whole].outcome == "passed"
 
 
-class BelievesEverybody(KeySeals):
-    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
-        super().verify_answer(question, payload, seal)
+class BelievesEverybody(KeySigning):
+    def verify_answer(self, question: Question, payload: bytes, attachment: bytes) -> bytes | None:
+        super().verify_answer(question, payload, attachment)
         return payload
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from stopgo.bridge.link.protocol import VERSION, Tagged
-from stopgo.bridge.link.seals import Seal
+from stopgo.bridge.link.signatures import SignatureAttachment
 from stopgo.mission.run.events import KINDS, AnyEvent, Health, PoseReport, StateReport, UnknownKind
 from stopgo.mission.run.run_commands import Answer, RunCommand
 
@@ -20,14 +20,23 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def protocol_schema() -> bytes:
-    """Return a definition of each message, event, report and seal, by its name on the link, as indented JSON.
+    """Return a definition of each kind of message and event, by its name on the link, as indented JSON.
 
     Any further field is valid in each of them, and so is an event of a kind that is not known.
     """
-    spoken = (*Tagged.__subclasses__(), RunCommand, Answer, AnyEvent, StateReport, PoseReport, Health, Seal)
+    spoken = (
+        *Tagged.__subclasses__(),
+        RunCommand,
+        Answer,
+        AnyEvent,
+        StateReport,
+        PoseReport,
+        Health,
+        SignatureAttachment,
+    )
     _, defs = msgspec.json.schema_components(spoken)
-    command = str(RunCommand.__struct_config__.tag)
-    defs[command] = defs.pop(RunCommand.__name__) | {"title": command}
+    for spoken_as, of in ((str(RunCommand.__struct_config__.tag), RunCommand), ("Seal", SignatureAttachment)):
+        defs[spoken_as] = defs.pop(of.__name__) | {"title": spoken_as}
     defs[UnknownKind.__name__] = _of_any_other_kind(defs[UnknownKind.__name__])
     defs["Event"] = _event()
     defs["LogPage"]["properties"]["events"]["items"] = {"$ref": "#/$defs/Event"}

@@ -19,7 +19,7 @@ from stopgo.bridge.link.direct_question import PROTOCOL, DirectQuestion
 from stopgo.bridge.link.keys import now_utc, read_keys
 from stopgo.bridge.link.link import Request
 from stopgo.bridge.link.protocol import KeyExpressions
-from stopgo.bridge.link.seals import KeySeals
+from stopgo.bridge.link.signatures import KeySigning
 from stopgo.bridge.link.zenoh_link import Guard, ZenohLink, admitting
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.station.station import connect
@@ -322,7 +322,7 @@ def answering(robot: Robot) -> list[Request]:
         return b"because"
 
     held = read_keys(robot.site / "site" / "r1", now=now_utc())
-    robot.admission.answers["sx/1/r1/info"] = KeySeals(held, boot_id="b1").seal_answers(answer)
+    robot.admission.answers["sx/1/r1/info"] = KeySigning(held, boot_id="b1").sign_answers(answer)
     return requests
 
 
@@ -339,7 +339,9 @@ def test_a_direct_question_is_answered_without_zenoh(robot: Robot) -> None:
 
 def test_an_answer_that_another_end_has_signed_is_not_taken(robot: Robot) -> None:
     held = read_keys(robot.site / "site" / "bob", now=now_utc())
-    robot.admission.answers["sx/1/r1/info"] = KeySeals(held, boot_id="b1").seal_answers(lambda request: b"no")
+    robot.admission.answers["sx/1/r1/info"] = KeySigning(held, boot_id="b1").sign_answers(
+        lambda request: b"no"
+    )
     assert asked(robot, "sx/1/r1/info").reply is None
 
 

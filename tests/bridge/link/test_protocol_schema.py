@@ -13,7 +13,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from stopgo.bridge.link.protocol import Malformed, Reply, Tagged, decode, encode
-from stopgo.bridge.link.seals import Seal
+from stopgo.bridge.link.signatures import SignatureAttachment
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
 from stopgo.mission.run.run_commands import Answer, RunCommand
@@ -62,13 +62,13 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, Any]]:
     field.work()
     for key, report in ((field.keys.state, field.report()), (field.keys.pose, POSE), *events(field)):
         field.link.publisher(key)(encode(report))
-    link = field.board.link(field.seals("alice"))
+    link = field.board.link(field.signing("alice"))
     for key, payload in ((field.keys.boot, b""), (field.keys.poses, b""), (field.keys.command("start"), CUT)):
         assert link.ask(key, payload, timeout_s=1.0)
     seen = [packet for packet in field.router.seen if packet.payload and packet.payload != CUT]
     bodies = [packet for packet in seen if packet.kind != "question" or "/chunk/" not in packet.key]
     told = [(_name(packet.key, body), body) for packet in bodies for body in (json.loads(packet.payload),)]
-    return [*told, *(("Seal", json.loads(packet.seal)) for packet in seen)]
+    return [*told, *(("Seal", json.loads(packet.attachment)) for packet in seen)]
 
 
 def events(field: GuardedField) -> Iterator[tuple[str, AnyEvent]]:
@@ -94,7 +94,12 @@ def test_what_a_newer_peer_adds_is_valid_and_is_read(said: list[tuple[str, Any]]
         more = widened(body)
         assert more != body
         assert valid(name, more), name
-        readers = {"StateReport": StateReport, "PoseReport": PoseReport, "Seal": Seal, "Command": RunCommand}
+        readers = {
+            "StateReport": StateReport,
+            "PoseReport": PoseReport,
+            "Seal": SignatureAttachment,
+            "Command": RunCommand,
+        }
         if name == "Event":
             event_of(json.dumps(more).encode())
         elif name in readers:

@@ -16,7 +16,7 @@ from stopgo.bridge.link.protocol import PosePage, decode
 from stopgo.bridge.link.zenoh_link import Guard, check_endpoint
 from stopgo.bridge.station.follow import Followed
 from stopgo.bridge.station.station import connect
-from stopgo.mission.document import sealed
+from stopgo.mission.document import with_digest
 from stopgo.mission.errors import InputError, RobotUnreachable
 from stopgo.mission.run.events import Event, Finished, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor
@@ -188,7 +188,7 @@ def test_the_first_pose_of_a_run_is_where_the_robot_was_put(tmp_path: Path) -> N
     """Its mission puts a robot that stands nowhere yet at its start; no pose of before is told of the run."""
     start = msgspec.structs.replace(corridor().start, x=1.0)
     first = msgspec.structs.replace(corridor().stops[0], approach=((1.0, 0.0), (2.0, 0.0)))
-    mission = sealed(msgspec.structs.replace(corridor(), start=start, stops=(first,), return_=None))
+    mission = with_digest(msgspec.structs.replace(corridor(), start=start, stops=(first,), return_=None))
     with robot_process("r1", tmp_path, speed_up=20) as endpoint, connect(endpoint, robot="r1") as station:
         station.push(mission)
         station.command("start")

@@ -12,7 +12,7 @@ import pytest
 
 from stopgo.bridge.robot.base import Rest
 from stopgo.bridge.robot.simulator import Fault, Faults, read_fault
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Pose, Scanned
 from stopgo.mission.run.run_commands import Verb
@@ -32,7 +32,7 @@ def started(mission: Mission, *faults: Fault) -> Field:
 def with_policy(**details: object) -> Mission:
     mission = corridor()
     policy = msgspec.structs.replace(mission.policy, **details)
-    return sealed(msgspec.structs.replace(mission, policy=policy))
+    return with_digest(msgspec.structs.replace(mission, policy=policy))
 
 
 def test_a_failed_scan_is_taken_again() -> None:
@@ -208,7 +208,7 @@ def test_a_robot_that_rolled_past_the_last_stop_takes_it_again() -> None:
 def test_a_turn_that_a_pause_ended_is_finished_before_the_scan() -> None:
     mission = corridor()
     first = msgspec.structs.replace(mission.stops[0], heading=math.pi / 2)
-    mission = sealed(msgspec.structs.replace(mission, stops=(first, *mission.stops[1:])))
+    mission = with_digest(msgspec.structs.replace(mission, stops=(first, *mission.stops[1:])))
     field = started(mission, Fault("slip", 1, 0.2))
     field.work_until(lambda run: run.leg > run.at)
     run_s = (field.clock.now_ns() - field.controller.run.started_ns) / 1e9

@@ -127,7 +127,7 @@ def journal_of_the_second_format(folder: Path) -> None:
 
 
 def journal_of_the_first_format(folder: Path) -> None:
-    """A journal as it was before rows had seals."""
+    """A journal as it was before rows had hashes."""
     journal_of_the_second_format(folder)
     connection = sqlite3.connect(folder / "journal.sqlite")
     connection.execute("DROP INDEX events_of_run")

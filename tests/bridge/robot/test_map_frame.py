@@ -16,7 +16,7 @@ from stopgo.bridge.robot.inbox import Inbox
 from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.map_frame import OnMap, turned, turned_back
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
-from stopgo.mission.document import Frame, sealed
+from stopgo.mission.document import Frame, with_digest
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import Pose
 from tests.bridge.world import EXACT, Field, corridor
@@ -38,7 +38,9 @@ def test_a_quarter_turn_on_paper() -> None:
 def test_a_mission_is_driven_on_the_map_and_told_in_its_own_frame(own: Transform | None) -> None:
     """The robot's own transform counts before the mission's."""
     other = Transform(x=-3.0, y=0.0, heading=1.0)
-    mission = sealed(msgspec.structs.replace(corridor(closed=False), frame=Frame(name="site", to_map=other)))
+    mission = with_digest(
+        msgspec.structs.replace(corridor(closed=False), frame=Frame(name="site", to_map=other))
+    )
     clock, journal = SimulatedClock(), memory_journal()
     inner = SimulatedBase(clock=clock, wear=EXACT)
     base = OnMap(inner, own)

@@ -22,7 +22,7 @@ from stopgo.bridge.link.protocol import (
     encode,
 )
 from stopgo.bridge.robot.mission_reading import read_mission
-from stopgo.mission.document import Mission, canonical, sealed
+from stopgo.mission.document import Mission, canonical, with_digest
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.files.mission_json import parse
 from tests.bridge.world import Field, corridor
@@ -94,7 +94,7 @@ def test_another_mission_is_refused_while_one_runs() -> None:
     field = Field()
     field.station().push(corridor())
     field.order("start")
-    other = sealed(msgspec.structs.replace(corridor(), id="f" * 32))
+    other = with_digest(msgspec.structs.replace(corridor(), id="f" * 32))
     with pytest.raises(NegativeResult, match="running"):
         field.station().push(other)
     assert field.controller.run.mission_id == corridor().id
@@ -151,7 +151,7 @@ def test_a_document_that_is_not_what_it_claims_is_rejected(document: bytes, reas
 
 def test_a_mission_that_leaves_its_route_is_infeasible() -> None:
     stop = msgspec.structs.replace(corridor().stops[1], approach=((9.0, 9.0), (4.0, 0.0)))
-    mission = sealed(msgspec.structs.replace(corridor(), stops=(corridor().stops[0], stop)))
+    mission = with_digest(msgspec.structs.replace(corridor(), stops=(corridor().stops[0], stop)))
     with pytest.raises(
         NegativeResult, match=r"infeasible: \$\.stops\[1\]\.approach\[0\]: \(9\.000, 9\.000\) is not stop s1"
     ):
@@ -191,7 +191,7 @@ def test_an_accepted_answer_says_what_was_accepted() -> None:
 @pytest.mark.parametrize("mission_id", ["mission", "sx", "cmd", "part", "commit"])
 def test_a_mission_of_any_name_can_be_pushed(mission_id: str) -> None:
     field = Field()
-    named = sealed(msgspec.structs.replace(corridor(), id=mission_id))
+    named = with_digest(msgspec.structs.replace(corridor(), id=mission_id))
     station = field.station()
     assert station.push(named).mission_id == mission_id
     assert station.mission(mission_id, 1) == named

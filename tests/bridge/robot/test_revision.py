@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from stopgo.mission.document import Mission, Scan, sealed
+from stopgo.mission.document import Mission, Scan, with_digest
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import RevisionTaken, Scanned
@@ -28,7 +28,7 @@ def running(**details: Any) -> Field:
 
 
 def changed(**details: Any) -> Mission:
-    return sealed(msgspec.structs.replace(corridor(revision=2), **details))
+    return with_digest(msgspec.structs.replace(corridor(revision=2), **details))
 
 
 def test_a_revision_is_followed_from_the_next_stop_on() -> None:

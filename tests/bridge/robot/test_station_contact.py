@@ -14,7 +14,7 @@ from stopgo.bridge.link.link import Request
 from stopgo.bridge.link.protocol import Watching, encode
 from stopgo.bridge.robot.station_contact import MOST_TOKENS, TOKEN_S, StationContact
 from stopgo.bridge.station.station import Station
-from stopgo.mission.document import sealed
+from stopgo.mission.document import with_digest
 from stopgo.mission.errors import NegativeResult
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import Field, corridor
@@ -48,7 +48,7 @@ def running(field: Field, station: Station) -> Field:
     """The robot runs a mission of this station, which has been silent since for `SILENCE_S`."""
     plain = corridor()
     policy = msgspec.structs.replace(plain.policy, link_loss="hold", link_loss_after_s=30.0)
-    station.push(sealed(msgspec.structs.replace(plain, policy=policy)))
+    station.push(with_digest(msgspec.structs.replace(plain, policy=policy)))
     station.command("start")
     field.clock.wait(SILENCE_S)
     return field
@@ -113,7 +113,7 @@ def test_a_robot_whose_commander_is_gone_holds_though_others_watch(site: Path, w
     plain = corridor()
     policy = msgspec.structs.replace(plain.policy, link_loss="hold", link_loss_after_s=30.0)
     commander, other = field.guarded_station(), field.guarded_station(who)
-    commander.push(sealed(msgspec.structs.replace(plain, policy=policy)))
+    commander.push(with_digest(msgspec.structs.replace(plain, policy=policy)))
     commander.command("start")
     other.link.announce(other.keys.watcher("t"))
     for _ in range(9):

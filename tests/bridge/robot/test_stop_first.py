@@ -20,7 +20,7 @@ from stopgo.bridge.robot.simulator import Fault, Faults
 from stopgo.bridge.robot.storage_watchdog import ANSWERS_WITHIN_S, LATE, LOOK_EVERY_S, StorageWatchdog
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.bridge.station.station import Station
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.run.run_commands import FREE_VERBS, Answer, RunCommand, Verb
 from stopgo.mission.run.states import Run
 from tests.bridge.world import Field, corridor
@@ -32,7 +32,7 @@ NET_S = 60.0
 
 def with_policy(policy: str) -> Mission:
     mission = corridor()
-    return sealed(
+    return with_digest(
         msgspec.structs.replace(mission, policy=msgspec.structs.replace(mission.policy, link_loss=policy))
     )
 

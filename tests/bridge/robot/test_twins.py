@@ -63,7 +63,7 @@ def test_an_impostor_is_no_twin(tmp_path: Path) -> None:
     """With another's keys it answers in vain, and nobody stops."""
     field = GuardedField(keys_of_site(tmp_path / "site"))
     field.guarded_station().push(corridor())
-    impostor = field.board.link(field.seals("r2", boot_id="b"))
+    impostor = field.board.link(field.signing("r2", boot_id="b"))
     impostor.serve(field.keys.info, lambda request: b"{}")
     impostor.serve(field.keys.boot, lambda request: encode(Booted(boot_id="b")))
     assert field.guarded_station().command("start").state == "RUNNING"

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from stopgo.bridge.link.memory_link import SealedMessage
+from stopgo.bridge.link.memory_link import SignedMessage
 from stopgo.bridge.link.protocol import encode
 from stopgo.bridge.robot.published_poses import PublishedPoses
 from stopgo.bridge.station import follow
@@ -22,7 +22,7 @@ from tests.bridge.guarded import Router
 from tests.bridge.world import Field, corridor
 
 TICK_S = 0.25
-Meddle = Callable[[SealedMessage], Iterable[SealedMessage]]
+Meddle = Callable[[SignedMessage], Iterable[SignedMessage]]
 
 
 class Watched:
@@ -88,14 +88,14 @@ def dropping(topic: str) -> Meddle:
 
 def repeating(topic: str) -> Meddle:
     """The first message on the topic is delivered for every later one."""
-    first: dict[str, SealedMessage] = {}
+    first: dict[str, SignedMessage] = {}
     return lambda message: (first.setdefault(message.kind, message),) if topic in message.key else (message,)
 
 
 def delaying(watched: Watched, topic: str, seconds: float) -> Meddle:
     late: set[int] = set()
 
-    def meddle(message: SealedMessage) -> Iterable[SealedMessage]:
+    def meddle(message: SignedMessage) -> Iterable[SignedMessage]:
         if topic not in message.key or message.kind != "told" or id(message) in late:
             return (message,)
         late.add(id(message))
@@ -107,9 +107,9 @@ def delaying(watched: Watched, topic: str, seconds: float) -> Meddle:
 
 def reordering(watched: Watched, topic: str) -> Meddle:
     """Every second message on the topic arrives after the next one."""
-    held: list[SealedMessage] = []
+    held: list[SignedMessage] = []
 
-    def meddle(message: SealedMessage) -> Iterable[SealedMessage]:
+    def meddle(message: SignedMessage) -> Iterable[SignedMessage]:
         if topic not in message.key or message.kind != "told":
             return (message,)
         if not held:

@@ -14,7 +14,7 @@ from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.comparing.spans import paused_s
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.run.events import (
     JUMPED_OVER,
     Aborted,
@@ -55,8 +55,8 @@ def planned() -> tuple[Mission, Sight]:
 
 
 def figures(route: Route) -> Figures:
-    shares = totals_of_plan(route.visibility).shares(np.zeros(32, dtype=bool))
-    return Figures("length", shares.whole, shares.rooms, worst_first(shares.kinds), 24.0, 24.0, (), ())
+    found = totals_of_plan(route.visibility).coverage(np.zeros(32, dtype=bool))
+    return Figures("length", found.whole, found.rooms, worst_first(found.kinds), 24.0, 24.0, (), ())
 
 
 def visit(stop: str, seconds: float, x: float, y: float, *, scan: bool = True) -> list[tuple]:
@@ -76,8 +76,8 @@ def run(*events: tuple) -> Comparison:
 def test_a_run_as_planned_saw_what_was_planned() -> None:
     whole = run(*visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1), (Finished, 133.0, {}))
     assert whole.acquired is not None
-    assert whole.acquired.shares.whole == whole.acquired.planned.whole
-    assert (whole.acquired.shares.whole.seen, whole.acquired.shares.whole.visible) == pytest.approx(
+    assert whole.acquired.coverage.whole == whole.acquired.planned.whole
+    assert (whole.acquired.coverage.whole.seen, whole.acquired.coverage.whole.visible) == pytest.approx(
         (1.1, 1.4)
     )
     assert judge(whole).answer == "yes"
@@ -92,7 +92,7 @@ def test_a_skipped_stop_takes_what_it_alone_would_have_seen() -> None:
         *visit("S1", 0, 1, 1), (Skipped, 65.0, {"stop": "S2", "reason": "skip by ann"}), (Finished, 70.0, {})
     )
     assert skipped.acquired is not None
-    assert skipped.acquired.shares.whole.coverage == pytest.approx(8 / 14)
+    assert skipped.acquired.coverage.whole.coverage == pytest.approx(8 / 14)
     (first, second) = skipped.stops
     assert (first.lost, second.outcome, second.reason) == (None, "skipped", "skip by ann")
     assert second.lost == pytest.approx(3 / 14)
@@ -129,14 +129,14 @@ def test_a_stop_of_which_nobody_says_that_it_was_scanned_leaves_it_open() -> Non
         (Finished, 90.0, {}),
     )
     assert unsure.acquired is not None
-    assert unsure.acquired.shares.whole.coverage == pytest.approx(8 / 14)
+    assert unsure.acquired.coverage.whole.coverage == pytest.approx(8 / 14)
     assert (judge(unsure).answer, judge(unsure).exit_code) == ("unknown", 3)
 
 
 def test_a_stop_that_a_revision_has_moved_is_not_counted_by_the_old_plan() -> None:
     mission, sight = planned()
     first, second = mission.stops
-    moved = sealed(
+    moved = with_digest(
         msgspec.structs.replace(
             mission, revision=2, stops=(first, msgspec.structs.replace(second, x=second.x + 0.5))
         )
@@ -152,7 +152,7 @@ def test_a_stop_that_a_revision_has_moved_is_not_counted_by_the_old_plan() -> No
     compared = compare(log, [mission, moved], [sight])
     assert compared.acquired is not None
     assert compared.acquired.unknown == ("S2",)
-    assert compared.acquired.shares.whole.coverage == pytest.approx(8 / 14)
+    assert compared.acquired.coverage.whole.coverage == pytest.approx(8 / 14)
     assert judge(compared).answer == "unknown"
 
 

@@ -78,7 +78,7 @@ def test_a_disputed_scan_is_not_counted_as_coverage() -> None:
     )
     run = compare(log, [mission], [sight])
     assert run.acquired is not None
-    assert not run.acquired.shares.whole.met
+    assert not run.acquired.coverage.whole.met
     assert (judge(run).answer, run.stops[0].disputed_m) == ("unknown", pytest.approx(1.0))
 
 

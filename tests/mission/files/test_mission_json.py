@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from stopgo.mission.document import Mission, canonical, digest_of, sealed
+from stopgo.mission.document import Mission, canonical, digest_of, with_digest
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import encode, next_revision, parse, read, write
 from stopgo.mission.frames.transform import Transform
@@ -42,7 +42,7 @@ def missions(draw: st.DrawFn) -> Mission:
         mission.frame, name=draw(texts), to_map=draw(st.sampled_from([None, turned]))
     )
     revision = draw(st.integers(1, 2**53))
-    return sealed(msgspec.structs.replace(mission, name=draw(texts), frame=frame, revision=revision))
+    return with_digest(msgspec.structs.replace(mission, name=draw(texts), frame=frame, revision=revision))
 
 
 @given(missions())
@@ -53,8 +53,8 @@ def test_a_mission_reads_back_the_same(mission: Mission) -> None:
 
 
 def test_encoding_sets_the_digest() -> None:
-    unsealed = msgspec.structs.replace(square_tour(), digest="")
-    assert parse(encode(unsealed), "m") == square_tour()
+    without_digest = msgspec.structs.replace(square_tour(), digest="")
+    assert parse(encode(without_digest), "m") == square_tour()
 
 
 def test_a_polyline_is_one_point_a_line() -> None:

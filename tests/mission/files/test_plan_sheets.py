@@ -13,15 +13,15 @@ from stopgo.mission.files import plan_sheets
 from stopgo.mission.files.pdf import PdfPage, pdf_of
 from stopgo.mission.files.plan_sheets import plan_pdf, rooms_of, sheets_of, tiles_of
 from stopgo.mission.files.svg import SMALLEST_TEXT
-from stopgo.mission.stages.figures import Figures, Share, Unreached
+from stopgo.mission.stages.figures import Figures, GroupCoverage, Unreached
 from tests.mission.worlds import room_mission, room_route
 
 DATE = "2026-11-22"
 FIGURES = Figures(
     rule="length",
-    whole=Share("all", 24.0, 24.0, 24.0),
-    rooms=(Share("Büro 12", 24.0, 24.0, 24.0),),
-    kinds=(Share("walls", 24.0, 24.0, 24.0),),
+    whole=GroupCoverage("all", 24.0, 24.0, 24.0),
+    rooms=(GroupCoverage("Büro 12", 24.0, 24.0, 24.0),),
+    kinds=(GroupCoverage("walls", 24.0, 24.0, 24.0),),
     rooms_m2=32.0,
     reached_m2=32.0,
     unreached=(Unreached(room="Lager", area_m2=9.0, why="door-7 is 0.60 m wide"),),

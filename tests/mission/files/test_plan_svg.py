@@ -253,7 +253,7 @@ def test_room_names_cross_no_wall_and_no_other_name(wide: float) -> None:
 NOWHERE = PaperBox(0.0, 0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("head", [plan_panel.STOP_HEAD, plan_panel.SHARE_HEAD])
+@pytest.mark.parametrize("head", [plan_panel.STOP_HEAD, plan_panel.COVERAGE_HEAD])
 def test_headings_leave_room_between_them(head: plan_panel.Row) -> None:
     """Bold letters are up to a tenth wider; `covered` and `covered %` once ran into each other."""
     for (before, edge), cell in zip(pairwise(head.edges), head.cells[1:], strict=True):

@@ -21,7 +21,7 @@ from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.settings.scanners import SCANNERS, ScannerName
 
 OTHER: dict[str, Any] = {
-    "register": True,
+    "register": False,
     "accuracy": 5.0,
     "control": ((1.0, 2.0), (3.0, 4.0)),
     "overlap": 0.25,
@@ -64,7 +64,6 @@ OTHER: dict[str, Any] = {
     "battery": 5400.0,
 }
 NEEDS = {
-    **dict.fromkeys(("accuracy", "control"), ("register",)),
     **dict.fromkeys(("since", "schedule", "in_progress"), ("date",)),
     "density": ("angular_step",),
     "wall_height": ("max_incidence",),

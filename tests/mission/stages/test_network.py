@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from stopgo.mission.document import Overlap, digest_of, sealed, stop_names
+from stopgo.mission.document import Overlap, digest_of, stop_names, with_digest
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.files.mission_json import encode, parse
 from stopgo.mission.stages.network import Network, apart_in_words, network_lines, network_of, network_table
@@ -41,7 +41,7 @@ def test_a_mission_with_a_network_reads_back_and_one_without_is_as_before() -> N
     assert network_lines(None) == []
     first, second = (stop.id for stop in plain.stops[:2])
     pairs = (Overlap(a=first, b=second, common_m=5.0, share=0.4, hold_m=1.0),)
-    told = sealed(msgspec.structs.replace(plain, network=pairs))
+    told = with_digest(msgspec.structs.replace(plain, network=pairs))
     assert digest_of(told) != plain.digest
     assert parse(encode(told), "test") == told
     assert not problems_of(told)

@@ -23,7 +23,7 @@ def test_what_a_stop_sees_and_what_it_alone_sees() -> None:
     assert (first.units, first.alone_units, second.units, second.alone_units) == (8, 4, 7, 3)
     assert first.sees == pytest.approx(0.8) and first.new == pytest.approx(0.8)
     assert second.new == second.alone == pytest.approx(0.3)
-    assert second.lost_share == pytest.approx(3 / 14)
+    assert second.lost_fraction == pytest.approx(3 / 14)
     (room,) = second.rooms
     assert room.coverage == pytest.approx(8 / 14)
     assert [room.name for room in second.short] == ["Room 1"]

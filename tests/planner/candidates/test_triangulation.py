@@ -48,7 +48,7 @@ from tests.planner.worlds import (
 
 
 def placed(floor: FloorPlan, **given: object) -> Candidates:
-    return candidates(navigable(floor, Settings(candidates="triangulation", **given)))  # type: ignore[arg-type]
+    return candidates(navigable(floor, Settings(candidates="triangulation", register=False, **given)))  # type: ignore[arg-type]
 
 
 def round_column(x: float, y: float, radius: float = 0.3) -> Polygon:

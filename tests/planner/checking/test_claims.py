@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -157,7 +158,7 @@ def test_check_tells_the_coverage_it_counted(made: Path, capsys: pytest.CaptureF
     coverage = json.loads(made.with_name("coverage.json").read_text())["total"]
     assert check(made, "--coverage-file", str(made.with_name("coverage.json"))) == 0
     last = capsys.readouterr().out.splitlines()[-1]
-    share = 100 * coverage["seen"] / coverage["visible"]
+    share = math.floor(1e5 * coverage["seen"] / coverage["visible"]) / 1e3
     assert last == (
         f"coverage {share:.3f} % ({coverage['seen']} of {coverage['visible']} units), counted line by line"
     )

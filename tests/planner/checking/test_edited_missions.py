@@ -40,7 +40,7 @@ def without_last_stop(mission: Mission) -> Mission:
 
 
 def test_a_dropped_stop_leaves_a_room_below_its_required_fraction() -> None:
-    settings = Settings(coverage=0.3, kind_coverage=0.0)
+    settings = Settings(coverage=0.3, kind_coverage=0.0, register=False)
     mission, nouns = planned(two_rooms(0.9), settings)
     space = nouns[NavigableSpace]
     assert list(overclaims(mission, recount(mission, space), None)) == []

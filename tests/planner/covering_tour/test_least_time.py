@@ -26,7 +26,7 @@ from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size, some
 from tests.planner.worlds import box, column, door, floor_of, hall, planned, room, shell, two_rooms, wall
 
-BASIS: dict[str, Any] = {"d_dis": 0.2, "refine": False}
+BASIS: dict[str, Any] = {"d_dis": 0.2, "refine": False, "register": False}
 
 
 def corridor() -> Any:
@@ -267,7 +267,7 @@ def test_a_zone_is_left_by_no_selection_that_sees_enough() -> None:
 
 
 def test_scans_that_are_to_register_still_do() -> None:
-    driven = two_step("rooms", 0, overlap=0.1)
+    driven = two_step("rooms", 0, register=True)
     made = least_time_route(driven)
     links = links_of(made.candidates)
     pieces = [len(components_of(links, one.selection.chosen)) for one in (driven, made)]

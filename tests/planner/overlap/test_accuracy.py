@@ -20,7 +20,7 @@ from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap import CONFIDENCE
 from stopgo.planner.overlap.control import seen_control
-from stopgo.planner.overlap.network_error import TARGET_M, network_errors
+from stopgo.planner.overlap.network_error import TARGET_M, network_errors, worst_errors
 from stopgo.planner.overlap.registered import predicted_errors
 from stopgo.planner.space.navigable import navigable
 from tests.planner.overlap.test_plans_that_register import three_rooms
@@ -42,14 +42,16 @@ def worst_mm(part: PartPlan) -> float:
 def test_two_control_points_hold_the_frame() -> None:
     """Two targets 10 m from the scan, to either side: each weighs half, and the scan lies between them."""
     points = [np.array((-10.0, 0.0)), np.array((10.0, 0.0))]
-    errors, frame = network_errors(np.zeros((1, 2)), [], [], [(0, point) for point in points])
+    covariances, frame = network_errors(np.zeros((1, 2)), [], [], [(0, point) for point in points])
+    errors = worst_errors(covariances)
     assert frame is None
     assert errors[0] == pytest.approx(TARGET_M / math.sqrt(2))
 
 
 def test_one_control_point_leaves_the_rotation_open() -> None:
     xy, seen = np.zeros((2, 2)), [(0, np.array((3.0, 0.0))), (1, np.array((3.0, 0.0)))]
-    errors, frame = network_errors(xy, [(0, 1)], [ONE], seen)
+    covariances, frame = network_errors(xy, [(0, 1)], [ONE], seen)
+    errors = worst_errors(covariances)
     assert frame in (0, 1)
     assert errors.tolist().count(0.0) == 1
 
@@ -57,10 +59,12 @@ def test_one_control_point_leaves_the_rotation_open() -> None:
 def test_control_points_of_two_scans_hold_their_network_together() -> None:
     """Each scan sees one point, and the pair joins them: the second point fixes the rotation."""
     seen = [(0, np.array((-10.0, 0.0))), (1, np.array((10.0, 0.0)))]
-    errors, frame = network_errors(np.zeros((2, 2)), [(0, 1)], [ONE], seen)
+    covariances, frame = network_errors(np.zeros((2, 2)), [(0, 1)], [ONE], seen)
+    errors = worst_errors(covariances)
     assert frame is None
     assert np.isfinite(errors).all()
-    alone, _ = network_errors(np.zeros((2, 2)), [], [], seen)
+    covariances, _ = network_errors(np.zeros((2, 2)), [], [], seen)
+    alone = worst_errors(covariances)
     assert not np.isfinite(alone).all() or alone.tolist().count(0.0) >= 1
 
 
@@ -129,9 +133,9 @@ def test_an_accuracy_that_is_none_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        ({"accuracy": 5.0}, "give --register too"),
-        ({"control": ((1.0, 2.0),)}, "give --register too"),
-        ({"accuracy": 5.0, "register": True, "minimise": "time"}, "--minimise time"),
+        ({"accuracy": 5.0, "register": False}, "no effect with --no-register"),
+        ({"control": ((1.0, 2.0),), "coverage_rule": "paper"}, "no effect with --coverage-rule paper"),
+        ({"accuracy": 5.0, "minimise": "time"}, "--minimise time"),
     ],
 )
 def test_an_accuracy_needs_scans_that_register(more: dict[str, Any], told: str) -> None:

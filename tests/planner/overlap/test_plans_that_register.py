@@ -10,6 +10,7 @@ import pytest
 
 from stopgo.mission.document import stop_names
 from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.settings.parameter_checks import check_settings
@@ -123,11 +124,11 @@ def test_a_further_mission_joins_the_scans_that_were_taken(made: PlanReport) -> 
     assert len(components_of(links_of(rows), taken)) == 1
 
 
-def test_scans_register_where_it_is_asked_or_an_overlap_is() -> None:
-    assert not Settings().registers
-    assert Settings(register=True).registers
-    assert ASKED.registers
-    made = plan(three_rooms(), Settings(register=True, d_sec=0.4, edge=0.0)).mission
+def test_scans_register_by_default_and_not_by_the_paper_s_rule() -> None:
+    assert Settings().registers
+    assert not Settings(coverage_rule="paper").registers
+    assert not Settings(register=False).registers
+    made = plan(three_rooms(), Settings(d_sec=0.4, edge=0.0)).mission
     network = network_of(made)
     assert network is not None
     assert len(network.pieces) == 1
@@ -139,10 +140,21 @@ def test_an_overlap_ratio_of_scans_that_need_not_register_is_refused() -> None:
     check_settings(LOOSE)
 
 
+@pytest.mark.parametrize("overlap", [None, 0.1])
+def test_a_mission_of_an_earlier_version_registers_only_if_it_gave_an_overlap(overlap: float | None) -> None:
+    made = plan(three_rooms(), replace(LOOSE, range=3.0)).mission
+    before = {key: value for key, value in made.origin.parameters.items() if key != "register"}
+    settings = recorded_settings({**before, **({"overlap": overlap} if overlap else {})})
+    assert settings.registers == (overlap is not None)
+    space = navigable(three_rooms(), settings)
+    problems = [problem.path for problem in network_overclaims(made, space)]
+    assert problems == (["$.network"] if overlap else [])
+
+
 def test_a_separate_scan_is_told_with_the_reason_and_a_position_for_a_target() -> None:
     """A corridor of 60 m whose ends no stop in its middle sees: its walls hold nothing along it."""
     corridor = floor_of(box(0, 0, 60, 3), elements=(shell(0, 0, 60, 3),))
-    asked = Settings(register=True, d_sec=0.5, edge=0.0, overlap_range=8.0, range=8.0)
+    asked = Settings(d_sec=0.5, edge=0.0, overlap_range=8.0, range=8.0)
     made = plan(corridor, asked).first
     told = [item for item in made.figures.findings if item.code == "scans_apart"]
     assert told

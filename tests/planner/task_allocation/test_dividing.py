@@ -16,7 +16,7 @@ from msgspec import UNSET
 from msgspec.structs import replace as replace_struct
 
 from stopgo.command_line import main
-from stopgo.mission.document import MissionShare
+from stopgo.mission.document import MissionAllocation
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import InputError, NegativeResult
@@ -132,7 +132,7 @@ def test_every_stop_is_in_one_mission(changes: dict[str, Any]) -> None:
     assert all(mission.stops for mission in missions)
     assert len({mission.id for mission in (*missions, divided.whole.mission)}) == len(missions) + 1
     assert [m.share for m in missions] == [
-        MissionShare(kind=divided.kind, number=k, of=len(missions)) for k in range(1, len(missions) + 1)
+        MissionAllocation(kind=divided.kind, number=k, of=len(missions)) for k in range(1, len(missions) + 1)
     ]
     for share in divided.shares:
         assert not list(problems_of(share.mission))

@@ -44,7 +44,7 @@ PLANNED = LAYERED if FULL else LAYERED[:2]
 def test_without_limits_a_plan_is_what_it_was_before(floor: Path) -> None:
     if not floor.exists():
         pytest.skip(f"{floor} is not at hand")
-    document = msgspec.to_builtins(plan(read_floor(floor), Settings()).mission)
+    document = msgspec.to_builtins(plan(read_floor(floor), Settings(register=False)).mission)
     told = {key: document[key] for key in ("robot", "scanner", "start", "stops", "return")}
     assert "limits" not in document
     assert not {"views", "max_incidence", "near", "scanner"} & set(document["origin"]["parameters"])
@@ -130,7 +130,7 @@ def test_what_a_run_acquires_counts_views_too() -> None:
     sight: Sight = sight_of(made.route, made.mission, made.figures)
     assert sight.planned.whole == made.figures.whole
     assert not sight.planned.short
-    one = sight.shares([mission.stops[0].id])
+    one = sight.coverage([mission.stops[0].id])
     assert one.whole.seen < 0.05 * sight.planned.whole.seen
     views = sight.views_from(sight.ids[:-1])
     assert sight.brings(sight.ids[-1], views) > 0

@@ -72,7 +72,7 @@ def test_what_stops_see_comes_back_whole(tmp_path: Path) -> None:
         assert np.array_equal(getattr(back.totals, name), getattr(sight.totals, name)), name
     assert (back.totals.rooms, back.totals.elements) == (sight.totals.rooms, sight.totals.elements)
     assert back.planned == sight.planned
-    assert back.shares(["S1"]) == sight.shares(["S1"])
+    assert back.coverage(["S1"]) == sight.coverage(["S1"])
     assert np.array_equal(back.targets.unit_xy, sight.targets.unit_xy)
 
 

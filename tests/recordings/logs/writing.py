@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -166,3 +167,54 @@ def write_ulog(path: Path, tables: dict[str, tuple[Sequence[str], Sequence[tuple
             data += message(b"D", struct.pack("<H", number) + struct.pack(form, *row))
     path.write_bytes(data)
     return path
+
+
+def write_json_mcap(
+    path: Path, rows: Sequence[tuple[str, str, int, Any]], *, chunked: bool = True, encoding: str = "json"
+) -> Path:
+    """An MCAP of (topic, schema, log time, JSON value), without an index, as a recorder leaves it."""
+    import lz4.frame
+
+    def record(kind: int, body: bytes) -> bytes:
+        return struct.pack("<BQ", kind, len(body)) + body
+
+    def text(value: str) -> bytes:
+        return struct.pack("<I", len(value.encode())) + value.encode()
+
+    numbers = {key: k for k, key in enumerate(dict.fromkeys((topic, schema) for topic, schema, _, _ in rows))}
+    data = b""
+    for (topic, schema), number in numbers.items():
+        body = text(schema) + text("jsonschema") + struct.pack("<I", 2) + b"{}"
+        data += record(3, struct.pack("<H", number + 1) + body)
+        data += record(
+            4, struct.pack("<HH", number, number + 1) + text(topic) + text(encoding) + struct.pack("<I", 0)
+        )
+    for k, (topic, schema, ns, value) in enumerate(rows):
+        head = struct.pack("<HIQQ", numbers[topic, schema], k, ns, ns)
+        data += record(5, head + (value if isinstance(value, bytes) else json.dumps(value).encode()))
+    if chunked:
+        packed = lz4.frame.compress(data)
+        head = struct.pack("<QQQI", 0, 2**62, len(data), 0)
+        data = record(6, head + text("lz4") + struct.pack("<Q", len(packed)) + packed)
+    magic = b"\x89MCAP0\r\n"
+    ends = record(0x0F, struct.pack("<I", 0)) + record(2, struct.pack("<QQI", 0, 0, 0))
+    path.write_bytes(magic + record(1, text("") + text("test")) + data + ends + magic)
+    return path
+
+
+def foxglove_time(ns: int) -> dict[str, int]:
+    return {"sec": ns // 10**9, "nsec": ns % 10**9}
+
+
+def foxglove_pose(pose: Pose, height: float = 0.0) -> dict[str, Any]:
+    x, y, heading = pose
+    turn = {"x": 0.0, "y": 0.0, "z": float(np.sin(heading / 2)), "w": float(np.cos(heading / 2))}
+    return {"position": {"x": x, "y": y, "z": height}, "orientation": turn}
+
+
+def foxglove_transform(ns: int, parent: str, child: str, pose: Pose) -> dict[str, Any]:
+    given = foxglove_pose(pose)
+    return {
+        "timestamp": foxglove_time(ns), "parent_frame_id": parent, "child_frame_id": child,
+        "translation": given["position"], "rotation": given["orientation"],
+    }  # fmt: skip

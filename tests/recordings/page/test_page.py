@@ -14,7 +14,7 @@ import pytest
 from stopgo.command_line import main
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.run_verdict import judge
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import Finished, Paused, Resumed, Skipped
 from stopgo.mission.run.run_log import Alignment
@@ -159,7 +159,7 @@ def test_runs_are_named_by_date_and_robot_and_numbered_within_a_minute() -> None
 
 def test_text_from_outside_stays_text(mission: Mission) -> None:
     subject = skipping()
-    nasty = sealed(msgspec.structs.replace(subject.mission, name=NASTY))
+    nasty = with_digest(msgspec.structs.replace(subject.mission, name=NASTY))
     page = report_html(replace(subject, missions=(nasty,), problems=(NASTY,)))
     assert b"<script" not in page
     assert not re.search(rb"[\x00-\x08\x0b-\x1f]", page)

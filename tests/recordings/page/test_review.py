@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from stopgo.command_line import main
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.recordings.embedded.checking import problems_of
 from stopgo.recordings.embedded.reading import read_recording
 from stopgo.recordings.rrd.compact import VIEWER
@@ -155,7 +155,7 @@ def test_a_recording_that_was_cut_and_mended_fails_the_check(
 
 def test_a_recording_of_another_mission_than_it_says_fails_the_check(field: Path, mission: Mission) -> None:
     read = read_recording(field)
-    other = sealed(msgspec.structs.replace(mission, name="other"))
+    other = with_digest(msgspec.structs.replace(mission, name="other"))
     assert problems_of(read) == ()
     (problem,) = problems_of(replace(read, missions=(other,)))
     assert "its run has digest" in problem

@@ -161,9 +161,9 @@ def wandering(seed: int, *, stops: int = 9, scan_s: float = 12.0) -> Mission:
         known.append(to)
     from msgspec.structs import replace
 
-    from stopgo.mission.document import sealed
+    from stopgo.mission.document import with_digest
 
     mission = mission_of(*made)
     scan = replace(mission.stops[0].scan, duration_s=scan_s)
     changed = tuple(replace(item, scan=scan, settle_s=2.0) for item in mission.stops)
-    return sealed(replace(mission, stops=changed))
+    return with_digest(replace(mission, stops=changed))

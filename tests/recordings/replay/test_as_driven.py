@@ -90,7 +90,7 @@ def test_the_command_tells_coverage_and_writes_the_top_up(
     assert main(["replay", *given, *floor]) == 3  # the log ends where the stop would be
     told = json.loads(capsys.readouterr().out)
     whole = told["coverage"]["shares"]["all"]
-    seen = as_driven(planned, places(planned, last)).shares.whole
+    seen = as_driven(planned, places(planned, last)).coverage.whole
     assert whole["as_driven"] == pytest.approx(seen.coverage, abs=0.005)
     assert whole["planned"] > whole["as_driven"]
     assert main(["check", str(folder / "next.json"), "--floor", str(folder / "floor.dxf")]) == 0

@@ -22,6 +22,8 @@ from stopgo.recordings.logs.field_log import FieldLog, Sweep
 from stopgo.recordings.replay.drive_verdict import DriveJudgement, drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.placed_sweeps import placed_sweeps
+from stopgo.recordings.replay.replay_page import to_do
+from stopgo.recordings.replay.replay_text import measured_lines
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.replay.standstills import find_standstills
@@ -85,7 +87,7 @@ def seen_by_laser(solid: shapely.Geometry, pose: tuple[float, float, float]) -> 
 def test_walls_as_planned_are_measured_without_deviation(planned: PlannedFloor) -> None:
     found = measured(planned, placed_sweeps(scanned(planned)))
     assert found.unplanned == ()
-    assert (found.shares.whole.coverage or 0) > 0.8
+    assert (found.coverage.whole.coverage or 0) > 0.8
     for _, count, mean, rms in found.deviations:
         assert count > 10
         assert abs(mean) <= 0.006
@@ -99,7 +101,7 @@ def test_a_wall_that_stands_elsewhere_is_told_by_its_side(planned: PlannedFloor)
     assert max(means) > 0.02
     assert min(means) < -0.02
     as_planned = measured(planned, placed_sweeps(scanned(planned)), tolerance=0.02)
-    assert (found.shares.whole.coverage or 0) < 0.75 * (as_planned.shares.whole.coverage or 0)
+    assert (found.coverage.whole.coverage or 0) < 0.75 * (as_planned.coverage.whole.coverage or 0)
 
 
 def test_what_nobody_planned_is_found_and_driven_round(planned: PlannedFloor) -> None:
@@ -192,7 +194,29 @@ def test_clouds_that_do_not_lie_on_the_floor_tell_nothing(
 def test_a_wall_that_was_never_built_is_named(planned: PlannedFloor) -> None:
     lengths = {item.name: item.seen for item in totals_of_plan(planned.seen).by_element(planned.seen.visible)}
     least = min((name for name in lengths if lengths[name] >= 0.5), key=lambda name: lengths[name])
-    assert f"No point lies on {least}," in judged(planned, wall_points(planned, without=least)).text
+    points = wall_points(planned, without=least)
+    assert f"No point lies on {least}," in judged(planned, points).text
+    found = measured(planned, [points], least_sweeps=1, surveyed=True)
+    driven_well = scanned(planned)
+    sight = as_driven(planned, driven_well.scanned_from)
+    (absent,) = found.absent(sight.driven)
+    assert (absent.id, absent.empty) == (least, 1.0)
+    by_element = {item.name: item for item in sight.elements}
+    assert absent.visible == pytest.approx(by_element[least].seen / by_element[least].visible)
+    lines = measured_lines(driven_well.with_sight(sight).with_measured(found))
+    assert any(line.startswith(f"  absent     {least}: no point on 100.0 % of") for line in lines)
+
+
+def test_what_nobody_planned_is_told_with_the_share_of_scans_that_hit_it(planned: PlannedFloor) -> None:
+    heap = np.stack([np.linspace(2.0, 2.4, 50), np.full(50, 1.0)], axis=-1)
+    points = wall_points(planned)
+    clouds = [points, np.concatenate([points, heap]), points, points]
+    found = measured(planned, clouds, least_sweeps=1, surveyed=True)
+    (item,) = found.unplanned
+    assert (item.hits, item.sweeps) == (1, 4)
+    shown = scanned(planned).with_measured(found)
+    assert any("hit in 1 of 4 scans (25.0 %)" in line for line in measured_lines(shown))
+    assert any("hit in 25.0 % of the scans" in line for line in to_do(shown))
 
 
 def test_a_follow_up_mission_scans_what_the_clouds_lack(planned: PlannedFloor) -> None:

@@ -90,8 +90,8 @@ def test_a_run_whose_every_stop_was_skipped_has_no_pose_and_is_told(tmp_path: Pa
 def test_a_run_of_another_mission_is_refused_by_name(tmp_path: Path) -> None:
     from msgspec.structs import replace
 
-    from stopgo.mission.document import sealed
+    from stopgo.mission.document import with_digest
 
-    other = sealed(replace(MISSION, id="f" * 32))
+    other = with_digest(replace(MISSION, id="f" * 32))
     with pytest.raises(InputError, match="no run of mission ffff"):
         replay(read_log(written_journal(tmp_path)), other, Placing())

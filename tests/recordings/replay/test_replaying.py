@@ -15,7 +15,7 @@ from msgspec.structs import replace as changed
 
 import stopgo
 from stopgo.command_line import main
-from stopgo.mission.document import Frame, Mission, sealed
+from stopgo.mission.document import Frame, Mission, with_digest
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import write
 from stopgo.mission.frames.transform import SiteOrigin, Transform
@@ -88,7 +88,7 @@ def test_a_drive_as_planned_is_one() -> None:
 def test_a_log_in_another_frame_is_placed_in_every_way(
     how: Placing, frame: str, changes: dict[str, Any]
 ) -> None:
-    mission = sealed(changed(MISSION, **changes))
+    mission = with_digest(changed(MISSION, **changes))
     track = logged(driven(mission), Senses(turned=0.8, shifted=(5.0, -3.0)))
     found = replay(log_of(track, frame=frame), mission, how)
     assert drive_verdict(found).answer == "yes"
@@ -99,7 +99,9 @@ def test_a_log_in_another_frame_is_placed_in_every_way(
 
 def test_a_log_on_the_earth_is_placed_by_the_georeference() -> None:
     """The site's +y bears 90°, east: the log's metres east and north are turned by that."""
-    mission = sealed(changed(MISSION, georeference=SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=90.0)))
+    mission = with_digest(
+        changed(MISSION, georeference=SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=90.0))
+    )
     track = logged(driven(mission), Senses(turned=-math.pi / 2))
     about = {"origin": SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=0.0), "rule": "ardupilot"}
     found = replay(log_of(track, frame="local", **about), mission, Placing())
@@ -267,7 +269,7 @@ def parked_near(first_stop: tuple[float, float], *, beside_m: float) -> tuple[Dr
     stops = (changed(MISSION.stops[0], x=first_stop[0], y=first_stop[1]), *MISSION.stops[1:])
     first = changed(stops[0], approach=((0.0, 0.0), first_stop))
     second = changed(stops[1], approach=(first_stop, *stops[1].approach[1:]))
-    mission = sealed(changed(MISSION, stops=(first, second, *stops[2:]), return_=back))
+    mission = with_digest(changed(MISSION, stops=(first, second, *stops[2:]), return_=back))
     drive = Drive(0.0, 0.0, 0.0)
     drive.rows.append((0.0, 0.0, 0.0, 0.0))
     for k, stop in enumerate(mission.stops):

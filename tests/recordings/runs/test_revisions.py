@@ -14,7 +14,7 @@ from stopgo.command_line import main
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.comparison_text import comparison_table
 from stopgo.mission.comparing.run_collector import SOURCE
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.run.events import AnyEvent, Arrived, PoseReport, StateReport
 from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.drawing import entities, palette
@@ -88,7 +88,7 @@ def test_the_report_tells_both_revisions(revised: Path) -> None:
 
 
 def test_what_a_revision_dropped_is_told_in_the_report(tmp_path: Path, mission: Mission) -> None:
-    shorter = sealed(msgspec.structs.replace(mission, revision=2, stops=mission.stops[:1]))
+    shorter = with_digest(msgspec.structs.replace(mission, revision=2, stops=mission.stops[:1]))
     path = tmp_path / "field.rrd"
     with FieldRecording(path, mission) as recording:
         for report in run.reports_of_two(mission, shorter, behind="S1"):
@@ -127,7 +127,10 @@ def test_a_station_that_only_heard_of_the_later_revision_records_the_whole_run(
 def test_a_revision_that_was_never_heard_of_is_told_by_the_one_after_it(
     tmp_path: Path, mission: Mission
 ) -> None:
-    path, third = tmp_path / "field.rrd", sealed(msgspec.structs.replace(world.revised(mission), revision=3))
+    path, third = (
+        tmp_path / "field.rrd",
+        with_digest(msgspec.structs.replace(world.revised(mission), revision=3)),
+    )
     with FieldRecording(path, mission) as recording:
         for report in run.reports_of_two(mission, world.revised(mission), behind="S1"):
             tell(recording, report)
@@ -166,7 +169,7 @@ def test_each_stop_is_compared_with_the_revision_by_which_it_was_reached(mission
 
 
 def test_stops_that_were_withdrawn_or_are_not_of_the_plan_come_last(mission: Mission) -> None:
-    first = sealed(msgspec.structs.replace(mission, stops=mission.stops[:1], revision=2))
+    first = with_digest(msgspec.structs.replace(mission, stops=mission.stops[:1], revision=2))
     told = [event for event in events(mission) if getattr(event, "stop", "S1") in ("S1", "S3")]
     told = [event for event in told if not isinstance(event, Arrived) or event.stop == "S1"]
     compared = compare(log_of(told), [mission, first])

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec.structs import replace as changed
 
-from stopgo.mission.document import Mission, Point, sealed
+from stopgo.mission.document import Mission, Point, with_digest
 from tests.recordings.replay.driving import Drive, wandering
 
 STOPS = 8
@@ -53,7 +53,7 @@ def mission_with_return(seed: int) -> Mission:
     plain = wandering(seed, stops=STOPS)
     last = plain.stops[-1]
     corner = (last.x, plain.start.y)
-    return sealed(changed(plain, return_=((last.x, last.y), corner, (plain.start.x, plain.start.y))))
+    return with_digest(changed(plain, return_=((last.x, last.y), corner, (plain.start.x, plain.start.y))))
 
 
 def toured(mission: Mission, visits: list[Visit], *, home: bool = True) -> Drive:
@@ -286,9 +286,38 @@ def mirrored(mission: Mission, chance: np.random.Generator) -> Tour:
 
 def another_mission(mission: Mission, chance: np.random.Generator) -> Tour:
     """The robot drove another mission of the same floor, whose stops lie between."""
-    other = _mapped(mission, lambda x, y: (x + 0.9, y - 0.7))
+    return replace(shifted(mission, (0.9, -0.7)), away=True)
+
+
+def shifted(mission: Mission, by: Point) -> Tour:
+    """The robot drove from its start to stops that all lie beside the mission's."""
+    other = _mapped(mission, lambda x, y: (x + by[0], y + by[1]))
     drive = toured(other, _all(other))
-    return Tour(mission, drive, truth_of(mission, drive), away=True)
+    return Tour(mission, drive, truth_of(mission, drive))
+
+
+def about_the_start(mission: Mission, turn: float, scale: float = 1.0) -> Tour:
+    """The whole drive is turned about the start, or stretched from it."""
+    start, cos, sin = mission.start, scale * math.cos(turn), scale * math.sin(turn)
+
+    def moved(x: float, y: float) -> Point:
+        x, y = x - start.x, y - start.y
+        return (start.x + cos * x - sin * y, start.y + sin * x + cos * y)
+
+    other = _mapped(mission, moved)
+    stops = tuple(changed(stop, heading=stop.heading + turn) for stop in other.stops)
+    drive = toured(changed(other, stops=stops), _all(other))
+    return Tour(mission, drive, truth_of(mission, drive))
+
+
+def turned_map(mission: Mission, chance: np.random.Generator) -> Tour:
+    """The robot's map is turned by 0.4 to 3 degrees against the drawing."""
+    return about_the_start(mission, float(chance.choice([-1, 1]) * chance.uniform(0.007, 0.05)))
+
+
+def stretched_map(mission: Mission, chance: np.random.Generator) -> Tour:
+    """The robot's map is 1 to 3 % larger or smaller than the drawing."""
+    return about_the_start(mission, 0.0, 1.0 + float(chance.choice([-1, 1]) * chance.uniform(0.01, 0.03)))
 
 
 def _mapped(mission: Mission, to: Callable[[float, float], Point]) -> Mission:
@@ -324,4 +353,6 @@ MISHAPS: tuple[Mishap, ...] = (
     climbs,
     mirrored,
     another_mission,
+    turned_map,
+    stretched_map,
 )

@@ -13,7 +13,17 @@ import numpy as np
 
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.transform import Transform
-from tests.recordings.logs.writing import BEGIN_NS, ODOMETRY, Messages, write_bag, write_dataflash, write_ulog
+from tests.recordings.logs.writing import (
+    BEGIN_NS,
+    ODOMETRY,
+    Messages,
+    foxglove_pose,
+    foxglove_time,
+    write_bag,
+    write_dataflash,
+    write_json_mcap,
+    write_ulog,
+)
 from tests.recordings.truth.senses import Sensed
 
 FRAME = Transform(x=5.0, y=-3.0, heading=0.8)
@@ -101,6 +111,39 @@ def euroc(folder: Path, mission: Mission, poses: Sensed) -> Path:
         )
     )
     return path
+
+
+CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+"""Axes of KITTI's camera in the robot's: x right, y down, z forward."""
+
+
+def kitti(folder: Path, mission: Mission, poses: Sensed) -> Path:
+    """Matrices of a camera, and their times."""
+    poses, path = _framed(poses), folder / "run.txt"
+    cos, sin = np.cos(poses.heading), np.sin(poses.heading)
+    zero, one = np.zeros_like(cos), np.ones_like(cos)
+    turn = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]]).transpose(2, 0, 1)
+    at = np.column_stack([poses.xy, poses.height]) @ CAMERA.T
+    rows = np.concatenate([CAMERA @ turn @ CAMERA.T, at[:, :, None]], axis=2).reshape(-1, 12)
+    path.write_text("".join(" ".join(f"{value:.7e}" for value in row) + "\n" for row in rows.tolist()))
+    (folder / "times.txt").write_text("".join(f"{ns // 10**9}.{ns % 10**9:09}\n" for ns in poses.ns.tolist()))
+    return path
+
+
+def foxglove(folder: Path, mission: Mission, poses: Sensed) -> Path:
+    """Foxglove's JSON in MCAP, in the order of writing."""
+    poses, start = _framed(poses), int(poses.ns[0])
+    frame = "map" if poses.tied else "odom"
+    rows = [
+        (
+            "/pose",
+            "foxglove.PoseInFrame",
+            start + number * 10**8,
+            {"timestamp": foxglove_time(ns), "frame_id": frame, "pose": foxglove_pose((x, y, heading), z)},
+        )
+        for number, (ns, (x, y), z, heading) in enumerate(_rows(poses))
+    ]
+    return write_json_mcap(folder / "run.mcap", rows)
 
 
 def _ros(suffix: str) -> Writer:
@@ -193,8 +236,8 @@ def telemetry(folder: Path, mission: Mission, poses: Sensed) -> Path:
     return path
 
 
-TABLES: tuple[Writer, ...] = (csv_table, comma_table, tum, euroc)
-BAGS: tuple[Writer, ...] = (_ros(".mcap"), _ros(".bag"), _ros(".db3"))
+TABLES: tuple[Writer, ...] = (csv_table, comma_table, tum, euroc, kitti)
+BAGS: tuple[Writer, ...] = (_ros(".mcap"), _ros(".bag"), _ros(".db3"), foxglove)
 VEHICLES: tuple[Writer, ...] = (dataflash, ulog, telemetry)
 WRITERS = (*TABLES, *BAGS, *VEHICLES)
 

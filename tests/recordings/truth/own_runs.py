@@ -1,7 +1,7 @@
 """Runs of stopgo's own robots with a known truth: what a station hears of them, with every loss and fault.
 
-A run is told event by event, as a robot's journal has it. A robot's events are its sealed word: what they say
-of a scan is the truth, unless the poses that the robot sent meanwhile contradict it.
+A run is told event by event, as a robot's journal has it. A robot's events are signed by it: what they say of
+a scan is the truth, unless the poses that the robot sent meanwhile contradict it.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.station.station import Station
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import ItemList
@@ -34,7 +34,8 @@ from tests.mission.mavlink.following.worlds import told, tour
 from tests.ports import free_port
 
 SPEED_UP = 5.0
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
+"""Of simulated time."""
 TUNED = {"px4": {"NAV_ACC_RAD": 0.1}}
 """As PX4 comes, half a metre from a stop is there."""
 KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
@@ -44,7 +45,7 @@ KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
 def real_tour(**details: Any) -> Mission:
     """The tour for a vehicle that drives as a real one: beside its stops, and late to stand still."""
     made = tour(**{"tolerance_m": 0.3, "settle_s": 3.0, **details})
-    return sealed(msgspec.structs.replace(made, robot=msgspec.structs.replace(made.robot, speed=0.5)))
+    return with_digest(msgspec.structs.replace(made, robot=msgspec.structs.replace(made.robot, speed=0.5)))
 
 
 @dataclass

@@ -9,7 +9,7 @@ import pytest
 
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
-from stopgo.mission.document import sealed
+from stopgo.mission.document import with_digest
 from stopgo.mission.run.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.runs.field import FieldRecording
@@ -144,7 +144,7 @@ def test_a_last_stop_that_is_left_out_ends_the_run_where_the_vehicle_is(tmp_path
 
 def test_the_way_back_is_driven_at_the_end(tmp_path: Path) -> None:
     there = real_tour()
-    back = sealed(msgspec.structs.replace(there, return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))))
+    back = with_digest(msgspec.structs.replace(there, return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))))
     site = Site(tmp_path, "ardupilot", mission=back)
     with site.up(), watched(site) as seen:
         site.order("start")
@@ -168,4 +168,4 @@ def test_a_run_that_somebody_else_has_started_is_told_as_theirs(tmp_path: Path) 
         peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
         peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)
     assert told(site.events) == ALL
-    assert "operator" in getattr(site.events[0], "commander", "")
+    assert "somebody" in getattr(site.events[0], "commander", "")

@@ -14,7 +14,7 @@ from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import read_signing_key
-from stopgo.mission.document import Scan, sealed
+from stopgo.mission.document import Scan, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import STILL_M_S
 from stopgo.mission.run.events import Arrived, Finished, Held, PoseReport, Scanned, Settled
@@ -76,7 +76,7 @@ def test_an_ardupilot_rover_turns_to_the_headings_that_a_narrow_scanner_needs(tm
     mission = site_mission(heading=math.pi / 2)
     narrow = msgspec.structs.replace(mission, scanner=msgspec.structs.replace(mission.scanner, fov_deg=90.0))
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
-        station.push(sealed(narrow))
+        station.push(with_digest(narrow))
         station.command("start")
         until(station.reports(), is_state("FINISHED"))
         arrived = [event for event in events_of(station) if isinstance(event, Arrived)]
@@ -110,7 +110,7 @@ def test_a_scanner_that_needs_headings_is_not_driven_by_what_cannot_turn(tmp_pat
         gateway(tmp_path, vehicle.url) as station,
         pytest.raises(NegativeResult, match="sees 90°"),
     ):
-        station.push(sealed(narrow))
+        station.push(with_digest(narrow))
 
 
 def test_nothing_starts_without_origin_arming_or_a_free_hand(tmp_path: Path) -> None:
@@ -159,7 +159,7 @@ def test_an_operators_hold_is_never_changed_back_before_a_retry(tmp_path: Path, 
         until(reports, is_driving(0.5))
         operator.hold()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody switched the autopilot to HOLD" in held.reason
+        assert "somebody (not known who) switched the autopilot to HOLD" in held.reason
         assert (operator.mode(), station.status().state) == ("HOLD", "HELD")
         station.command("retry")
         until(reports, is_state("FINISHED"))
@@ -174,7 +174,7 @@ def test_who_drives_by_hand_keeps_the_vehicle_until_it_is_handed_over(tmp_path: 
         until(reports, is_driving(0.5))
         operator.manual()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody switched the autopilot to MANUAL" in held.reason
+        assert "somebody (not known who) switched the autopilot to MANUAL" in held.reason
         with pytest.raises(
             NegativeResult, match="somebody else drives it; to hand it over, switch it to HOLD"
         ):
@@ -209,7 +209,7 @@ def test_a_hold_during_a_scan_keeps_the_next_leg_from_being_driven(tmp_path: Pat
         until(reports, lambda report: getattr(report, "stop_state", "") == "SCANNING")
         operator.hold()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody switched the autopilot to HOLD" in held.reason
+        assert "somebody (not known who) switched the autopilot to HOLD" in held.reason
         assert scanned(station) == ["s1"]
 
 

@@ -18,7 +18,7 @@ from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import reached
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.station.station import connect
-from stopgo.mission.document import Mission, Scan, sealed
+from stopgo.mission.document import Mission, Scan, with_digest
 from stopgo.mission.run.events import Scanned
 from tests.bridge.mavlink.driving.world import Operator, is_state, site_mission, until
 from tests.called import stopgo
@@ -42,7 +42,7 @@ def brisk(**details: Any) -> Mission:
         for stop in made.stops
     )
     back = made.return_ and tuple((x / 2, y / 2) for x, y in made.return_)
-    return sealed(msgspec.structs.replace(made, robot=robot, stops=stops, return_=back))
+    return with_digest(msgspec.structs.replace(made, robot=robot, stops=stops, return_=back))
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.program import RobotOptions, robot_on
 from stopgo.bridge.station.follow import Report
 from stopgo.bridge.station.station import Station
-from stopgo.mission.document import Mission, Scan, sealed
+from stopgo.mission.document import Mission, Scan, with_digest
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor, pose_of
@@ -40,7 +40,7 @@ def site_mission(*, site: SiteOrigin | None = SITE, **details: Any) -> Mission:
     """Two stops along a corridor that has its place on the earth; each scan takes three seconds."""
     scan = Scan(profile="default", duration_s=3.0, timeout_s=20.0)
     made = corridor(**{"stops": 2, "closed": False, "settle_s": 0.2, "scan": scan, **details})
-    return sealed(msgspec.structs.replace(made, georeference=site))
+    return with_digest(msgspec.structs.replace(made, georeference=site))
 
 
 def cornered_mission(*, speed: float = 0.5, **details: Any) -> Mission:
@@ -52,7 +52,7 @@ def cornered_mission(*, speed: float = 0.5, **details: Any) -> Mission:
         msgspec.structs.replace(stop, x=x, y=y, approach=(before, (x, y)))
         for stop, before, (x, y) in zip(made.stops, places, places[1:], strict=False)
     )
-    return sealed(msgspec.structs.replace(made, stops=stops, robot=robot))
+    return with_digest(msgspec.structs.replace(made, stops=stops, robot=robot))
 
 
 def site_pose(pose: Pose) -> Pose:

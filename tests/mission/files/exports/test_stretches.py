@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.coverage_json import coverage_json
 from stopgo.mission.files.exports.stretches import read_stretches
@@ -61,7 +61,7 @@ def test_another_missions_coverage_is_refused(written: tuple[Path, Mission]) -> 
     with pytest.raises(InputError, match=r"coverage\.json: is the coverage of mission 0123"):
         read_stretches(path, msgspec.structs.replace(mission, id="f" * 32))
     with pytest.raises(InputError, match="of another revision"):
-        read_stretches(path, sealed(msgspec.structs.replace(mission, revision=2)))
+        read_stretches(path, with_digest(msgspec.structs.replace(mission, revision=2)))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.files.exports import FORMATS, exported
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.imports import READERS
@@ -39,7 +39,7 @@ def named(word: str) -> Mission:
     scan = msgspec.structs.replace(first.scan, profile=word)
     stops = (msgspec.structs.replace(first, id=word, scan=scan), *made.stops[1:])
     frame = msgspec.structs.replace(made.frame, name=word)
-    return sealed(msgspec.structs.replace(made, name=word, frame=frame, stops=stops))
+    return with_digest(msgspec.structs.replace(made, name=word, frame=frame, stops=stops))
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -6,7 +6,7 @@ import math
 
 import msgspec
 
-from stopgo.mission.document import Frame, Mission, sealed
+from stopgo.mission.document import Frame, Mission, with_digest
 from stopgo.mission.frames.transform import SiteOrigin, Transform
 from tests.mission.worlds import mission_of, room_mission, square_tour, stop
 
@@ -25,7 +25,7 @@ def laboratory() -> Mission:
         back=((-2.0, 1.5), (0.0, 0.5), (1.0, 1.0)),
         begin=(1.0, 1.0),
     )
-    return sealed(msgspec.structs.replace(made, name="Halle <2>, Büro\n=1+1", georeference=ZURICH))
+    return with_digest(msgspec.structs.replace(made, name="Halle <2>, Büro\n=1+1", georeference=ZURICH))
 
 
 def from_the_first_stop() -> Mission:
@@ -33,7 +33,7 @@ def from_the_first_stop() -> Mission:
     made = mission_of(
         stop("a", (2.0, 2.0)), stop("b", (2.0, 2.0), (5.0, 2.0)), begin=(2.0, 2.0),
     )  # fmt: skip
-    return sealed(msgspec.structs.replace(made, georeference=ZURICH))
+    return with_digest(msgspec.structs.replace(made, georeference=ZURICH))
 
 
 def surveyed() -> Mission:
@@ -49,12 +49,12 @@ def surveyed() -> Mission:
 def on_a_map() -> Mission:
     """The laboratory, whose frame says where it lies on the robot's map."""
     made = laboratory()
-    return sealed(msgspec.structs.replace(made, frame=Frame(name="site", to_map=MAP)))
+    return with_digest(msgspec.structs.replace(made, frame=Frame(name="site", to_map=MAP)))
 
 
 def across_the_date_line() -> Mission:
     """The laboratory in Fiji, with stops on both sides of 180°."""
-    return sealed(msgspec.structs.replace(laboratory(), georeference=FIJI))
+    return with_digest(msgspec.structs.replace(laboratory(), georeference=FIJI))
 
 
 MISSIONS = {

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stopgo.mission.document import Mission, Stop, sealed
+from stopgo.mission.document import Mission, Stop, with_digest
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.exports import exported
@@ -53,7 +53,7 @@ def missions(draw: st.DrawFn) -> Mission:
     mission = mission_over(
         *stops, begin=places[0], back=draw(st.sampled_from([None, (places[at], places[0])]))
     )
-    return sealed(msgspec.structs.replace(mission, georeference=draw(origins)))
+    return with_digest(msgspec.structs.replace(mission, georeference=draw(origins)))
 
 
 def there_and_back(mission: Mission, name: str, autopilot: str, settings: Settings | None = None) -> Mission:

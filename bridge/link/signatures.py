@@ -1,12 +1,12 @@
-"""Signatures of messages between ends that hold keys; each travels with its message, as a seal.
+"""Signatures of messages between ends that hold keys; each travels as the message's attachment.
 
-A seal is an Ed25519 signature, and the values that bind it to one use. Nobody between two ends can change,
-swap, replay or long delay a message unnoticed. Without keys (`NO_SEALS`) every message is unsigned and is
-accepted: for use on one machine only.
+An attachment is an Ed25519 signature, and the values that bind it to one use. Nobody between two ends can
+change, swap, replay or long delay a message unnoticed. Without keys (`NO_SIGNING`) every message is unsigned
+and is accepted: for use on one machine only.
 
 What is signed (`_signed`): a line for the kind of message ("question", "answer" or "told"), a line for each
-thing that it is bound to, four lines with the seal's `nonce`, `boot_id`, `number` and `at_ns`, then the bytes
-as they were sent. It is bound to the key that it is sent on, which names the robot; a question to its
+thing that it is bound to, four lines with its `nonce`, `boot_id`, `number` and `at_ns`, then the bytes as
+they were sent. It is bound to the key that it is sent on, which names the robot; a question to its
 parameters too; an answer to the question's parameters and the hash of its payload.
 
 Questions and answers
@@ -59,7 +59,7 @@ AHEAD_S: Final = 1.0
 """Greatest drift between two clocks before they are compared again."""
 
 
-class Seal(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class SignatureAttachment(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The attachment of a message, as JSON; unknown fields are ignored."""
 
     signature: bytes = b""
@@ -77,66 +77,66 @@ class Seal(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 @dataclass(frozen=True)
 class Question:
-    """A question with its seal, and what its answer must match."""
+    """A question with its signature, and what its answer must match."""
 
     key: str
     payload: bytes
     parameters: Mapping[str, str]
-    seal: bytes = b""
+    attachment: bytes = b""
     nonce: str = ""
     asked_ns: int = 0
 
 
-SealedAnswering = Callable[[Request], tuple[bytes, bytes]]
-"""Returns the answer and its seal."""
-SealedHearing = Callable[[str, bytes, bytes], None]
-"""Receives key, payload and seal."""
+SignedAnswering = Callable[[Request], tuple[bytes, bytes]]
+"""Returns the answer and its attachment."""
+SignedHearing = Callable[[str, bytes, bytes], None]
+"""Receives key, payload and attachment."""
 
 
-class Seals(Protocol):
+class MessageSigning(Protocol):
     """One end's way to sign its messages, and to verify those of the other end."""
 
     distrusted: str
     """Reason of the last message that was not accepted."""
 
-    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
-        """Return the question with its seal."""
+    def sign_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        """Return the question with its attachment."""
 
-    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+    def verify_answer(self, question: Question, payload: bytes, attachment: bytes) -> bytes | None:
         """Return the answer if it is to be accepted, else `None`."""
 
-    def seal_answers(self, answer: Answering) -> SealedAnswering:
-        """Return a function that answers verified questions, and refuses all others; it seals its answers."""
+    def sign_answers(self, answer: Answering) -> SignedAnswering:
+        """Return a function that answers verified questions, and refuses all others; it signs its answers."""
 
-    def seal_publication(self, key: str, payload: bytes) -> bytes:
-        """Return the seal of a publication."""
+    def sign_publication(self, key: str, payload: bytes) -> bytes:
+        """Return the attachment of a publication."""
 
-    def verify_publications(self, heard: Hearing) -> SealedHearing:
+    def verify_publications(self, heard: Hearing) -> SignedHearing:
         """Return a function that passes on verified publications only."""
 
 
-class NoSeals:
+class NoSigning:
     """No signatures: nothing is signed, everything is accepted."""
 
     distrusted = ""
 
-    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+    def sign_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
         return Question(key, payload, parameters)
 
-    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+    def verify_answer(self, question: Question, payload: bytes, attachment: bytes) -> bytes | None:
         return payload
 
-    def seal_answers(self, answer: Answering) -> SealedAnswering:
+    def sign_answers(self, answer: Answering) -> SignedAnswering:
         return lambda request: (answer(request), b"")
 
-    def seal_publication(self, key: str, payload: bytes) -> bytes:
+    def sign_publication(self, key: str, payload: bytes) -> bytes:
         return b""
 
-    def verify_publications(self, heard: Hearing) -> SealedHearing:
-        return lambda key, payload, seal: heard(key, payload)
+    def verify_publications(self, heard: Hearing) -> SignedHearing:
+        return lambda key, payload, attachment: heard(key, payload)
 
 
-NO_SEALS: Final = NoSeals()
+NO_SIGNING: Final = NoSigning()
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Anchor:
     heard_ns: int
 
 
-class KeySeals:
+class KeySigning:
     """Signs with one holder's keys, and accepts holders whose keys the same authority has issued."""
 
     def __init__(
@@ -183,32 +183,38 @@ class KeySeals:
 
     # Questions
 
-    def seal_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+    def sign_question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
         boot_id, at_ns = self._robot_time(key)
-        seal = Seal(nonce=secrets.token_hex(16), certificate=self._held.der, boot_id=boot_id, at_ns=at_ns)
-        sealed = self._with_signature(seal, payload, "question", key, _parameters(parameters))
-        return Question(key, payload, parameters, sealed, seal.nonce, self._clock_ns())
+        attachment = SignatureAttachment(
+            nonce=secrets.token_hex(16), certificate=self._held.der, boot_id=boot_id, at_ns=at_ns
+        )
+        signed = self._with_signature(attachment, payload, "question", key, _parameters(parameters))
+        return Question(key, payload, parameters, signed, attachment.nonce, self._clock_ns())
 
-    def verify_answer(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+    def verify_answer(self, question: Question, payload: bytes, attachment: bytes) -> bytes | None:
         try:
-            self._check_answer(question, payload, _read(seal))
+            self._check_answer(question, payload, _read(attachment))
         except Untrusted as error:
             self.distrusted = str(error)
             return None
         return payload
 
-    def _check_answer(self, question: Question, payload: bytes, seal: Seal) -> None:
+    def _check_answer(self, question: Question, payload: bytes, attachment: SignatureAttachment) -> None:
         robot, where = _place(question.key)
-        holder, public = self._certificates.holder(seal.certificate or b"")
+        holder, public = self._certificates.holder(attachment.certificate or b"")
         about = (_parameters(question.parameters), _hash(question.payload))
-        _verify(public, seal, payload, "answer", question.key, *about)
+        _verify(public, attachment, payload, "answer", question.key, *about)
         _must_be_robot(holder, robot)
-        if seal.nonce != question.nonce:
+        if attachment.nonce != question.nonce:
             raise Untrusted("it answers another question")
         heard_ns = self._clock_ns()
         with self._lock:
             self._anchors[where] = Anchor(
-                seal.boot_id, seal.certificate or b"", seal.at_ns, question.asked_ns, heard_ns
+                attachment.boot_id,
+                attachment.certificate or b"",
+                attachment.at_ns,
+                question.asked_ns,
+                heard_ns,
             )
 
     def _robot_time(self, key: str) -> tuple[str, int]:
@@ -220,18 +226,20 @@ class KeySeals:
 
     # Answers
 
-    def seal_answers(self, answer: Answering) -> SealedAnswering:
+    def sign_answers(self, answer: Answering) -> SignedAnswering:
         def answered(request: Request) -> tuple[bytes, bytes]:
             nonce = ""
             try:
-                seal = _read(request.seal)
-                nonce = seal.nonce
-                reply = answer(self._verified(request, seal))
+                attachment = _read(request.attachment)
+                nonce = attachment.nonce
+                reply = answer(self._verified(request, attachment))
             except Untrusted as error:
                 self.distrusted = str(error)
                 self._refused(request.key, str(error))
                 reply = encode(untrusted(error))
-            own = Seal(certificate=self._held.der, nonce=nonce, boot_id=self._boot_id, at_ns=self._clock_ns())
+            own = SignatureAttachment(
+                certificate=self._held.der, nonce=nonce, boot_id=self._boot_id, at_ns=self._clock_ns()
+            )
             about = (_parameters(request.parameters), _hash(request.payload))
             try:
                 return reply, self._with_signature(own, reply, "answer", request.key, *about)
@@ -240,36 +248,36 @@ class KeySeals:
 
         return answered
 
-    def _verified(self, request: Request, seal: Seal) -> Request:
+    def _verified(self, request: Request, attachment: SignatureAttachment) -> Request:
         """Return the request with its verified sender, and with `fresh` true if it was asked just now."""
-        holder, public = self._certificates.holder(seal.certificate or b"")
-        _verify(public, seal, request.payload, "question", request.key, _parameters(request.parameters))
-        return replace(request, holder=holder, fresh=self._is_fresh(seal))
+        holder, public = self._certificates.holder(attachment.certificate or b"")
+        _verify(public, attachment, request.payload, "question", request.key, _parameters(request.parameters))
+        return replace(request, holder=holder, fresh=self._is_fresh(attachment))
 
-    def _is_fresh(self, seal: Seal) -> bool:
+    def _is_fresh(self, attachment: SignatureAttachment) -> bool:
         """True if the message was sent in this boot, a moment ago."""
-        age_s = (self._clock_ns() - seal.at_ns) / 1e9
-        return seal.boot_id == self._boot_id and -AHEAD_S <= age_s <= OLDEST_S
+        age_s = (self._clock_ns() - attachment.at_ns) / 1e9
+        return attachment.boot_id == self._boot_id and -AHEAD_S <= age_s <= OLDEST_S
 
     # Publications
 
-    def seal_publication(self, key: str, payload: bytes) -> bytes:
+    def sign_publication(self, key: str, payload: bytes) -> bytes:
         with self._lock:
             self._published[key] += 1
             number = self._published[key]
         if self._boot_id:
-            seal = Seal(boot_id=self._boot_id, number=number, at_ns=self._clock_ns())
+            attachment = SignatureAttachment(boot_id=self._boot_id, number=number, at_ns=self._clock_ns())
         else:
             boot_id, at_ns = self._robot_time(key)
-            seal = Seal(
+            attachment = SignatureAttachment(
                 certificate=self._held.der, nonce=self._session, boot_id=boot_id, number=number, at_ns=at_ns
             )
-        return self._with_signature(seal, payload, "told", key)
+        return self._with_signature(attachment, payload, "told", key)
 
-    def verify_publications(self, heard: Hearing) -> SealedHearing:
-        def passed_on(key: str, payload: bytes, seal: bytes) -> None:
+    def verify_publications(self, heard: Hearing) -> SignedHearing:
+        def passed_on(key: str, payload: bytes, attachment: bytes) -> None:
             try:
-                self._check_publication(key, payload, _read(seal))
+                self._check_publication(key, payload, _read(attachment))
             except Untrusted as error:
                 self.distrusted = str(error)
                 return
@@ -277,65 +285,72 @@ class KeySeals:
 
         return passed_on
 
-    def _check_publication(self, key: str, payload: bytes, seal: Seal) -> None:
+    def _check_publication(self, key: str, payload: bytes, attachment: SignatureAttachment) -> None:
         check = self._check_station if self._boot_id else self._check_robot
-        stream = check(key, payload, seal)
+        stream = check(key, payload, attachment)
         with self._lock:
-            if seal.number <= self._last_received.get(stream, 0):
+            if attachment.number <= self._last_received.get(stream, 0):
                 raise Untrusted("it was received before")
-            self._last_received[stream] = seal.number
+            self._last_received[stream] = attachment.number
 
-    def _check_station(self, key: str, payload: bytes, seal: Seal) -> tuple[str, ...]:
-        certificate = seal.certificate or b""
+    def _check_station(self, key: str, payload: bytes, attachment: SignatureAttachment) -> tuple[str, ...]:
+        certificate = attachment.certificate or b""
         holder, public = self._certificates.holder(certificate)
-        _verify(public, seal, payload, "told", key)
+        _verify(public, attachment, payload, "told", key)
         if holder.role != "station":
             raise Untrusted(f"{holder.name} is a {holder.role}; only stations may publish to a robot")
-        if not self._is_fresh(seal):
+        if not self._is_fresh(attachment):
             raise Untrusted(f"the message of {holder.name} is old, or for another boot")
-        return key, seal.nonce, _hash(certificate)
+        return key, attachment.nonce, _hash(certificate)
 
-    def _check_robot(self, key: str, payload: bytes, seal: Seal) -> tuple[str, ...]:
+    def _check_robot(self, key: str, payload: bytes, attachment: SignatureAttachment) -> tuple[str, ...]:
         robot, where = _place(key)
         anchor = self._anchors.get(where)
-        if anchor is None or seal.boot_id != anchor.boot_id:
+        if anchor is None or attachment.boot_id != anchor.boot_id:
             raise Untrusted(f"{robot} has not answered since it started")
         holder, public = self._certificates.holder(anchor.certificate)
-        _verify(public, seal, payload, "told", key)
+        _verify(public, attachment, payload, "told", key)
         _must_be_robot(holder, robot)
-        sent_ns = anchor.asked_ns + seal.at_ns - anchor.at_ns
+        sent_ns = anchor.asked_ns + attachment.at_ns - anchor.at_ns
         if self._clock_ns() - sent_ns > OLDEST_S * 1e9:
             raise Untrusted(f"the message of {robot} is older than {OLDEST_S:g} s")
-        return key, seal.boot_id
+        return key, attachment.boot_id
 
-    def _with_signature(self, seal: Seal, payload: bytes, *about: str) -> bytes:
-        signature = self._held.key.sign(_signed(seal, payload, *about))
-        return msgspec.json.encode(msgspec.structs.replace(seal, signature=signature))
+    def _with_signature(self, attachment: SignatureAttachment, payload: bytes, *about: str) -> bytes:
+        signature = self._held.key.sign(_signed(attachment, payload, *about))
+        return msgspec.json.encode(msgspec.structs.replace(attachment, signature=signature))
 
 
-def _signed(seal: Seal, payload: bytes, *about: str) -> bytes:
+def _signed(attachment: SignatureAttachment, payload: bytes, *about: str) -> bytes:
     """Return the bytes to sign: a line for each thing that the message is bound to, then the message."""
     kind, *rest = about
-    lines = (f"stopgo/{VERSION} {kind}", *rest, seal.nonce, seal.boot_id, str(seal.number), str(seal.at_ns))
+    lines = (
+        f"stopgo/{VERSION} {kind}",
+        *rest,
+        attachment.nonce,
+        attachment.boot_id,
+        str(attachment.number),
+        str(attachment.at_ns),
+    )
     if any("\n" in line for line in lines):
         raise Untrusted("its key or parameters have several lines")
     return "\n".join(lines).encode(errors="surrogatepass") + b"\n" + payload
 
 
-def _verify(public: Ed25519PublicKey, seal: Seal, payload: bytes, *about: str) -> None:
+def _verify(public: Ed25519PublicKey, attachment: SignatureAttachment, payload: bytes, *about: str) -> None:
     from cryptography.exceptions import InvalidSignature
 
     try:
-        public.verify(seal.signature, _signed(seal, payload, *about))
+        public.verify(attachment.signature, _signed(attachment, payload, *about))
     except InvalidSignature:
         raise Untrusted("the signature is not right") from None
 
 
-def _read(seal: bytes) -> Seal:
-    if not seal:
+def _read(attachment: bytes) -> SignatureAttachment:
+    if not attachment:
         raise Untrusted("it is not signed")
     try:
-        read = decode(seal, Seal)
+        read = decode(attachment, SignatureAttachment)
     except msgspec.DecodeError:
         raise Untrusted("its signature cannot be read") from None
     if "\n" in read.nonce or "\n" in read.boot_id:

@@ -10,8 +10,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from stopgo.bridge.link.memory_link import SealedMessage
-from stopgo.bridge.link.seals import OLDEST_S, Seal
+from stopgo.bridge.link.memory_link import SignedMessage
+from stopgo.bridge.link.signatures import OLDEST_S, SignatureAttachment
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor
@@ -56,7 +56,7 @@ def test_an_answer_that_was_changed_or_meant_for_another_question_is_not_believe
     first = station.info()
     old = next(packet for packet in field.router.seen if packet.kind == "answer")
 
-    def shifted(packet: SealedMessage) -> Iterable[SealedMessage]:
+    def shifted(packet: SignedMessage) -> Iterable[SignedMessage]:
         if packet.kind != "answer":
             return (packet,)
         told = json.loads(packet.payload)
@@ -66,9 +66,9 @@ def test_an_answer_that_was_changed_or_meant_for_another_question_is_not_believe
     for meddle, why in (
         (shifted, "signature is not right"),
         (lambda packet: (packet,) if packet.kind == "question" else (old,), "signature|another question"),
-        (lambda packet: (replace(packet, seal=b""),), "not signed"),
-        (lambda packet: (replace(packet, seal=b"\xff"),), "cannot be read"),
-        (lambda packet: (replace(packet, seal=b'{"later": ' + b"[" * 20_000),), "cannot be read"),
+        (lambda packet: (replace(packet, attachment=b""),), "not signed"),
+        (lambda packet: (replace(packet, attachment=b"\xff"),), "cannot be read"),
+        (lambda packet: (replace(packet, attachment=b'{"later": ' + b"[" * 20_000),), "cannot be read"),
     ):
         field.router.meddle = meddle  # type: ignore[assignment]
         with pytest.raises(OutcomeUnknown, match=why):
@@ -80,7 +80,7 @@ def test_an_answer_that_was_changed_or_meant_for_another_question_is_not_believe
 def test_a_question_is_bound_to_its_parameters_and_its_robot(site: Path) -> None:
     field = ready(site)
 
-    def elsewhere(packet: SealedMessage) -> Iterable[SealedMessage]:
+    def elsewhere(packet: SignedMessage) -> Iterable[SignedMessage]:
         if packet.kind == "question" and packet.parameters:
             return (replace(packet, parameters={"since": "7"}),)
         return (packet,)
@@ -107,9 +107,9 @@ def told(field: GuardedField, key: str, number: int) -> list[bytes]:
 def test_what_a_robot_tells_is_heard_once_and_in_order(site: Path) -> None:
     field = ready(site)
     assert told(field, field.keys.state, 3) == [b"state 0", b"state 1", b"state 2"]
-    kept: list[SealedMessage] = []
+    kept: list[SignedMessage] = []
 
-    def twice(packet: SealedMessage) -> Iterable[SealedMessage]:
+    def twice(packet: SignedMessage) -> Iterable[SignedMessage]:
         kept.append(packet)
         return (packet, packet, *kept) if packet.kind == "told" else (packet,)
 
@@ -122,7 +122,7 @@ def test_what_a_robot_told_long_ago_or_before_its_reboot_is_not_heard(site: Path
     station = field.guarded_station()
     heard: list[bytes] = []
     station.link.hear(field.keys.state, lambda key, payload: heard.append(payload))
-    held: list[SealedMessage] = []
+    held: list[SignedMessage] = []
     station.info()
     tell = field.link.publisher(field.keys.state)
     tell(b"now")
@@ -148,16 +148,18 @@ def test_an_impostor_is_not_heard(site: Path) -> None:
     heard: list[bytes] = []
     station.link.hear(field.keys.state, lambda key, payload: heard.append(payload))
     station.info()
-    impostor = field.board.link(field.seals("r2", boot_id=field.controller.boot_id))
+    impostor = field.board.link(field.signing("r2", boot_id=field.controller.boot_id))
     impostor.publisher(field.keys.state)(b"FINISHED")
     assert heard == []
 
 
-def test_fields_of_a_seal_that_are_not_known_are_passed_over(site: Path) -> None:
+def test_fields_of_an_attachment_that_are_not_known_are_passed_over(site: Path) -> None:
     field = ready(site)
 
-    def newer(packet: SealedMessage) -> Iterable[SealedMessage]:
-        return (replace(packet, seal=json.dumps(json.loads(packet.seal) | {"later": 1}).encode()),)
+    def newer(packet: SignedMessage) -> Iterable[SignedMessage]:
+        return (
+            replace(packet, attachment=json.dumps(json.loads(packet.attachment) | {"later": 1}).encode()),
+        )
 
     field.router.meddle = newer
     assert field.guarded_station().status().state == "READY"
@@ -195,17 +197,17 @@ def test_a_robot_hears_only_stations_and_only_at_once(site: Path) -> None:
     assert heard == [b"arm", b"alive"]
 
 
-def test_a_seal_is_small() -> None:
+def test_an_attachment_is_small() -> None:
     """Beside a pose of some 250 bytes, fifty times a second."""
-    seal = Seal(signature=b"x" * 64, boot_id="0123456789ab", number=10**6, at_ns=10**15)
-    assert len(msgspec.json.encode(seal)) < 200
+    attachment = SignatureAttachment(signature=b"x" * 64, boot_id="0123456789ab", number=10**6, at_ns=10**15)
+    assert len(msgspec.json.encode(attachment)) < 200
 
 
-def held_back(field: GuardedField) -> list[SealedMessage]:
+def held_back(field: GuardedField) -> list[SignedMessage]:
     """From now on every order is withheld, and kept."""
-    kept: list[SealedMessage] = []
+    kept: list[SignedMessage] = []
 
-    def withhold(packet: SealedMessage) -> Iterable[SealedMessage]:
+    def withhold(packet: SignedMessage) -> Iterable[SignedMessage]:
         if "/cmd/" in packet.key:
             kept.append(packet)
             return ()
@@ -234,9 +236,9 @@ def test_an_order_that_a_station_has_given_up_is_never_carried_out(site: Path, l
 
 def test_a_commit_that_was_held_back_over_a_reboot_is_never_taken(site: Path) -> None:
     field = ready(site)
-    kept: list[SealedMessage] = []
+    kept: list[SignedMessage] = []
 
-    def withhold(packet: SealedMessage) -> Iterable[SealedMessage]:
+    def withhold(packet: SignedMessage) -> Iterable[SignedMessage]:
         if packet.key.endswith("/commit"):
             kept.append(packet)
             return ()
@@ -252,19 +254,19 @@ def test_a_commit_that_was_held_back_over_a_reboot_is_never_taken(site: Path) ->
     assert field.controller.run.revision == 1
 
 
-@pytest.mark.parametrize("seal", [{"nonce": "a\nb"}, {"nonce": "a", "boot_id": "a\nb"}])
-def test_a_seal_with_a_line_break_is_refused_and_the_refusal_is_signed(
-    site: Path, seal: dict[str, str]
+@pytest.mark.parametrize("attachment", [{"nonce": "a\nb"}, {"nonce": "a", "boot_id": "a\nb"}])
+def test_an_attachment_with_a_line_break_is_refused_and_the_refusal_is_signed(
+    site: Path, attachment: dict[str, str]
 ) -> None:
     field = ready(site)
-    forged = msgspec.json.encode({"signature": "", **seal})
-    question = SealedMessage("question", field.keys.info, b"", forged)
+    forged = msgspec.json.encode({"signature": "", **attachment})
+    question = SignedMessage("question", field.keys.info, b"", forged)
     (answer,) = field.board.answers(question)
     assert b"has several lines" in answer.payload
-    assert answer.seal
+    assert answer.attachment
 
 
 def test_parameters_with_a_line_break_are_not_answered(site: Path) -> None:
     field = ready(site)
-    question = SealedMessage("question", field.keys.log, b"", b"{}", {"since": "0\n1"})
+    question = SignedMessage("question", field.keys.log, b"", b"{}", {"since": "0\n1"})
     assert field.board.answers(question) == []

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stopgo.bridge.conform import falsified_seals as falsified
-from stopgo.bridge.conform.falsified_seals import Falsifying
+from stopgo.bridge.conform import falsified_signatures as falsified
+from stopgo.bridge.conform.falsified_signatures import Falsifying
 from stopgo.bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
 from stopgo.bridge.conform.robot_bench import RobotBench
 from stopgo.bridge.conform.robot_queries import describe, must_reject, read_reply
@@ -16,7 +16,7 @@ def _must_be_untrusted(bench: RobotBench, falsify: Falsifying, what: str) -> Non
     """Send queries and a command with falsified signatures; all must be refused."""
     if bench.forger is None:
         raise NotTried(NO_KEYS)
-    bench.forger.seals.falsify = falsify
+    bench.forger.signing.falsify = falsify
     for key, payload, parameters in (
         (bench.keys.info, b"", {}),
         (bench.keys.log, b"", {"since": "0"}),
@@ -37,15 +37,15 @@ def wrong_signatures_are_untrusted(bench: RobotBench) -> None:
     _must_be_untrusted(bench, falsified.flipped, "with a wrong signature")
 
 
-def seals_are_for_one_key(bench: RobotBench) -> None:
+def signatures_are_for_one_key(bench: RobotBench) -> None:
     _must_be_untrusted(bench, falsified.of_another_key, "with the signature of another key")
 
 
-def seals_are_for_one_payload(bench: RobotBench) -> None:
+def signatures_are_for_one_payload(bench: RobotBench) -> None:
     _must_be_untrusted(bench, falsified.of_another_payload, "with the signature of other bytes")
 
 
-def seals_are_for_their_parameters(bench: RobotBench) -> None:
+def signatures_are_for_their_parameters(bench: RobotBench) -> None:
     _must_be_untrusted(bench, falsified.of_other_parameters, "with the signature of other parameters")
 
 
@@ -60,7 +60,7 @@ def orders_are_given_in_ones_own_name(bench: RobotBench) -> None:
     must_reject(bench.ask(bench.keys.command("pause"), encode(order)), "untrusted")
 
 
-def what_is_published_is_sealed(bench: RobotBench) -> None:
+def publications_are_signed(bench: RobotBench) -> None:
     """The link delivers only publications whose signature is valid."""
     if bench.forger is None:
         raise NotTried(NO_KEYS)
@@ -73,16 +73,16 @@ def what_is_published_is_sealed(bench: RobotBench) -> None:
         raise Nonconforming(f"no state with a valid signature was received ({why})") from None
 
 
-SEALS: tuple[Requirement[RobotBench], ...] = tuple(
+SIGNATURE_REQUIREMENTS: tuple[Requirement[RobotBench], ...] = tuple(
     Requirement("Signatures", text, test)
     for text, test in (
         ("a query without a signature: `untrusted`", unsigned_is_untrusted),
         ("a wrong signature: `untrusted`", wrong_signatures_are_untrusted),
-        ("a signature is valid on its own key expression only", seals_are_for_one_key),
-        ("a signature is valid for its own bytes only", seals_are_for_one_payload),
-        ("a signature is valid for its own parameters only", seals_are_for_their_parameters),
+        ("a signature is valid on its own key expression only", signatures_are_for_one_key),
+        ("a signature is valid for its own bytes only", signatures_are_for_one_payload),
+        ("a signature is valid for its own parameters only", signatures_are_for_their_parameters),
         ("a question without a certificate: `untrusted`", certificates_are_needed),
         ("a command in another's name: `untrusted`", orders_are_given_in_ones_own_name),
-        ("states are signed, numbered and fresh", what_is_published_is_sealed),
+        ("states are signed, numbered and fresh", publications_are_signed),
     )
 )

@@ -1,4 +1,4 @@
-"""Seals are, byte for byte, what docs/reference/protocol.md says: a dialogue with fixed keys and clocks."""
+"""Signatures are, byte for byte, as docs/reference/protocol.md says: one dialogue, fixed keys and times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey,
 
 from stopgo.bridge.link.keys import HeldKeys, KeyFiles, holder_of
 from stopgo.bridge.link.link import Request
-from stopgo.bridge.link.seals import KeySeals
+from stopgo.bridge.link.signatures import KeySigning
 
 VECTORS: dict[str, Any] = json.loads(files("stopgo.bridge.link").joinpath("seal.vectors.json").read_bytes())
 MESSAGES: list[dict[str, Any]] = VECTORS["messages"]
@@ -30,21 +30,21 @@ def test_our_own_ends_say_exactly_this(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 @each_message
-def test_a_seal_verifies_as_the_document_says(message: dict[str, Any]) -> None:
-    seal = json.loads(message["seal"])
-    assert by_the_document(message, seal) == message["signed"].encode()
+def test_a_signature_verifies_as_the_document_says(message: dict[str, Any]) -> None:
+    attachment = json.loads(message["seal"])
+    assert by_the_document(message, attachment) == message["signed"].encode()
     key = public_key(message["by"])
-    key.verify(msgspec.convert(seal["signature"], bytes), message["signed"].encode())
+    key.verify(msgspec.convert(attachment["signature"], bytes), message["signed"].encode())
 
 
 @each_message
 @pytest.mark.parametrize("line", ["nonce", "boot_id", "number", "at_ns"])
-def test_whatever_is_changed_in_a_seal_breaks_it(message: dict[str, Any], line: str) -> None:
-    seal = json.loads(message["seal"])
-    changed = {**seal, line: seal.get(line, 0) + 1 if line in ("number", "at_ns") else "other"}
+def test_whatever_is_changed_in_an_attachment_breaks_it(message: dict[str, Any], line: str) -> None:
+    attachment = json.loads(message["seal"])
+    changed = {**attachment, line: attachment.get(line, 0) + 1 if line in ("number", "at_ns") else "other"}
     with pytest.raises(InvalidSignature):
         public_key(message["by"]).verify(
-            msgspec.convert(seal["signature"], bytes), by_the_document(message, changed)
+            msgspec.convert(attachment["signature"], bytes), by_the_document(message, changed)
         )
 
 
@@ -53,7 +53,7 @@ def test_the_document_names_the_vectors() -> None:
     assert "bridge/link/seal.vectors.json" in page.read_text(encoding="utf-8")
 
 
-def by_the_document(message: dict[str, Any], seal: dict[str, Any]) -> bytes:
+def by_the_document(message: dict[str, Any], attachment: dict[str, Any]) -> bytes:
     """The bytes that are signed, written once more after docs/reference/protocol.md alone."""
     parameters = ";".join(f"{name}={value}" for name, value in sorted(message["parameters"].items()))
     asked = hashlib.sha256(message.get("question", "").encode()).hexdigest()
@@ -62,7 +62,12 @@ def by_the_document(message: dict[str, Any], seal: dict[str, Any]) -> bytes:
         "answer": [message["key"], parameters, asked],
         "told": [message["key"]],
     }[message["kind"]]
-    bound = [seal.get("nonce", ""), seal.get("boot_id", ""), seal.get("number", 0), seal.get("at_ns", 0)]
+    bound = [
+        attachment.get("nonce", ""),
+        attachment.get("boot_id", ""),
+        attachment.get("number", 0),
+        attachment.get("at_ns", 0),
+    ]
     lines = "".join(f"{line}\n" for line in (f"stopgo/1 {message['kind']}", *about, *bound))
     return lines.encode() + message["payload"].encode()
 
@@ -90,12 +95,12 @@ def dialogue(held: dict[str, HeldKeys], monkeypatch: pytest.MonkeyPatch) -> list
     nonces: Iterator[int] = iter(range(1, 100))
     monkeypatch.setattr("secrets.token_hex", lambda size: f"{next(nonces):0{2 * size}x}")
     day = datetime.fromisoformat(VECTORS["now"])
-    station = KeySeals(held["alice"], now=lambda: day, clock_ns=lambda: 5_000_000_000)
-    robot = KeySeals(held["r1"], boot_id="b7", now=lambda: day, clock_ns=lambda: 1_700_000_000_000_000_000)
+    station = KeySigning(held["alice"], now=lambda: day, clock_ns=lambda: 5_000_000_000)
+    robot = KeySigning(held["r1"], boot_id="b7", now=lambda: day, clock_ns=lambda: 1_700_000_000_000_000_000)
     said: list[dict[str, Any]] = []
 
-    def say(shows: str, kind: str, by: str, key: str, payload: str, seal: bytes, **more: Any) -> None:
-        sealed = json.loads(seal)
+    def say(shows: str, kind: str, by: str, key: str, payload: str, attachment: bytes, **more: Any) -> None:
+        signed = json.loads(attachment)
         message = {
             "shows": shows,
             "kind": kind,
@@ -105,23 +110,27 @@ def dialogue(held: dict[str, HeldKeys], monkeypatch: pytest.MonkeyPatch) -> list
             "payload": payload,
             **more,
         }
-        said.append({**message, "signed": by_the_document(message, sealed).decode(), "seal": seal.decode()})
+        said.append(
+            {**message, "signed": by_the_document(message, signed).decode(), "seal": attachment.decode()}
+        )
 
     def ask(shows: str, key: str, payload: str, reply: str, **parameters: str) -> None:
-        question = station.seal_question(key, payload.encode(), parameters)
-        say(shows, "question", "alice", key, payload, question.seal, parameters=parameters)
-        answered = robot.seal_answers(lambda request: reply.encode())
-        got, seal = answered(Request(key, payload.encode(), parameters, question.seal))
-        assert station.verify_answer(question, got, seal) == reply.encode(), station.distrusted
+        question = station.sign_question(key, payload.encode(), parameters)
+        say(shows, "question", "alice", key, payload, question.attachment, parameters=parameters)
+        answered = robot.sign_answers(lambda request: reply.encode())
+        got, attachment = answered(Request(key, payload.encode(), parameters, question.attachment))
+        assert station.verify_answer(question, got, attachment) == reply.encode(), station.distrusted
         more = {"parameters": parameters, "question": payload}
-        say(f"the answer to {shows}", "answer", "r1", key, reply, seal, **more)
+        say(f"the answer to {shows}", "answer", "r1", key, reply, attachment, **more)
 
-    def tell(shows: str, speaker: KeySeals, by: str, key: str, payload: str, listener: KeySeals) -> None:
+    def tell(shows: str, speaker: KeySigning, by: str, key: str, payload: str, listener: KeySigning) -> None:
         heard: list[bytes] = []
-        seal = speaker.seal_publication(key, payload.encode())
-        listener.verify_publications(lambda key, payload: heard.append(payload))(key, payload.encode(), seal)
+        attachment = speaker.sign_publication(key, payload.encode())
+        listener.verify_publications(lambda key, payload: heard.append(payload))(
+            key, payload.encode(), attachment
+        )
         assert heard == [payload.encode()], listener.distrusted
-        say(shows, "told", by, key, payload, seal)
+        say(shows, "told", by, key, payload, attachment)
 
     root = "north/hall/sx/1/r1"
     ask("a first question, without payload", f"{root}/info", "", '{"is":"Malformed","message":"Büro 😀"}')

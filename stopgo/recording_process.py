@@ -1,0 +1,206 @@
+"""A plan's recording in a process of its own, which loads Rerun while the floor is planned.
+
+The results go through a pipe, and the process writes and checks the file. If it ends early, for whatever
+reason, the recording is drawn here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copyreg
+import io
+import json
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+from typing import IO, TYPE_CHECKING, Any
+
+from stopgo.mission.errors import InputError
+
+if TYPE_CHECKING:
+    from stopgo.recordings.plan import PlanRecording
+
+CHILD = """
+import json, sys
+sys.path[:] = json.loads(sys.stdin.buffer.readline())
+from stopgo.recording_process import serve
+serve()
+"""
+"""Program of the process; its first line of input is the path of modules."""
+
+CACHED = "_cached_"
+"""Begin of the names of values that are derived from a result, and that no drawing reads."""
+
+
+class RecordingProcess:
+    """The process that draws the recordings of one command's plans, one after the other."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """True from the start to the end of the process, or to the first sign that it has ended."""
+        return self._process is not None
+
+    def start(self) -> None:
+        """Start the process, unless Rerun is missing, or already loaded here."""
+        if "rerun" in sys.modules or find_spec("rerun") is None or not sys.executable:
+            return
+        with contextlib.suppress(OSError):
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", CHILD],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,  # Ctrl-C reaches this process, which ends the other
+            )
+            self._send(json.dumps(sys.path).encode() + b"\n")
+
+    def end(self) -> None:
+        """End the process, also in the middle of its work."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.communicate()
+
+    def draw(self, recording_id: str, results: Iterable[object]) -> PlanDrawing:
+        """Begin to draw a recording of these stage results."""
+        results = tuple(results)
+        if self._process is not None:
+            try:
+                self._send(_pickled((recording_id, results)))
+            except (pickle.PicklingError, TypeError, AttributeError):  # of a result that a plug-in made
+                self.end()
+        return PlanDrawing(self, recording_id, results)
+
+    def written(self, path: Path) -> bool:
+        """True once the recording that is being drawn is in `path`, and was read to its end.
+
+        Raises
+        ------
+        OSError, InputError
+            The file cannot be written, or does not hold what was written.
+        """
+        if self._process is None:
+            return False
+        try:
+            self._send(pickle.dumps(path))
+            assert self._process is not None and self._process.stdout is not None
+            problem = pickle.load(self._process.stdout)
+        except (EOFError, AssertionError, pickle.UnpicklingError):
+            self.end()
+            return False
+        except BaseException:
+            self.end()
+            raise
+        if problem is not None:
+            raise problem
+        return True
+
+    def _send(self, data: bytes) -> None:
+        """Send to the process; if it has ended, that is noticed when its answer is read."""
+        assert self._process is not None and self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.write(data)
+            self._process.stdin.flush()
+
+
+class PlanDrawing:
+    """A recording that is drawn, beside the other files of a plan."""
+
+    def __init__(self, process: RecordingProcess, recording_id: str, results: tuple[object, ...]) -> None:
+        self._process = process
+        self._recording_id = recording_id
+        self._results = results
+
+    def write(self, path: Path) -> None:
+        """Write the recording into `path`, and read the file to its end."""
+        if not self._process.written(path):
+            _recording_of(self._recording_id, self._results).write(path)
+
+
+@contextmanager
+def recording_process() -> Iterator[RecordingProcess]:
+    """Yield a process that ends with the block; until it is started, recordings are drawn here."""
+    process = RecordingProcess()
+    try:
+        yield process
+    finally:
+        process.end()
+
+
+def serve() -> None:
+    """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
+    _leave_pandas_out()
+    asked, answers = sys.stdin.buffer, sys.stdout.buffer
+    sys.stdout = sys.stderr
+    import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
+
+    with contextlib.suppress(EOFError):
+        while True:
+            _serve_one(asked, answers)
+
+
+def _serve_one(asked: IO[bytes], answers: IO[bytes]) -> None:
+    recording = _recording_of(*pickle.load(asked))
+    recording.draw()
+    problem = None
+    try:
+        recording.write(pickle.load(asked))
+    except (OSError, InputError) as error:
+        problem = error
+    answers.write(pickle.dumps(problem))
+    answers.flush()
+
+
+def _recording_of(recording_id: str, results: Iterable[object]) -> PlanRecording:
+    from stopgo.recordings.plan import PlanRecording
+
+    recording = PlanRecording(recording_id)
+    for result in results:
+        recording.observe(result)
+    return recording
+
+
+class _WithoutPandas:
+    """Finder of modules that does not find pandas."""
+
+    def find_spec(self, name: str, *_: Any) -> None:
+        if name == "pandas":
+            raise ModuleNotFoundError(name=name)
+
+
+def _leave_pandas_out() -> None:
+    """Spare this process pandas, 0.2 s, which pyarrow loads to ask of each array whether it is a series."""
+    sys.meta_path.insert(0, _WithoutPandas())
+
+
+class _Pickler(pickle.Pickler):
+    """Pickles stage results; what was derived from them stays here."""
+
+    def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, MappingProxyType):
+            return _read_only, (dict(value),)
+        values = getattr(value, "__dict__", None)
+        if isinstance(value, type) or not isinstance(values, dict):
+            return NotImplemented
+        if not any(name.startswith(CACHED) for name in values):
+            return NotImplemented
+        left = {name: held for name, held in values.items() if not name.startswith(CACHED)}
+        return copyreg.__newobj__, (type(value),), left  # type: ignore[attr-defined]
+
+
+def _read_only(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(values)
+
+
+def _pickled(value: object) -> bytes:
+    file = io.BytesIO()
+    _Pickler(file, protocol=pickle.HIGHEST_PROTOCOL).dump(value)
+    return file.getvalue()

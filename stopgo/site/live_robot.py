@@ -1,0 +1,368 @@
+"""One robot as pages show it: its state with its age, events, path and coverage, from any kind of link.
+
+Data. Poses go from the link's thread to the feed at once. Everything else goes through the robot's own
+thread, which follows run after run as `stopgo watch` does, and records each in the folder.
+
+Invariants:
+- A state on the feed is the newest by the robot's sealed sequence; its age is never understated.
+- Events of the present run have a key each, so that no page misses one; a new run replaces them all.
+- The path has a bounded number of points; its spacing grows with its length.
+"""
+
+from __future__ import annotations
+
+import math
+import queue
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
+from typing import Any
+
+import msgspec
+
+from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.link.protocol import decode
+from stopgo.bridge.station.follow import (
+    AGAIN_S,
+    SILENCE_S,
+    Followed,
+    LiveReport,
+    RunFollower,
+    Silence,
+    WatchedLink,
+    late_poses,
+    next_report,
+    subscribe,
+)
+from stopgo.bridge.station.logged_run import LoggedReport
+from stopgo.bridge.station.station import Station
+from stopgo.bridge.station.watch import hand_over
+from stopgo.mission.comparing.run_collector import RunCollector
+from stopgo.mission.document import Mission
+from stopgo.mission.document.schedule import schedule
+from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.run.events import (
+    PoseReport,
+    PosesMissing,
+    ReportsMissing,
+    Scanned,
+    Skipped,
+    StateReport,
+    Unconfirmed,
+)
+from stopgo.mission.run.health_text import charge_text
+from stopgo.site.event_feed import EventFeed
+from stopgo.site.known_missions import KnownMission, KnownMissions
+
+SPACING_M = 0.1
+"""Smallest distance between two points of the drawn path."""
+CHUNK = 50
+MOST_CHUNKS = 100
+"""Chunks of the path at most; then every second point is left out."""
+MOST_EVENTS = 5000
+
+OpenRecording = Callable[[str, str, KnownMission | None], AbstractContextManager[RunCollector]]
+"""Opens the collector of a run, by robot, run id and mission."""
+
+
+class PagePath:
+    """Points of a run's path at some distance from each other, in chunks on the feed."""
+
+    def __init__(self, feed: EventFeed, robot: str) -> None:
+        self._feed = feed
+        self._robot = robot
+        self.begin("")
+
+    def begin(self, run_id: str) -> None:
+        """Begin the path of a run."""
+        self._run_id = run_id
+        self._spacing = SPACING_M
+        self._chunks: list[list[list[float]]] = [[]]
+        self._feed.forget("path", self._robot)
+
+    def add(self, x: float, y: float) -> None:
+        """Add a position, if it is far enough from the last."""
+        last = self._chunks[-1][-1] if self._chunks[-1] else None
+        if last is not None and math.dist(last, (x, y)) < self._spacing:
+            return
+        if len(self._chunks[-1]) >= CHUNK:
+            self._chunks.append([list(self._chunks[-1][-1])])
+        self._chunks[-1].append([round(x, 2), round(y, 2)])
+        if len(self._chunks) > MOST_CHUNKS:
+            self._thin()
+        self._tell(len(self._chunks) - 1)
+
+    def _thin(self) -> None:
+        points = [point for chunk in self._chunks for point in chunk][::2]
+        self._spacing *= 2
+        self._chunks = [points[k : k + CHUNK + 1] for k in range(0, len(points), CHUNK)]
+        self._feed.forget("path", self._robot)
+        for number in range(len(self._chunks)):
+            self._tell(number)
+
+    def _tell(self, number: int) -> None:
+        value = {"run": self._run_id, "spacing": self._spacing, "xy": self._chunks[number]}
+        self._feed.tell(("path", self._robot, str(number)), value)
+
+
+class LiveRobot:
+    """A robot that is followed run after run; `follow` is the work of its thread."""
+
+    def __init__(
+        self, station: Station, feed: EventFeed, missions: KnownMissions, recorder: OpenRecording
+    ) -> None:
+        self.station = station
+        self.name = station.keys.robot
+        self.state: StateReport | None = None
+        self.state_at = self.pose_at = 0.0
+        """Times at which the newest state and the newest pose arrived."""
+        self.pose: PoseReport | None = None
+        self.mission: Mission | None = None
+        """Mission that the robot holds, once it was read."""
+        self.on_change: Callable[[], None] = lambda: None
+        """Called after each state and pose, from several threads."""
+        self._feed = feed
+        self._missions = missions
+        self._recorder = recorder
+        self._path = PagePath(feed, self.name)
+        self._true_at = time.monotonic()
+        """Time at which the newest state was true, at the latest known."""
+        self._token = uuid.uuid4().hex[:12]
+        self._trouble: tuple[str, ...] = ("not_found",)
+        self._offset: tuple[str, float] = ("", -math.inf)
+        """Boot, and lower bound of this clock minus the robot's, seconds."""
+        self._stops: dict[str, str] = {}
+        self._events: deque[int] = deque()
+        self._run_id = ""
+        self._open = ExitStack()
+        self._collector: RunCollector | None = None
+        self._recorded: set[tuple[str | None, int | None]] = set()
+
+    def work(self, stopped: threading.Event) -> None:
+        """Follow the robot until `stopped`; a fault that ends this is shown, and STOP works all the same."""
+        try:
+            self.follow(stopped)
+        except Exception as error:  # noqa: BLE001  where the robot's thread ends
+            if not stopped.is_set():
+                name = type(error).__name__
+                self._set_trouble(
+                    (f"unexpected error ({name}: {error}); restart stopgo site, and report it",)
+                )
+
+    def follow(self, stopped: threading.Event) -> None:
+        """Follow the robot until `stopped`; the fault of one run does not end it."""
+        link, keys = self.station.link, self.station.keys
+        self._tell_state(time.monotonic())
+        received = subscribe(link, keys)
+        link.hear(keys.pose, lambda key, payload: self._hear_pose(payload))
+        link.announce(keys.watcher(self._token))
+        watched = WatchedLink(self._keep)
+        while not stopped.is_set():
+            try:
+                self._follow_run(received, watched, stopped)
+            except StopgoError as error:
+                self._set_trouble((str(error),))
+                stopped.wait(SILENCE_S)
+            finally:
+                self._close_recording()
+
+    def _follow_run(
+        self, received: queue.SimpleQueue[LiveReport], watched: WatchedLink, stopped: threading.Event
+    ) -> None:
+        """Follow one run to its end, and wait for the next; without one, the robot's states."""
+        link, keys = self.station.link, self.station.keys
+        follower = RunFollower(link, keys, lambda: RECORD in self.station.capabilities)
+        first = self._newest(watched.ask())
+        for report in () if first is None else follower.take(first):
+            self._take(report)
+        while not stopped.is_set():
+            item = next_report(received, 0.0 if follower.poses.behind else AGAIN_S)
+            silent_s = watched.take(item)
+            if item is None and silent_s >= SILENCE_S:
+                self._take(Silence(seconds=silent_s))
+            asked = self._newest(watched.ask()) if watched.to_ask else None
+            news = self._newest(item) if watched.is_news else None
+            if _is_of_next_run(follower, news) or _is_of_next_run(follower, asked):
+                return
+            for fresh in (asked, news):
+                for report in () if fresh is None or follower.ended else follower.take(fresh):
+                    self._take(report)
+            if follower.ended and self._collector is not None:
+                for report in late_poses(received, follower):
+                    self._take(report)
+                self._close_recording()
+            elif not follower.ended:
+                self._catch_up(follower, watched, idle=item is None)
+
+    def _catch_up(self, follower: RunFollower, watched: WatchedLink, *, idle: bool) -> None:
+        """Take what is missing of the run; poses when nothing else waits."""
+        for pose in follower.poses.catch_up() if idle and follower.poses.behind else ():
+            self._take(pose)
+        for report in follower.catch_up():
+            self._take(report)
+        for missing in watched.missing(follower):
+            self._take(missing)
+
+    def _keep(self) -> StateReport | None:
+        asked_at = time.monotonic()
+        state = self.station.keep(self._token)
+        if state is not None:
+            boot, offset = self._offset
+            newest = asked_at - state.robot_ns / 1e9
+            self._offset = (state.boot_id, max(offset, newest) if boot == state.boot_id else newest)
+        return state
+
+    def _newest(self, item: LiveReport | None) -> LiveReport | None:
+        """Show a state as soon as it is there, before the events that it counts."""
+        if isinstance(item, StateReport):
+            self.state, self._trouble = item, ()
+            self.state_at = now = time.monotonic()
+            boot, offset = self._offset
+            known = boot == item.boot_id and math.isfinite(offset)
+            self._tell_state(min(now, item.robot_ns / 1e9 + offset) if known else now)
+            self._read_mission(item)
+            self.on_change()
+        return item
+
+    def _hear_pose(self, payload: bytes) -> None:
+        """Show a pose at once; called by the link's threads."""
+        try:
+            report = decode(payload, PoseReport)
+        except msgspec.DecodeError:
+            return
+        self.pose, self.pose_at = report, time.monotonic()
+        pose = {"x": round(report.pose.x, 3), "y": round(report.pose.y, 3), "heading": report.pose.heading}
+        self._feed.tell(("pose", self.name), pose | {"speed": round(report.speed, 3)})
+        self.on_change()
+
+    def _tell_state(self, at_s: float) -> None:
+        state, lease = self.state, self.station.lease
+        value: dict[str, Any] = {} if state is None else msgspec.to_builtins(state)
+        value["robot"] = self.name
+        value["charge"] = charge_text(None if state is None else state.battery)
+        value["trouble"] = self._trouble
+        value["lease"] = None
+        if lease is not None:
+            value["lease"] = {"holder": lease.commander, "left_s": self.station.lease_left_s}
+        self._feed.tell(("robot", self.name), value, at_s=at_s)
+        self._true_at = at_s
+
+    def _set_trouble(self, trouble: tuple[str, ...]) -> None:
+        if trouble != self._trouble:
+            self._trouble = trouble
+            self._tell_state(self._true_at)
+
+    def _read_mission(self, state: StateReport) -> None:
+        """Read the mission that the robot holds, when it changes."""
+        held = self.mission
+        if state.mission_id is None or state.revision is None:
+            return
+        if held is not None and (held.id, held.revision) == (state.mission_id, state.revision):
+            return
+        self.mission = self.station.mission(state.mission_id, state.revision)
+        self._tell_mission()
+
+    def _tell_mission(self) -> None:
+        if self.mission is None:
+            return
+        known = self._missions.add(self.mission)
+        mission = known.mission
+        value = {
+            "id": mission.id, "revision": mission.revision, "name": mission.name, "stops": len(mission.stops),
+            "total_s": schedule(mission).total_s, "trouble": known.trouble,
+        }  # fmt: skip
+        self._feed.tell(("mission", self.name), value)
+        self._tell_coverage()
+
+    def look_again(self) -> None:
+        """Look for the plan of the robot's mission again: a new one may be in the folder."""
+        self._tell_mission()
+
+    def _take(self, report: Followed) -> None:
+        """Show and record one report of the run."""
+        self._begin_run(report)
+        if isinstance(report, Silence):
+            self._set_trouble(("silent",))
+        elif isinstance(report, ReportsMissing):
+            self._set_trouble(report.topics)
+        elif isinstance(report, PoseReport):
+            self._path.add(report.pose.x, report.pose.y)
+        elif not isinstance(report, StateReport | PosesMissing | LoggedReport):
+            self._tell_event(report)
+        self._record(report)
+
+    def _begin_run(self, report: Followed) -> None:
+        run_id = getattr(report, "run_id", None)
+        if not run_id or run_id == self._run_id or isinstance(report, ReportsMissing):
+            return
+        self._close_recording()
+        self._run_id, self._stops = run_id, {}
+        self._events.clear()
+        self._feed.forget("event", self.name)
+        self._path.begin(run_id)
+        self._feed.tell(("run", self.name), {"run": run_id})
+        try:
+            self._collector = self._open.enter_context(self._recorder(self.name, run_id, self._known()))
+        except InputError as error:
+            self._feed.tell(("recording", self.name), {"run": run_id, "trouble": str(error)})
+        else:
+            self._feed.tell(("recording", self.name), {"run": run_id, "trouble": ""})
+
+    def _tell_event(self, event: Any) -> None:
+        value = msgspec.to_builtins(event)
+        pose = self.pose
+        near = pose is not None and abs(pose.robot_ns - event.robot_ns) < 2e9
+        value["at"] = [round(pose.pose.x, 2), round(pose.pose.y, 2)] if near and pose is not None else None
+        self._feed.tell(("event", self.name, str(event.number)), value)
+        self._events.append(event.number)
+        if len(self._events) > MOST_EVENTS:
+            self._feed.forget("event", self.name, str(self._events.popleft()))
+        if isinstance(event, Scanned | Unconfirmed | Skipped):
+            self._stops[event.stop] = "skipped" if isinstance(event, Skipped) else "done"
+            self._tell_coverage()
+
+    def _tell_coverage(self) -> None:
+        known = self._known()
+        done, skipped = (
+            tuple(stop for stop, what in self._stops.items() if what == kind) for kind in ("done", "skipped")
+        )
+        value = None if known is None else known.coverage(done, skipped)
+        shown = {"run": self._run_id, "done": done, "skipped": skipped, "coverage": value}
+        self._feed.tell(("coverage", self.name), shown)
+
+    def _known(self) -> KnownMission | None:
+        """Return the mission that the robot holds, with its plan if that is known."""
+        mission = self.mission
+        return None if mission is None else self._missions.get(mission.id, mission.revision)
+
+    def _record(self, report: Followed) -> None:
+        """Hand a report to the recording, its revision of the mission first."""
+        collector = self._collector
+        if collector is None:
+            return
+        revision = (getattr(report, "mission_id", None), getattr(report, "revision", None))
+        if None not in revision and revision not in self._recorded:
+            self._recorded.add(revision)
+            collector.mission(self.station.mission(*revision))  # type: ignore[arg-type]
+        hand_over(collector, report)
+
+    def _close_recording(self) -> None:
+        collector, self._collector = self._collector, None
+        self._recorded = set()
+        if collector is not None:
+            try:
+                self._open.close()
+            except StopgoError as error:
+                self._feed.tell(("recording", self.name), {"run": self._run_id, "trouble": str(error)})
+            else:
+                self._feed.tell(("recording", self.name), {"run": self._run_id, "trouble": "", "over": True})
+
+
+def _is_of_next_run(follower: RunFollower, item: LiveReport | None) -> bool:
+    """True for a state of another run than the one that is followed."""
+    if not isinstance(item, StateReport) or follower.run_id is None:
+        return False
+    return item.run_id != follower.run_id

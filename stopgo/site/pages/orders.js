@@ -1,0 +1,116 @@
+// Orders to one robot: none is ever disabled, for the page may be wrong; those that fit the state stand out.
+import { orderId, read, send } from "./api.js";
+import { fill, h, say } from "./dom.js";
+import { get } from "./store.js";
+import { lineOf } from "./stop.js";
+import { clock, duration, seconds, t } from "./words.js";
+
+const FITTING = {
+  READY: ["start"], FINISHED: ["start"], ABORTED: ["start"], RUNNING: ["pause"], HOMING: ["pause"],
+  PAUSED: ["resume"], HELD: ["retry", "skip"],
+};
+const VERBS = ["start", "pause", "resume", "skip", "retry", "home", "abort"];
+const ASK_FIRST = ["skip", "home", "abort"];
+const CONFIRM_MS = 5000;
+
+export function makeOrders(name, me) {
+  const result = h("p", { class: "result", role: "status" });
+  const question = h("div", { class: "question" });
+  const buttons = VERBS.map((verb) => h("button", { type: "button", "data-verb": verb, onclick: (event) => pressed(name, verb, event.currentTarget, question) }, t(`verb_${verb}`)));
+  const push = h("button", { type: "button", onclick: () => offerMissions(name, question) }, t("push"));
+  const element = h("div", { class: "orders" }, h("div", { class: "buttons" }, buttons, push), question, result);
+  return element;
+}
+
+export function showOrders(element, name, state, holder) {
+  const fitting = FITTING[state.state] ?? [];
+  for (const button of element.querySelectorAll("[data-verb]")) {
+    button.classList.toggle("primary", fitting.includes(button.dataset.verb));
+  }
+  const record = get("order", name);
+  if (record) say(element.querySelector(".result"), resultText(record));
+}
+
+export function resultText(record) {
+  const verb = record.verb === "push" ? t("push") : t(`verb_${record.verb}`);
+  if (record.outcome === "sent") return t("order_sent", { verb, time: clock(record.sent_at * 1000) });
+  if (record.outcome === "ok") {
+    return t("order_ok", { verb, took: seconds((record.heard_at - record.sent_at) * 1000, 2), note: record.message });
+  }
+  return t(`order_${record.outcome}`, { verb, reason: record.message });
+}
+
+function pressed(name, verb, button, question) {
+  const again = ["FINISHED", "ABORTED"].includes(get("robot", name)?.state);
+  if (ASK_FIRST.includes(verb) || (verb === "start" && again)) {
+    ask(question, t(`confirm_${verb}`, { robot: name }), t(`verb_${verb}`), () => give(name, { verb, again: verb === "start" && again }, question));
+  } else give(name, { verb }, question);
+}
+
+function ask(question, text, yes, work) {
+  const done = () => fill(question);
+  fill(question, h("p", {}, text),
+    h("button", { type: "button", class: "primary", onclick: () => { done(); work(); } }, yes),
+    h("button", { type: "button", onclick: done }, t("cancel")));
+  question.querySelector("button").focus();
+}
+
+async function give(name, order, question) {
+  const path = `/api/robots/${encodeURIComponent(name)}/orders`;
+  await sent(name, question, (more) => send(path, { id: orderId(), ...order, ...more }));
+}
+
+// Another operator's lease is not taken without a question.
+async function sent(name, question, work) {
+  try {
+    const { orders } = await work({});
+    const [record] = orders;
+    if (record.outcome === "refused" && ["not_the_commander", "fenced"].includes(record.reason)) {
+      const who = get("robot", name)?.lease?.holder ?? "?";
+      ask(question, t("take_over_question", { who, robot: name }), t("take_over"), () => work({ take_over: true }).catch((error) => fault(question, error)));
+    }
+  } catch (error) {
+    fault(question, error);
+  }
+}
+
+function fault(question, error) {
+  fill(question, h("p", { class: "bad", role: "alert" }, t("not_sent", { reason: error.message })));
+}
+
+async function offerMissions(name, question) {
+  if (question.firstChild) return fill(question);
+  const { missions } = await read("/api/folder").catch(() => ({ missions: [] }));
+  if (!missions.length) return fill(question, h("p", {}, t("no_missions")));
+  const list = h("select", { "aria-label": t("mission_to_push") }, missions.map((one) =>
+    h("option", { value: one.file }, t("mission_choice", { ...one, time: duration(one.total_s) }))));
+  const difference = h("p", { class: "difference" });
+  const show = async () => {
+    const found = await read(`/api/robots/${encodeURIComponent(name)}/difference?file=${encodeURIComponent(list.value)}`).catch((error) => ({ error: error.message }));
+    say(difference, found.error ?? differenceText(found));
+  };
+  list.addEventListener("change", show);
+  fill(question, list, difference,
+    h("button", { type: "button", class: "primary", onclick: () => push(name, list.value, question) }, t("push_to", { robot: name })),
+    h("button", { type: "button", onclick: () => fill(question) }, t("cancel")));
+  await show();
+}
+
+export function differenceText(found) {
+  if (!found.held) return t("difference_none", { stops: found.new.stops });
+  if (found.same) return t("difference_same");
+  const change = t("difference_stops", { added: found.added.length, removed: found.removed.length, kept: found.kept });
+  const time = t("difference_time", { before: duration(found.held.total_s), after: duration(found.new.total_s) });
+  const what = found.same_mission
+    ? t("difference_revision", { before: found.held.revision, after: found.new.revision })
+    : t("difference_other", { before: found.held.name, after: found.new.name });
+  return `${what} ${change} ${time}`;
+}
+
+function push(name, file, question) {
+  const path = `/api/robots/${encodeURIComponent(name)}/push`;
+  fill(question);
+  return sent(name, question, (more) => send(path, { id: orderId(), file, ...more }));
+}
+
+export { lineOf };

@@ -1,0 +1,273 @@
+// Planning: a floor of the folder, twelve options, variants beside each other, and stops moved by hand.
+import { read, send } from "./api.js";
+import { fill, h, say, svg } from "./dom.js";
+import { emptyMap, floorLayers, legend, markSize, place, setFrame, stopMark, targetPaths } from "./map.js";
+import { all, onChange } from "./store.js";
+import { duration, number, percent, t } from "./words.js";
+
+const FORBIDDEN_M = 0.6;
+const NUDGE_M = 0.1;
+const chosen = { floor: null, options: {}, shown: null, base: null };
+const drawings = new Map();
+
+export function makePlan(main, me) {
+  const map = emptyMap(t("map_of_floor"));
+  const layers = Object.fromEntries(["floor", "targets", "progress", "legs", "stops", "findings", "pointer"].map((name) => [name, svg("g")]));
+  map.append(...Object.values(layers));
+  const view = {
+    me, map, layers, form: h("form", { class: "options" }), findings: h("ul", { class: "findings" }),
+    note: h("p", { class: "notice", role: "status" }), variants: h("div", { class: "variants" }),
+    hand: h("div", { class: "hand", role: "group", "aria-label": t("by_hand") }), selected: null, mode: null,
+  };
+  const may = me.role === "operator";
+  fill(main, h("div", { class: "planning" },
+    h("section", { class: "floor", "aria-label": t("tab_plan") }, view.note, map, view.hand,
+      legend(["seen", "unplanned", "hidden", "stop_waiting"], { seen: "legend_covered", stop_waiting: "legend_stop" })),
+    h("aside", {}, may ? view.form : h("p", { class: "notice" }, t("viewer_cannot_plan")),
+      h("h2", {}, t("variants")), view.variants, h("h2", {}, t("findings")), view.findings)));
+  map.addEventListener("click", (event) => pressedMap(view, event));
+  const off = onChange((kinds) => {
+    if (kinds.has("plan") || kinds.has("*")) drawVariants(view);
+  });
+  if (may) makeForm(view);
+  drawVariants(view);
+  return off;
+}
+
+async function makeForm(view) {
+  const [{ floors }, { options }] = await Promise.all([read("/api/folder"), read("/api/plan-options")]);
+  if (!floors.length) return say(view.note, t("no_floors"));
+  const floor = h("select", { id: "floor", onchange: () => { chosen.options = {}; readFloor(view, true); } },
+    floors.map((name) => h("option", { value: name, selected: name === chosen.floor }, name)));
+  const fields = options.map((option) => h("label", {}, h("span", {}, t(`option_${option.key}`), option.unit && ` (${option.unit})`), field(view, option)));
+  fill(view.form, h("label", {}, h("span", {}, t("floor")), floor), fields,
+    h("button", { type: "submit", class: "primary", id: "plan" }, t("plan_now")));
+  view.form.onsubmit = (event) => {
+    event.preventDefault();
+    begin(view, { floor: floor.value, options: given(view), required: [], forbidden: [] });
+  };
+  view.floor = floor;
+  await readFloor(view, !chosen.shown);
+}
+
+function field(view, option) {
+  const about = { name: option.key, id: `option-${option.key}`, title: option.help };
+  const value = chosen.options[option.key] ?? "";
+  const undecided = option.default || (/none|--|_/.test(option.undecided) ? "" : option.undecided);
+  const reread = ["storey", "date"].includes(option.key) ? () => readFloor(view, true) : null;
+  const words = option.flag ? ["yes", "no"] : option.choices;
+  if (option.key === "storey") {
+    view.storeys = h("select", { ...about, onchange: reread }, h("option", { value: "" }, t("only_one")));
+    return view.storeys;
+  }
+  if (words.length) {
+    return h("select", about, h("option", { value: "" }, undecided || "–"), words.map((word) => h("option", { value: word, selected: word === value }, word)));
+  }
+  return h("input", { ...about, value, placeholder: undecided || option.form, autocomplete: "off", ...(reread ? { type: "date", onchange: reread } : {}) });
+}
+
+function given(view) {
+  const options = {};
+  for (const [name, value] of new FormData(view.form)) if (value) options[name] = value;
+  chosen.options = options;
+  return options;
+}
+
+async function readFloor(view, show) {
+  chosen.floor = view.floor.value;
+  const options = given(view);
+  say(view.note, t("reading", { floor: chosen.floor }));
+  const wanted = Object.fromEntries(Object.entries(options).filter(([key]) => ["storey", "date"].includes(key)));
+  const found = await send("/api/floors", { floor: chosen.floor, options: wanted }).catch((error) => ({ trouble: error.message, storeys: [] }));
+  const storey = options.storey ?? "";
+  fill(view.storeys, h("option", { value: "" }, t("only_one")), found.storeys.map((one) =>
+    h("option", { value: one.name, selected: one.name === storey }, one.area_m2 ? `${one.name} (${number(one.area_m2)} m²)` : one.name)));
+  say(view.note, found.trouble ?? t("floor_read", { area: number(found.about.area_m2), rooms: found.about.rooms, openings: found.about.openings }));
+  if (show && found.drawing) {
+    chosen.shown = null;
+    showFloor(view, found.drawing);
+  }
+}
+
+function showFloor(view, drawing) {
+  view.drawing = drawing;
+  setFrame(view.map, drawing.frame);
+  fill(view.layers.floor, floorLayers(drawing));
+  for (const name of ["targets", "progress", "legs", "stops", "pointer"]) fill(view.layers[name]);
+  showFindings(view, drawing.findings ?? []);
+}
+
+function showFindings(view, findings) {
+  const frame = view.drawing.frame;
+  const size = 0.014 * Math.max(frame.width, frame.height);
+  const places = findings.filter((one) => one.at);
+  fill(view.layers.findings, places.map((one, index) => {
+    const [x, y] = place(frame, one.at[0], one.at[1]);
+    return svg("g", { class: `finding ${one.rank}`, transform: `translate(${x} ${y})` }, svg("title", {}, one.text),
+      svg("path", { d: `M0 ${-1.4 * size}L${1.3 * size} ${size}H${-1.3 * size}Z`, "vector-effect": "non-scaling-stroke" }),
+      svg("text", { y: 0.75 * size, "font-size": 1.3 * size, "text-anchor": "middle" }, index + 1));
+  }));
+  fill(view.findings, findings.length ? findings.map((one) =>
+    h("li", { class: one.rank }, one.at && h("b", {}, `${places.indexOf(one) + 1} `), one.text)) : h("li", {}, t("no_findings")));
+}
+
+async function begin(view, request) {
+  try {
+    const { number: made } = await send("/api/plans", request);
+    chosen.shown = made;
+    view.follow = made;
+    drawVariants(view);
+  } catch (error) {
+    say(view.note, t("not_sent", { reason: error.message }));
+  }
+}
+
+function variantsShown() {
+  return all("plan").map((one) => one.value).sort((a, b) => a.number - b.number);
+}
+
+function drawVariants(view) {
+  const variants = variantsShown();
+  fill(view.variants, variants.map((one) => card(view, one, variants)));
+  const shown = variants.find((one) => one.number === chosen.shown) ?? null;
+  if (shown) show(view, shown);
+  drawHand(view, shown);
+}
+
+function card(view, one, variants) {
+  const base = variants.find((other) => other.number === one.request.base) ?? variants.filter((other) => other.report && other.number < one.number).pop();
+  const operator = view.me.role === "operator";
+  const name = h("input", { value: defaultName(one), "aria-label": t("name_of_plan"), autocomplete: "off" });
+  const report = one.report;
+  return h("section", { class: `variant ${one.state}${one.number === chosen.shown ? " focus" : ""}`, "aria-label": t("variant", { n: one.number }) },
+    h("div", { class: "line" }, h("button", { type: "button", "aria-pressed": String(one.number === chosen.shown), onclick: () => { chosen.shown = one.number; view.selected = null; drawVariants(view); } }, t("variant", { n: one.number })),
+      h("span", { class: "state" }, one.state === "running" ? t(`stage_${one.stage}`) : t(`variant_${one.state}`))),
+    h("p", { class: "what" }, describe(one.request)),
+    one.error && one.state === "failed" && h("p", { class: "bad", role: "alert" }, one.error),
+    report && figures(report, base?.report),
+    operator && one.state === "done" && h("div", { class: "buttons" }, name,
+      h("button", { type: "button", class: one.saved ? "" : "primary", onclick: () => save(view, one, name.value) }, t("save"))),
+    one.saved && h("p", { class: "result" }, t("saved_as", { file: one.saved })),
+    operator && ["running", "waiting"].includes(one.state) && h("button", { type: "button", onclick: () => send(`/api/plans/${one.number}/cancel`, {}) }, t("cancel")));
+}
+
+function defaultName(one) {
+  const storey = one.request.options.storey;
+  const stem = one.request.floor.split("/").pop().replace(/\.\w+$/, "");
+  return one.request.replaces?.match(/^plans\/([^/]+)\//)?.[1] ?? (storey ? `${stem}-${storey}` : stem);
+}
+
+function describe(request) {
+  const options = Object.entries(request.options).map(([key, value]) => `${t(`option_${key}`)} ${value}`);
+  if (request.required.length || request.forbidden.length) options.push(t("by_hand_count", { n: request.required.length, not: request.forbidden.length }));
+  return [request.floor, ...options].join(" · ");
+}
+
+function figures(report, base) {
+  const joined = (one) => !one.findings.some((finding) => finding.code === "scans_not_joined");
+  const rows = [
+    [t("figure_stops"), number(report.stops), base && signed(report.stops - base.stops, 0)],
+    [t("figure_coverage"), percent(report.coverage), base && signed(100 * (report.coverage - base.coverage), 1, " %")],
+    [t("figure_route"), `${number(report.length_m, 1)} m`, base && signed(report.length_m - base.length_m, 1, " m")],
+    [t("figure_time"), duration(report.total_s), base && signed((report.total_s - base.total_s) / 60, 1, " min")],
+    [t("figure_overlap"), joined(report) ? t("joined") : t("not_joined"), base && joined(base) !== joined(report) ? "≠" : ""],
+  ];
+  return h("table", {}, h("tbody", {}, rows.map(([name, value, change]) =>
+    h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value), h("td", { class: "change" }, change || "")))),
+    report.coverage < report.required && h("caption", { class: "bad" }, t("below_required", { required: percent(report.required) })));
+}
+
+function signed(value, digits, unit = "") {
+  const rounded = Number(value.toFixed(digits));
+  return rounded === 0 ? "±0" : `${rounded > 0 ? "+" : "−"}${number(Math.abs(rounded), digits)}${unit}`;
+}
+
+async function save(view, one, name) {
+  try {
+    await send(`/api/plans/${one.number}/save`, { name });
+  } catch (error) {
+    say(view.note, t("not_sent", { reason: error.message }));
+  }
+}
+
+async function show(view, one) {
+  if (one.state === "done") {
+    if (!drawings.has(one.number)) drawings.set(one.number, await read(`/api/plans/${one.number}/drawing`).catch(() => null));
+    const drawing = drawings.get(one.number);
+    if (!drawing || chosen.shown !== one.number) return;
+    showFloor(view, { ...drawing, findings: one.report.findings });
+    view.size = markSize(drawing);
+    const seen = new Set(drawing.stops.map((stop) => stop.id));
+    fill(view.layers.targets, targetPaths(drawing, seen, new Set()));
+    fill(view.layers.legs, svg("path", { d: drawing.legs, class: "legs", "vector-effect": "non-scaling-stroke" }));
+    drawStops(view, drawing);
+    return;
+  }
+  if (one.error) say(view.note, one.state === "failed" ? one.error : t("variant_cancelled"));
+  if (one.drawing && view.drawing?.made !== one.number) showFloor(view, { ...one.drawing, made: one.number });
+  if (!view.drawing || !one.drawing) return;
+  const frame = view.drawing.frame;
+  const r = 0.004 * Math.max(frame.width, frame.height);
+  const dot = (radius, kind) => ([x, y]) => {
+    const [px, py] = place(frame, x, y);
+    return svg("circle", { cx: px, cy: py, r: radius, class: kind });
+  };
+  fill(view.layers.progress, one.chosen ? one.chosen.map(dot(3 * r, "chosen")) : (one.candidates ?? []).map(dot(r, "candidate")));
+  const line = (leg) => "M" + leg.map(([x, y]) => place(frame, x, y).map((part) => part.toFixed(2)).join(" ")).join("L");
+  fill(view.layers.legs, one.legs && svg("path", { d: one.legs.map(line).join(""), class: "legs", "vector-effect": "non-scaling-stroke" }));
+}
+
+function drawStops(view, drawing) {
+  fill(view.layers.stops, drawing.stops.map((stop) => {
+    const pick = () => { view.selected = stop.id; view.mode = null; drawVariants(view); };
+    return stopMark(drawing, stop, view.selected === stop.id ? "current" : "waiting", view.size, {
+      tabindex: "0", role: "button", "aria-label": t("stop_named", { stop: stop.id }), "data-stop": stop.id,
+      onclick: (event) => { if (view.mode) return; event.stopPropagation(); pick(); },
+      onkeydown: (event) => keyOnStop(view, event, stop, pick),
+    });
+  }));
+}
+
+function keyOnStop(view, event, stop, pick) {
+  const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  if (event.key === "Enter" || event.key === " ") pick();
+  else if (event.key === "Delete") edit(view, { without: stop.id });
+  else if (steps[event.key]) {
+    const [dx, dy] = steps[event.key];
+    edit(view, { without: stop.id, at: [stop.x + NUDGE_M * dx, stop.y + NUDGE_M * dy] });
+  } else return;
+  event.preventDefault();
+}
+
+function drawHand(view, shown) {
+  if (view.me.role !== "operator" || shown?.state !== "done") return fill(view.hand);
+  const mode = (name) => () => { view.mode = view.mode === name ? null : name; drawHand(view, shown); };
+  const button = (name, work, needs) => (!needs || view.selected) && h("button", { type: "button", "aria-pressed": String(view.mode === name), onclick: work }, t(`hand_${name}`, { stop: view.selected }));
+  fill(view.hand, h("span", {}, view.mode ? t(`hand_${view.mode}_where`) : view.selected ? "" : t("hand_help")),
+    button("add", mode("add")), button("move", mode("move"), true), button("forbid", () => edit(view, { without: view.selected }), true));
+}
+
+function pressedMap(view, event) {
+  if (!view.mode || !view.drawing) return;
+  const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(view.map.getScreenCTM().inverse());
+  const { left, top } = view.drawing.frame;
+  const at = [Math.round(1000 * (point.x + left)) / 1000, Math.round(1000 * (top - point.y)) / 1000];
+  edit(view, view.mode === "add" ? { at } : { without: view.selected, at });
+}
+
+// A change by hand is a new variant beside this one: all other stops stay, so the difference is its cost.
+// A stop in a doorway cannot be required; the planner chooses it again where it is needed.
+function edit(view, { without = null, at = null }) {
+  const base = variantsShown().find((one) => one.number === chosen.shown);
+  const drawing = drawings.get(chosen.shown);
+  if (!base || !drawing) return;
+  const gone = drawing.stops.find((stop) => stop.id === without);
+  const required = drawing.stops.filter((stop) => stop.id !== without && !stop.doorway).map((stop) => [stop.x, stop.y]);
+  if (at) required.push(at);
+  const far = gone && at ? Math.hypot(at[0] - gone.x, at[1] - gone.y) : Infinity;
+  const radius = Math.min(FORBIDDEN_M, 0.5 * far);
+  const forbidden = [...base.request.forbidden, ...(gone ? [[gone.x, gone.y, radius]] : [])];
+  view.mode = view.selected = null;
+  const { floor, options, replaces } = base.request;
+  begin(view, { floor, options, required, forbidden, replaces: base.saved ?? replaces ?? null });
+}

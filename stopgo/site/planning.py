@@ -1,0 +1,257 @@
+"""Planning from the page: variants of plans, made one after another in processes, kept until they are saved.
+
+A variant is a folder of temporary files. Saving copies them into `plans/<name>` of the site's folder, the
+mission last, as the next revision of the mission that lies there.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import queue
+import shutil
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import msgspec
+
+from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.files.atomic import replacing
+from stopgo.mission.files.file_name import file_name
+from stopgo.mission.files.mission_json import next_revision, read
+from stopgo.site.event_feed import EventFeed
+from stopgo.site.planning_work import DRAWING, CommandTask, ReadTask, VariantTask, WorkAnswer, work_on
+from stopgo.site.site_folder import SiteFiles
+
+MOST_VARIANTS = 24
+POLL_S = 0.2
+FILES = ("plan.rrd", "plan.pdf", "coverage.json", "plan.svg", "mission.json")
+"""Files of a plan, in the order in which they appear in the folder."""
+
+WorkTask = ReadTask | VariantTask | CommandTask
+
+
+class VariantRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A plan to make: a floor of the folder, options as people write them, and stops by hand."""
+
+    floor: str
+    options: dict[str, str] = {}
+    required: tuple[tuple[float, float], ...] = ()
+    forbidden: tuple[tuple[float, float, float], ...] = ()
+    replaces: str | None = None
+    """Mission file of the folder that it will replace."""
+
+
+@dataclass
+class WorkOrder:
+    """A task in the queue of a lane, and where its messages go."""
+
+    task: WorkTask
+    told: Callable[[WorkAnswer], None]
+    done: Callable[[WorkAnswer], None]
+    cancelled: threading.Event = field(default_factory=threading.Event)
+
+
+class WorkLane:
+    """One process that works on tasks in turn; a new one is started when a task has ended it."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[WorkOrder | None] = queue.SimpleQueue()
+        self._process: Any = None
+        self._connection: Any = None
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def begin(self, order: WorkOrder) -> WorkOrder:
+        """Put an order into the queue."""
+        self._queue.put(order)
+        return order
+
+    def answer(self, task: WorkTask) -> WorkAnswer:
+        """Return the answer of a task; waits for it."""
+        answers: queue.SimpleQueue[WorkAnswer] = queue.SimpleQueue()
+        self.begin(WorkOrder(task, lambda message: None, answers.put))
+        found = answers.get()
+        if "error" in found:
+            raise InputError(found["error"])
+        return found
+
+    def close(self) -> None:
+        """End the lane and its process, whatever it works on."""
+        self._queue.put(None)
+        self._end_process()
+
+    def _serve(self) -> None:
+        while (order := self._queue.get()) is not None:
+            order.done({"error": "cancelled"} if order.cancelled.is_set() else self._work(order))
+
+    def _work(self, order: WorkOrder) -> WorkAnswer:
+        try:
+            connection = self._begin_process()
+            connection.send(order.task)
+            while True:
+                while not connection.poll(POLL_S):
+                    if order.cancelled.is_set():
+                        self._end_process()
+                        return {"error": "cancelled"}
+                message = connection.recv()
+                if "done" in message:
+                    found: WorkAnswer = message["done"]
+                    return found
+                order.told(message)
+        except (EOFError, OSError):
+            self._end_process()
+            return {"error": "its process ended (killed, or out of memory); the site goes on"}
+
+    def _begin_process(self) -> Any:
+        if self._process is None or not self._process.is_alive():
+            context = get_context("spawn")
+            self._connection, theirs = context.Pipe()
+            self._process = context.Process(target=work_on, args=(theirs,), daemon=True)
+            self._process.start()
+            theirs.close()
+        return self._connection
+
+    def _end_process(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.join()
+
+
+@dataclass
+class PlanVariant:
+    """A plan that is made or was made, as pages show it."""
+
+    number: int
+    request: VariantRequest
+    folder: Path
+    order: WorkOrder | None = None
+    shown: dict[str, Any] = field(default_factory=dict)
+
+
+class PlanningRoom:
+    """Variants of a site, and the processes that make them."""
+
+    def __init__(self, folder: SiteFiles, feed: EventFeed, saved: Callable[[], None]) -> None:
+        self._folder = folder
+        self._feed = feed
+        self._saved = saved
+        self._place = TemporaryDirectory(prefix="stopgo-site-", ignore_cleanup_errors=True)
+        self._plans, self.files = WorkLane(), WorkLane()
+        self._numbers = itertools.count(1)
+        self._lock = threading.Lock()
+        self._variants: dict[int, PlanVariant] = {}
+
+    def close(self) -> None:
+        self._plans.close()
+        self.files.close()
+        self._place.cleanup()
+
+    def read(self, floor: str, options: dict[str, str]) -> WorkAnswer:
+        """Read a floor of the folder in a process."""
+        return self.files.answer(ReadTask(self._folder.file(floor), options))
+
+    def plan(self, request: VariantRequest) -> int:
+        """Begin a plan, and return its number.
+
+        Raises
+        ------
+        InputError
+            If the floor or the mission to replace is no file of the folder.
+        """
+        floor = self._folder.file(request.floor)
+        replaces = None if request.replaces is None else self._folder.file(request.replaces)
+        with self._lock:
+            number = next(self._numbers)
+            folder = Path(self._place.name) / str(number)
+            folder.mkdir()
+            variant = self._variants[number] = PlanVariant(number, request, folder)
+            self._forget_oldest()
+        variant.shown = {
+            "number": number, "state": "waiting", "stage": "", "request": msgspec.to_builtins(request)
+        }  # fmt: skip
+        task = VariantTask(floor, request.options, folder, request.required, request.forbidden, replaces)
+        self._tell(variant)
+        variant.order = self._plans.begin(
+            WorkOrder(
+                task, lambda message: self._progress(variant, message), lambda a: self._done(variant, a)
+            )
+        )
+        return number
+
+    def variant(self, number: int) -> PlanVariant:
+        """Return a variant; raises `InputError` if it is unknown."""
+        found = self._variants.get(number)
+        if found is None:
+            raise InputError(f"variant {number}: is not kept any more; plan it again")
+        return found
+
+    def drawing(self, number: int) -> dict[str, Any]:
+        """Return the drawing of a finished variant."""
+        try:
+            found: dict[str, Any] = json.loads((self.variant(number).folder / DRAWING).read_bytes())
+        except OSError:
+            raise InputError(f"variant {number}: has no plan") from None
+        return found
+
+    def cancel(self, number: int) -> None:
+        """End the work on a variant."""
+        order = self.variant(number).order
+        if order is not None:
+            order.cancelled.set()
+
+    def save(self, number: int, name: str) -> str:
+        """Copy a variant's files to `plans/<name>`, and return the name of its mission file.
+
+        Raises
+        ------
+        NegativeResult
+            If another mission than the one that it replaces lies there.
+        """
+        variant = self.variant(number)
+        if not (variant.folder / DRAWING).exists():
+            raise InputError(f"variant {number}: has no plan to save")
+        place = self._folder.path(f"plans/{file_name(name)}")
+        mission = read(variant.folder / "mission.json")
+        if next_revision(place / "mission.json", mission) != mission.revision:
+            raise NegativeResult(f"plans/{name}: holds another revision of this mission; plan again from it")
+        place.mkdir(parents=True, exist_ok=True)
+        there = [one for one in FILES if (variant.folder / one).exists()]
+        with replacing(*(place / one for one in there)) as paths:
+            for one, path in zip(there, paths, strict=True):
+                shutil.copyfile(variant.folder / one, path)
+        saved = self._folder.name_of(place / "mission.json")
+        variant.shown = {**variant.shown, "saved": saved}
+        self._tell(variant)
+        self._saved()
+        return saved
+
+    def _progress(self, variant: PlanVariant, message: WorkAnswer) -> None:
+        variant.shown = {**variant.shown, "state": "running", **message}
+        self._tell(variant)
+
+    def _done(self, variant: PlanVariant, answer: WorkAnswer) -> None:
+        kept = {key: variant.shown[key] for key in ("number", "request")}
+        if "error" in answer:
+            state = "cancelled" if answer["error"] == "cancelled" else "failed"
+            drawing = variant.shown.get("drawing")
+            variant.shown = {**kept, "state": state, "error": answer["error"], "drawing": drawing}
+        else:
+            variant.shown = {**kept, "state": "done", **answer}
+        self._tell(variant)
+
+    def _tell(self, variant: PlanVariant) -> None:
+        self._feed.tell(("plan", str(variant.number)), variant.shown)
+
+    def _forget_oldest(self) -> None:
+        while len(self._variants) > MOST_VARIANTS:
+            oldest = self._variants.pop(next(iter(self._variants)))
+            if oldest.order is not None:
+                oldest.order.cancelled.set()
+            self._feed.forget("plan", str(oldest.number))
+            shutil.rmtree(oldest.folder, ignore_errors=True)

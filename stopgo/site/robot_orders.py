@@ -1,0 +1,226 @@
+"""Orders of pages to robots: sent at once over the open links, and shown until the robot stands.
+
+A stop goes to every robot that it names, whatever state the site believes in. It has threads of its own, so
+nothing else delays it. What became known is shown with its time; what did not is shown as unknown.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any, Literal
+
+import msgspec
+
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, StopgoError
+from stopgo.mission.mavlink.telemetry import STILL_M_S
+from stopgo.mission.run.run_commands import Verb
+from stopgo.site.event_feed import EventFeed
+from stopgo.site.live_robot import LiveRobot
+
+MOST_KEPT = 200
+STOP_THREADS, ORDER_THREADS = 64, 16
+WATCHED_S = 30.0
+"""Time for which a stop is watched until the robot stands."""
+DRIVING = ("RUNNING", "HOMING")
+
+OrderOutcome = Literal["sent", "ok", "refused", "unknown", "not_sent"]
+
+
+class StopRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A press of STOP; without names, for every robot."""
+
+    id: str
+    robots: tuple[str, ...] = ()
+
+
+class OrderRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An order to one robot; sent again with the same `id`, it is given once."""
+
+    id: str
+    verb: Verb
+    stop: str | None = None
+    take_over: bool = False
+    again: bool = False
+    from_here: bool = False
+
+
+class PushRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A mission file of the folder for one robot."""
+
+    id: str
+    file: str
+    take_over: bool = False
+
+
+@dataclass(frozen=True)
+class OrderRecord:
+    """An order and what is known of it; times are seconds since 1970 on this machine's clock."""
+
+    id: str
+    robot: str
+    verb: str
+    sent_at: float
+    outcome: OrderOutcome = "sent"
+    heard_at: float | None = None
+    """Time of the robot's answer."""
+    standing_at: float | None = None
+    """Time of the first report after a stop in which the robot stands."""
+    reason: str = ""
+    message: str = ""
+    state: str = ""
+
+
+class RobotOrders:
+    """Orders to the robots of a site."""
+
+    def __init__(self, robots: Mapping[str, LiveRobot], feed: EventFeed) -> None:
+        self._robots = robots
+        self._feed = feed
+        self._lock = threading.Lock()
+        self._given: OrderedDict[tuple[str, str], Future[OrderRecord]] = OrderedDict()
+        self._stops = ThreadPoolExecutor(STOP_THREADS, "stop")
+        self._others = ThreadPoolExecutor(ORDER_THREADS, "order")
+        self._watched: dict[str, tuple[OrderRecord, float]] = {}
+        """Stops whose robot is not known to stand, and when each was sent on the monotonic clock."""
+
+    def close(self) -> None:
+        """Give no more orders; those on their way are waited for by nobody."""
+        self._stops.shutdown(wait=False, cancel_futures=True)
+        self._others.shutdown(wait=False, cancel_futures=True)
+
+    def stop(self, request: StopRequest) -> list[Future[OrderRecord]]:
+        """Send a pause to robots, all at the same time."""
+        names = request.robots or tuple(self._robots)
+        return [
+            self._once(request.id, name, partial(self._stop, request.id, self.robot(name)), self._stops)
+            for name in names
+        ]
+
+    def order(self, name: str, request: OrderRequest) -> Future[OrderRecord]:
+        """Send an order to one robot."""
+        robot = self.robot(name)
+        if request.verb in ("pause", "abort"):
+            return self._once(
+                request.id, name, partial(self._stop, request.id, robot, request.verb), self._stops
+            )
+        details: dict[str, Any] = {"take_over": request.take_over, "stop": request.stop}
+        if request.verb == "start":
+            details = {
+                "take_over": request.take_over, "again": request.again, "from_here": request.from_here
+            }  # fmt: skip
+        give = partial(robot.station.command, request.verb, **details)
+        return self._once(
+            request.id, name, partial(self._run, request.id, robot, request.verb, give), self._others
+        )
+
+    def push(self, name: str, request: PushRequest, mission: Mission) -> Future[OrderRecord]:
+        """Send a mission to one robot, and verify that it is stored."""
+        robot = self.robot(name)
+        give = partial(robot.station.push, mission, take_over=request.take_over)
+        return self._once(request.id, name, partial(self._run, request.id, robot, "push", give), self._others)
+
+    def robot(self, name: str) -> LiveRobot:
+        """Return a robot by name; raises `InputError` if the site has none of this name."""
+        found = self._robots.get(name)
+        if found is None:
+            raise InputError(f"robot {name[:64]!r}: not on this site")
+        return found
+
+    def _once(
+        self, order_id: str, name: str, work: Callable[[], OrderRecord], pool: ThreadPoolExecutor
+    ) -> Future[OrderRecord]:
+        """Begin an order, or return the one that was begun under its id."""
+        with self._lock:
+            known = self._given.get((order_id, name))
+            if known is not None:
+                return known
+            begun = self._given[order_id, name] = pool.submit(work)
+            while len(self._given) > MOST_KEPT:
+                self._given.popitem(last=False)
+        return begun
+
+    def _stop(self, order_id: str, robot: LiveRobot, verb: Verb = "pause") -> OrderRecord:
+        sent_s = time.monotonic()
+        station = robot.station
+        sent = OrderRecord(order_id, robot.name, verb, time.time())
+        with self._lock:
+            self._watched[robot.name] = (sent, sent_s)
+        robot.on_change = partial(self.look_if_standing, robot)
+        done = self._run(order_id, robot, verb, partial(station.command, verb), sent=sent)
+        with self._lock:
+            watched = self._watched.get(robot.name)
+            if watched is not None and watched[0].id == order_id:
+                self._watched[robot.name] = (done, sent_s)
+        self.look_if_standing(robot)
+        return done
+
+    def _run(
+        self,
+        order_id: str,
+        robot: LiveRobot,
+        verb: str,
+        give: Callable[[], Any],
+        *,
+        sent: OrderRecord | None = None,
+    ) -> OrderRecord:
+        """Give an order, and show it when it is sent and when its outcome is known."""
+        record = sent or OrderRecord(order_id, robot.name, verb, time.time())
+        self._tell(record)
+        try:
+            answer = give()
+        except StopgoError as error:
+            record = replace(record, **_failure(error))
+        else:
+            state, message = str(getattr(answer, "state", "")), str(getattr(answer, "message", ""))
+            record = replace(record, outcome="ok", heard_at=time.time(), state=state, message=message)
+        self._tell(record)
+        return record
+
+    def look_if_standing(self, robot: LiveRobot) -> None:
+        """Show that a stopped robot stands, once reports that came after the stop say so."""
+        with self._lock:
+            watched = self._watched.get(robot.name)
+            if watched is None:
+                return
+            record, sent_s = watched
+            if time.monotonic() - sent_s > WATCHED_S:
+                del self._watched[robot.name]
+                return
+            if record.outcome == "sent" or not _stands(robot, sent_s):
+                return
+            del self._watched[robot.name]
+        self._tell(replace(record, standing_at=time.time()))
+
+    def _tell(self, record: OrderRecord) -> None:
+        kind = "stop" if record.verb in ("pause", "abort") else "order"
+        self._feed.tell((kind, record.robot), asdict(record))
+
+
+def _stands(robot: LiveRobot, since_s: float) -> bool:
+    """Return True if a state and a pose that arrived since then say that the robot does not drive."""
+    state, pose = robot.state, robot.pose
+    if state is None or pose is None or min(robot.state_at, robot.pose_at) <= since_s:
+        return False
+    return state.state not in DRIVING and abs(pose.speed) < STILL_M_S
+
+
+def _failure(error: StopgoError) -> dict[str, Any]:
+    """Return the outcome of an order that was not carried out, or may not have been."""
+    if isinstance(error, NegativeResult):
+        outcome: OrderOutcome = "refused"
+        heard = time.time()
+        return {"outcome": outcome, "heard_at": heard, "reason": error.reason or "", "message": str(error)}
+    outcome = "unknown" if isinstance(error, OutcomeUnknown) else "not_sent"
+    return {"outcome": outcome, "message": str(error)}
+
+
+def records_json(records: Iterable[OrderRecord]) -> list[dict[str, Any]]:
+    """Return records for the page."""
+    return [asdict(record) for record in records]

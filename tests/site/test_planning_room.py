@@ -1,0 +1,134 @@
+"""Planning from the page: floors read in processes, variants, stops by hand, and saving as a revision."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.files.mission_json import read
+from stopgo.site.event_feed import EventFeed
+from stopgo.site.planning import PlanningRoom, VariantRequest
+from stopgo.site.planning_routes import options_json
+from stopgo.site.planning_work import ReadTask, VariantTask, read_work, settings_of, variant_work
+from stopgo.site.run_pages import RunRoom
+from stopgo.site.site_folder import SiteFiles
+from tests.site.two_rooms import two_rooms
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    two_rooms(folder / "house.dxf")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def room(place: Path) -> Iterator[PlanningRoom]:
+    made = PlanningRoom(SiteFiles.at(place), EventFeed(), lambda: None)
+    yield made
+    made.close()
+
+
+def waited(room: PlanningRoom, number: int) -> dict[str, Any]:
+    """What pages show of a variant once its process has answered."""
+    order = room.variant(number).order
+    assert order is not None
+    while room.variant(number).shown["state"] in ("waiting", "running"):
+        time.sleep(0.02)
+    return room.variant(number).shown
+
+
+def test_a_floor_is_read_with_its_drawing(place: Path) -> None:
+    found = read_work(ReadTask(place / "house.dxf", {}), lambda message: None)
+    assert (found["about"]["rooms"], found["about"]["openings"]) == (2, 1)
+    assert found["about"]["area_m2"] == pytest.approx(32.0)
+    assert {layer["kind"] for layer in found["drawing"]["layers"]} == {"floor", "walls", "openings"}
+    assert [name for name, _, _ in found["drawing"]["names"]] == ["left", "right"]
+
+
+def test_a_plan_is_shown_as_it_grows(place: Path, tmp_path: Path) -> None:
+    told: list[dict[str, Any]] = []
+    answer = variant_work(VariantTask(place / "house.dxf", {"coverage": "0.8"}, tmp_path), told.append)
+    stages = [one["stage"] for one in told]
+    assert stages[0] == "FloorPlan"
+    assert stages.index("Candidates") < stages.index("Selection") < stages.index("Route")
+    route = next(one for one in told if one["stage"] == "Route")
+    assert route["length_m"] == pytest.approx(answer["report"]["length_m"])
+    assert {"mission.json", "plan.rrd", "plan.svg", "plan.pdf", "drawing.json"} <= {*os.listdir(tmp_path)}
+
+
+def test_variants_and_stops_by_hand_are_revisions_of_one_mission(room: PlanningRoom, place: Path) -> None:
+    first = waited(room, room.plan(VariantRequest(floor="house.dxf")))
+    assert first["state"] == "done", first
+    saved = room.save(first["number"], "house")
+    mission = read(place / saved)
+    assert (saved, mission.revision) == ("plans/house/mission.json", 1)
+    stop, *others = mission.stops
+    moved = waited(room, room.plan(VariantRequest(
+        floor="house.dxf", required=((stop.x, round(stop.y + 0.3, 3)), *((one.x, one.y) for one in others)),
+        forbidden=((stop.x, stop.y, 0.1),), replaces=saved,
+    )))  # fmt: skip
+    assert moved["state"] == "done", moved
+    room.save(moved["number"], "house")
+    again = read(place / saved)
+    assert (again.id, again.revision) == (mission.id, 2)
+    assert (stop.x, stop.y) not in {(one.x, one.y) for one in again.stops}
+    with pytest.raises(NegativeResult, match="another revision"):
+        room.save(first["number"], "house")
+
+
+def test_bad_options_and_a_killed_process_are_one_line(room: PlanningRoom, place: Path) -> None:
+    wrong = waited(room, room.plan(VariantRequest(floor="house.dxf", options={"coverage": "much"})))
+    assert (wrong["state"], wrong["error"]) == ("failed", "--coverage much: must be a number")
+    (place / "broken.dxf").write_bytes(b"0\nSECTION\n")
+    assert "broken.dxf" in waited(room, room.plan(VariantRequest(floor="broken.dxf")))["error"]
+    with pytest.raises(InputError, match="no such file"):
+        room.plan(VariantRequest(floor="../house.dxf".removeprefix("../") + "x"))
+    os.kill(room._plans._process.pid, signal.SIGKILL)
+    assert waited(room, room.plan(VariantRequest(floor="house.dxf")))["state"] in ("failed", "done")
+    assert waited(room, room.plan(VariantRequest(floor="house.dxf")))["state"] == "done"
+
+
+def test_a_variant_is_cancelled(room: PlanningRoom) -> None:
+    number = room.plan(VariantRequest(floor="house.dxf"))
+    room.cancel(number)
+    assert waited(room, number)["state"] == "cancelled"
+    with pytest.raises(InputError, match="no plan"):
+        room.save(number, "cancelled")
+
+
+def test_the_twelve_options_are_options_of_plan() -> None:
+    listed = options_json()
+    assert len(listed) == 12
+    given = {
+        "min_views": "2",
+        "register": "yes",
+        "start": "1,2,90",
+        "targets": "walls",
+        "robot_radius": "0.3",
+    }
+    settings = settings_of(given)
+    assert (settings.views, settings.start) == (2, (1.0, 2.0, 90.0))
+    assert given.keys() <= {str(one["key"]) for one in listed}
+
+
+def test_saved_plans_are_listed_and_downloaded(room: PlanningRoom, place: Path, tmp_path: Path) -> None:
+    back = RunRoom(SiteFiles.at(place), tmp_path, room.files)
+    (mission,) = [one for one in back.listed()["missions"] if one["file"]]
+    assert mission["runs"] == []
+    assert b"<svg" in back.report(mission["key"])
+    for form, begin in {"pdf": b"%PDF", "svg": b"<?xml", "dxf": b"  0", "csv": b"", "json": b"{"}.items():
+        assert back.download(mission["file"], form).body.startswith(begin), form
+    with pytest.raises(InputError, match="no such form"):
+        back.download(mission["file"], "exe")
+    secret = back.open_recording(mission["key"])
+    assert back.recording_of_secret(secret).startswith(b"RRF2")
+    with pytest.raises(InputError, match="too old"):
+        back.recording_of_secret("guessed")

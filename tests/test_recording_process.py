@@ -1,0 +1,152 @@
+"""A plan's recording is the same whether a process of its own draws it, or ends before it has."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import MappingProxyType
+
+import pytest
+
+import stopgo.recording_process
+from stopgo.mission.document.schedule import schedule
+from stopgo.mission.errors import InputError
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages.sight import sight_of
+from stopgo.planner import plan
+from stopgo.planner.floors import read_floor
+from stopgo.recording_process import RecordingProcess, recording_process
+from stopgo.recordings.rrd.read import check
+from tests.disk import small_disk
+
+SAMPLE = Path(__file__).parents[1] / "recordings" / "samples" / "office.dxf"
+
+
+@pytest.fixture(scope="module")
+def results() -> tuple[object, ...]:
+    """Stage results of the sample office."""
+    part = plan(read_floor(SAMPLE), Settings()).parts[0]
+    sight = sight_of(part.route, part.mission, part.figures)
+    return (*part.stage_results(), part.mission, schedule(part.mission), sight)
+
+
+@pytest.fixture
+def process(monkeypatch: pytest.MonkeyPatch) -> Iterator[RecordingProcess]:
+    """A process that was started, as if this one had not loaded Rerun."""
+    with recording_process() as made:
+        with monkeypatch.context() as patch:
+            patch.delitem(sys.modules, "rerun", raising=False)
+            made.start()
+        assert made.is_running
+        yield made
+
+
+def test_the_process_writes_what_would_be_written_here(
+    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path
+) -> None:
+    here, there = tmp_path / "here.rrd", tmp_path / "there.rrd"
+    RecordingProcess().draw("same", results).write(here)
+    process.draw("same", results).write(there)
+    assert process.is_running, "the process has drawn it"
+    assert check(there) == check(here)
+    process.draw("next", results).write(there)
+    assert process.is_running
+    assert check(there).recording_id == "next"
+
+
+@pytest.mark.parametrize("when", ["before", "during", "after"])
+def test_a_process_that_is_killed_costs_no_recording(
+    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path, when: str
+) -> None:
+    child = process._process
+    assert child is not None
+    if when == "before":
+        child.kill()
+        child.wait()
+    drawing = process.draw("killed", results)
+    if when == "during":
+        child.kill()
+    elif when == "after":
+        drawing.write(tmp_path / "first.rrd")
+        child.kill()
+        drawing = process.draw("killed", results)
+    drawing.write(tmp_path / "plan.rrd")
+    assert not process.is_running
+    assert check(tmp_path / "plan.rrd").recording_id == "killed"
+
+
+def test_results_that_cannot_be_sent_are_drawn_here(
+    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path
+) -> None:
+    process.draw("own", (*results, lambda: None)).write(tmp_path / "plan.rrd")
+    assert not process.is_running
+    assert check(tmp_path / "plan.rrd").recording_id == "own"
+
+
+def test_a_full_disk_is_reported_as_here(
+    monkeypatch: pytest.MonkeyPatch, results: tuple[object, ...], tmp_path: Path
+) -> None:
+    with small_disk(10_000), recording_process() as process:
+        with monkeypatch.context() as patch:
+            patch.delitem(sys.modules, "rerun", raising=False)
+            process.start()
+        drawing = process.draw("full", results)
+        with pytest.raises(OSError, match="File too large"):
+            drawing.write(tmp_path / "plan.rrd")
+
+
+def test_a_file_that_does_not_hold_the_recording_is_an_error(
+    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path
+) -> None:
+    drawing = process.draw("lost", results)
+    with pytest.raises((OSError, InputError)):
+        drawing.write(tmp_path / "no folder" / "plan.rrd")
+    assert process.is_running
+
+
+def test_derived_values_stay_here_and_read_only_ones_stay_read_only(results: tuple[object, ...]) -> None:
+    floor = results[0]
+    vars(floor)["_cached_by_a_test"] = lambda: None
+    sent = pickle.loads(stopgo.recording_process._pickled(floor))
+    del vars(floor)["_cached_by_a_test"]
+    assert "_cached_by_a_test" not in vars(sent)
+    assert isinstance(sent.status, MappingProxyType)
+    assert b"stopgo.planner" not in stopgo.recording_process._pickled(results)
+
+
+OWNER = """
+import sys
+from stopgo.recording_process import RecordingProcess
+process = RecordingProcess()
+process.start()
+print(process._process.pid, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_the_process_ends_when_its_owner_is_killed() -> None:
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert owner.stdout is not None and owner.stdin is not None
+    child = int(owner.stdout.readline())
+    owner.send_signal(signal.SIGKILL)
+    owner.communicate()
+    deadline = time.monotonic() + 60
+    while _runs(child) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not _runs(child)
+
+
+def _runs(number: int) -> bool:
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
