@@ -27,6 +27,7 @@ BY_COMMAND = {
     "recordings": ("stopgo.commands.plan_command", "stopgo.recordings.runs.field"),
     "bridge": ("stopgo.bridge.commands.spawn", "stopgo.bridge.robot", "stopgo.bridge.station"),
     "mavlink": ("stopgo.bridge.mavlink",),
+    "site": ("stopgo.site.web_server",),
 }
 """Modules that a benchmark starts in processes of their own, so that no import shows them."""
 MODULE_OF = {"ways": "tours", "all-places": "all_places", "least-time": "least_time"}

@@ -31,6 +31,7 @@ MEANINGS = {
     "--parameters": "plan.toml",
     "--robot": "name of the robot",
     "--seed": "seed of the random numbers",
+    "--set-origin": "give a vehicle without an origin the mission's",
     "--since": "only what was finished after a day",
     "--speed-up": "factor by which simulated time runs faster",
     "--start": "start pose of the robot",

@@ -345,6 +345,22 @@ AutopilotId = Annotated[
 ArmInRun = Annotated[
     bool, typer.Option("--arm", rich_help_panel=VEHICLE, help="mavlink: arm it when a run needs that.")
 ]
+SetOriginOfAutopilot = Annotated[
+    bool,
+    typer.Option(
+        "--set-origin",
+        rich_help_panel=VEHICLE,
+        help="mavlink: give it the mission's origin whenever it has none.",
+    ),
+]
+SetTimeout = Annotated[
+    bool,
+    typer.Option(
+        "--set-timeout",
+        rich_help_panel=VEHICLE,
+        help="mavlink: set the time that it drives on without this computer to 0.5 s.",
+    ),
+]
 ScannerTrigger = Annotated[
     str,
     typer.Option(

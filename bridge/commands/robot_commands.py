@@ -25,6 +25,8 @@ from stopgo.bridge.commands.bridge_options import (
     OwnName,
     RouterEndpoint,
     ScannerTrigger,
+    SetOriginOfAutopilot,
+    SetTimeout,
     SigningKey,
     SimulatedPose,
     SiteName,
@@ -49,7 +51,7 @@ MAVLINK = "mavlink:"
 """Before the URL of an autopilot that is the controller."""
 LONGEST_BATTERY_LIFE_S = 1e6
 ONLY_SIMULATED = ("--at", "--map", "--fault", "--speed-up", "--battery-life")
-ONLY_DRIVEN = ("--arm", "--trigger", "--vehicle", "--signing-key")
+ONLY_DRIVEN = ("--arm", "--set-origin", "--set-timeout", "--trigger", "--vehicle", "--signing-key")
 """Options of `--controller sim`, and of `--controller mavlink:URL`; with the other one they are refused."""
 
 
@@ -73,6 +75,8 @@ def robot(
     battery_life: BatteryLife = "6h",
     vehicle: AutopilotId = None,
     arm: ArmInRun = False,
+    set_origin: SetOriginOfAutopilot = False,
+    set_timeout: SetTimeout = False,
     trigger: ScannerTrigger = "camera",
     signing_key: SigningKey = None,
 ) -> None:
@@ -84,15 +88,13 @@ def robot(
     """
     from stopgo.bridge.robot.program import RobotOptions
 
-    given = given_options(context)
     simulated = SimulatedOptions(at, read_map(map_), read_battery_life(battery_life), read_faults(fault))
-    driven = AutopilotOptions(arm, trigger, signing_key, vehicle, insecure)
-    body = body_of(controller, state, given, simulated, driven)
+    driven = AutopilotOptions(arm, set_origin, set_timeout, trigger, signing_key, vehicle, insecure)
+    body = body_of(controller, state, given_options(context), simulated, driven)
     run(RobotOptions(
         name, listen, state, body, connect=connect, site=site, speed_up=speed_up, to_map=simulated.to_map,
         insecure=insecure, keys=keys, revisions=read_revisions(revision), faults=simulated.faults, say=say,
-        record_bytes=round(record * 1e6),
-    ), given)  # fmt: skip
+        record_bytes=round(record * 1e6)), given_options(context))  # fmt: skip
 
 
 def run(options: RobotOptions, given: GivenOptions) -> None:
@@ -121,6 +123,8 @@ class AutopilotOptions:
     """Options of an autopilot as the controller."""
 
     arm: bool
+    set_origin: bool
+    set_timeout: bool
     trigger: str
     signing_key: Path | None
     vehicle: int | None
@@ -143,7 +147,8 @@ def body_of(
         refuse_options(given, "an autopilot", *ONLY_SIMULATED)
         return AutopilotBody(
             controller.removeprefix(MAVLINK), driven.arm, read_trigger(driven.trigger), driven.signing_key,
-            driven.vehicle, driven.insecure, guards=True,
+            driven.vehicle, driven.insecure, set_origin=driven.set_origin, set_timeout=driven.set_timeout,
+            guards=True,
         )  # fmt: skip
     from stopgo.bridge.robot.plugin_body import plugin_body
 

@@ -275,7 +275,7 @@ def member_line(member: FleetMember, before: LastSeen | None) -> str:
 
 def status_json(report: StateReport) -> dict[str, Any]:
     """Return a state for JSON."""
-    return {key: getattr(report, key) for key in STATUS_KEYS}
+    return {key: getattr(report, key) for key in STATUS_KEYS} | {"battery": report.charge}
 
 
 def report_answer(answer: Answer, robot: str, json_: bool) -> None:

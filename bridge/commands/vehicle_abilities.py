@@ -9,7 +9,7 @@ from stopgo.bridge.commands.checks import Check
 from stopgo.bridge.mavlink.vehicle_link.messages import every_component, request
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.wire import sender
-from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.autopilots.kind import ALONE_S, Autopilot
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.following.vehicle_health import HealthReports
 from stopgo.mission.mavlink.items import Command, ItemList
@@ -30,6 +30,7 @@ def abilities(peer: Peer, parameters: Mapping[str, float]) -> Iterator[Check]:
     yield _camera(peer)
     yield script_check(peer.autopilot, parameters)
     yield Check("can", True, alone_text(peer.autopilot, parameters))
+    yield Check("can", True, hands_text(peer))
     yield Check("can", True, health_reports_text(peer))
 
 
@@ -93,8 +94,16 @@ def alone_text(kind: Autopilot, parameters: Mapping[str, float]) -> str:
         return f"gateway: not with autopilots of kind {kind.name}"
     name = kind.driving.gives_up_parameter
     if name in parameters:
-        return f"gateway: without its computer it drives on for {parameters[name]:g} s ({name})"
+        remedy = f"; stopgo robot --set-timeout sets {ALONE_S:g} s" if parameters[name] > ALONE_S else ""
+        return f"gateway: without its computer it drives on for {parameters[name]:g} s ({name}){remedy}"
     return f"gateway: without its computer it drives on for {kind.driving.gives_up_s:g} s, which is fixed"
+
+
+def hands_text(peer: Peer) -> str:
+    """Return how far a change by somebody else can be traced to the one who made it."""
+    reports = peer.ask(MessageId.RC_CHANNELS) is not None
+    remote = "a remote control by the channel that moved" if reports else "no remote control (no RC_CHANNELS)"
+    return f"whose hand: {remote}; another station if this line carries its commands or the answers to them"
 
 
 def health_reports_text(peer: Peer) -> str:

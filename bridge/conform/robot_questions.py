@@ -31,7 +31,7 @@ from stopgo.bridge.link.protocol import (
     encode,
 )
 from stopgo.mission.document import Mission
-from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
+from stopgo.mission.run.events import STOPS_LISTED, UNKNOWN_CHARGE, Pose, StateReport
 from stopgo.mission.run.run_commands import RunCommand
 
 STATE_BYTES = 16 * 1024
@@ -89,7 +89,7 @@ def states_are_bounded(bench: RobotBench) -> None:
     must(listed <= STOPS_LISTED, f"a state lists {listed} stops; at most {STOPS_LISTED} are")
     must(state.done_count >= len(state.done), "done_count is less than what `done` lists")
     charge = state.battery
-    must(charge is None or 0 <= charge <= 1, f"battery is {charge}; 0 to 1, or null, is meant")
+    must(charge == UNKNOWN_CHARGE or 0 <= charge <= 1, f"battery is {charge}; 0 to 1, or -1, is meant")
 
 
 def log_has_no_gaps(bench: RobotBench) -> None:

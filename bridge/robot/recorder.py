@@ -21,7 +21,7 @@ from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.run_record import RunRecord
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.file_name import file_name
-from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport
+from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport, reported_charge
 
 ENTRY_S = 0.5
 """Interval of entries. A killed robot loses at most this, and the time of one write."""
@@ -128,7 +128,7 @@ class RunRecorder:
             if self._run is None:
                 return None
             health = Health(
-                robot_ns=robot_ns, run_id=self._run.run_id, battery=battery,
+                robot_ns=robot_ns, run_id=self._run.run_id, battery=reported_charge(battery),
                 localisation=base.localisation, emergency_stop=base.emergency_stop,
                 safety_field=base.safety_field,
             )  # fmt: skip

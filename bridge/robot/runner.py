@@ -8,7 +8,7 @@ from typing import Protocol
 
 from stopgo.bridge.robot.base import BaseHealth
 from stopgo.mission.document import Mission
-from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
+from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport, reported_charge
 from stopgo.mission.run.run_commands import Answer, RunCommand
 from stopgo.mission.run.states import Run, stop_of
 
@@ -71,6 +71,6 @@ def state_report(runner: Runner, *, robot: str, seq: int, ns: int, newest: int) 
         stop_state=run.stop_state if stop else None, done=run.done[-STOPS_LISTED:],
         skipped=run.skipped[-STOPS_LISTED:], done_count=len(run.done), skipped_count=len(run.skipped),
         outside=run.outside[-STOPS_LISTED:], outside_count=len(run.outside),
-        battery=runner.battery(), last_event=newest, next_revision=run.next_revision,
+        battery=reported_charge(runner.battery()), last_event=newest, next_revision=run.next_revision,
         battery_ok=health.battery_ok, position_ok=health.position_ok, fence_ok=health.fence_ok,
     )  # fmt: skip

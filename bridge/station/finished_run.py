@@ -10,7 +10,16 @@ from stopgo.bridge.station.logged_run import LoggedReport, read_index, read_run
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import NegativeResult
-from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Scanned, Skipped, StateReport, Unconfirmed
+from stopgo.mission.run.events import (
+    UNKNOWN_CHARGE,
+    Aborted,
+    AnyEvent,
+    Finished,
+    Scanned,
+    Skipped,
+    StateReport,
+    Unconfirmed,
+)
 from stopgo.mission.run.tolerance import stops_outside
 
 
@@ -37,7 +46,7 @@ def past_reports(
     end = events[-1]
     if not isinstance(end, Finished | Aborted):
         raise NegativeResult(f"run {run_id} of {robot}: not finished; follow it without --run")
-    pending, battery = list(events), None
+    pending, battery = list(events), UNKNOWN_CHARGE
     entries = read_run(station.link, station.keys, run_id, patience_s=station.patience_s) if recorded else ()
     for item in entries:
         if isinstance(item, LoggedReport):
@@ -57,7 +66,7 @@ def _runs(station: Station) -> str:
 
 
 def _final_state(
-    events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float | None, outside: tuple[str, ...]
+    events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float, outside: tuple[str, ...]
 ) -> StateReport:
     done = tuple(event.stop for event in events if isinstance(event, Scanned | Unconfirmed))
     skipped = tuple(event.stop for event in events if isinstance(event, Skipped))

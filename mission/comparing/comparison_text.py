@@ -56,7 +56,7 @@ def _jumped_lines(comparison: Comparison) -> list[str]:
     if not jumped:
         return []
     return [
-        f"not scanned, {JUMPED_OVER}: {', '.join(jumped)}; for a follow-up mission: {FOLLOW_UP};"
+        f"not scanned, {JUMPED_OVER} somebody: {', '.join(jumped)}; for a follow-up mission: {FOLLOW_UP};"
         " to drive the whole mission again: stopgo start --again"
     ]
 

@@ -17,7 +17,9 @@ class Command:
     """MAV_CMD numbers that are used here."""
 
     NAV_WAYPOINT = 16
+    NAV_LOITER_UNLIM = 17
     NAV_LOITER_TIME = 19
+    NAV_RETURN_TO_LAUNCH = 20
     NAV_DELAY = 93
     DO_SET_MODE = 176
     DO_CHANGE_SPEED = 178

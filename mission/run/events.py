@@ -90,7 +90,7 @@ class Skipped(Event, frozen=True, kw_only=True):
     reason: str
 
 
-JUMPED_OVER = "jumped over by somebody"
+JUMPED_OVER = "jumped over by"
 """First words of the reason of a stop that was skipped by no command from here."""
 
 
@@ -214,6 +214,20 @@ STOPS_LISTED = 50
 """In a state; the journal has them all."""
 
 
+UNKNOWN_CHARGE = -1.0
+"""Charge of a battery that nobody reports; a number, because stations of 0.1 read nothing else."""
+
+
+def reported_charge(charge: float | None) -> float:
+    """Return a charge as reports hold it."""
+    return UNKNOWN_CHARGE if charge is None else charge
+
+
+def known_charge(reported: float) -> float | None:
+    """Return the charge in a report, 0 to 1; `None` if it is not known."""
+    return None if reported < 0 else reported
+
+
 class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     """A full snapshot, sent on every change and at least every second."""
 
@@ -231,8 +245,8 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     done: tuple[str, ...]
     """The newest of them, at most STOPS_LISTED, so that a state is small whatever the mission."""
     skipped: tuple[str, ...]
-    battery: float | None
-    """0 to 1; `None` if it is not known."""
+    battery: float
+    """0 to 1, or UNKNOWN_CHARGE; see `charge`."""
     last_event: int
     """Number of the newest event in the journal, 0 if none."""
     next_revision: int | None = None
@@ -248,6 +262,11 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     """False while the autopilot's estimator has no position."""
     fence_ok: bool | None = None
     """False while the geofence is breached."""
+
+    @property
+    def charge(self) -> float | None:
+        """Charge of the battery, 0 to 1; `None` if it is not known."""
+        return known_charge(self.battery)
 
 
 class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -268,14 +287,19 @@ class Health(msgspec.Struct, frozen=True, kw_only=True):
 
     robot_ns: Nanoseconds
     run_id: str | None
-    battery: float | None
-    """0 to 1."""
+    battery: float
+    """0 to 1, or UNKNOWN_CHARGE; see `charge`."""
     localisation: float | None = None
     """Quality of the localisation, 0 to 1."""
     emergency_stop: bool | None = None
     """True if an emergency stop is pressed."""
     safety_field: bool | None = None
     """True if something is in the field that the safety scanners watch."""
+
+    @property
+    def charge(self) -> float | None:
+        """Charge of the battery, 0 to 1; `None` if it is not known."""
+        return known_charge(self.battery)
 
 
 class PosesMissing(msgspec.Struct, frozen=True, kw_only=True):

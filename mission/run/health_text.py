@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from stopgo.mission.run.events import StateReport
 
 
@@ -10,14 +12,32 @@ def charge_text(charge: float | None) -> str:
     return "unknown" if charge is None else f"{charge:.0%}"
 
 
+@dataclass(frozen=True)
+class HealthWords:
+    """Health of a robot at one time, in words."""
+
+    robot_ns: int
+    battery: str
+    position: str
+    fence: str
+
+
+def health_words(report: StateReport) -> HealthWords:
+    """Return the health that a state reports; what it does not report is unknown."""
+    lasts = ", its failsafe lasts" if report.battery_ok is False else ""
+    return HealthWords(
+        report.robot_ns, charge_text(report.charge) + lasts,
+        _word(report.position_ok, "lost"), _word(report.fence_ok, "breached"),
+    )  # fmt: skip
+
+
 def health_text(report: StateReport) -> str:
     """Return battery, position estimate and geofence; the latter two only of a robot that reports either."""
-    failed = ", its failsafe lasts" if report.battery_ok is False else ""
-    words = [f"battery {charge_text(report.battery)}{failed}"]
+    words = health_words(report)
+    text = f"battery {words.battery}"
     if (report.battery_ok, report.position_ok, report.fence_ok) != (None, None, None):
-        words.append(f"position estimate {_word(report.position_ok, 'lost')}")
-        words.append(f"geofence {_word(report.fence_ok, 'breached')}")
-    return ", ".join(words)
+        text += f", position estimate {words.position}, geofence {words.fence}"
+    return text
 
 
 def _word(ok: bool | None, bad: str) -> str:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Started
+from stopgo.mission.run.health_text import HealthWords
 from stopgo.mission.run.pose_gaps import gap_limit_ns, gaps_after
 
 
@@ -171,6 +172,8 @@ class RunLog:
     """In the order of their numbers."""
     alignment: Alignment | None = None
     """None where the log is in the mission's frame already."""
+    health: tuple[HealthWords, ...] = ()
+    """Health of the robot at the run's begin, at each change and at the end; empty if it was not recorded."""
 
     @property
     def began_ns(self) -> int | None:

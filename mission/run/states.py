@@ -62,6 +62,12 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     """The scan that waits to be verified."""
     done: tuple[str, ...] = ()
     skipped: tuple[str, ...] = ()
+    jumped: tuple[str, ...] = ()
+    """Those of `skipped` that somebody jumped over: they are offered again at the end of the route."""
+    offered: bool = False
+    """True while they are offered, and the robot is still at the end of the route."""
+    revisits: bool = False
+    """True once they were offered: the route is driven again, past the stops that are done."""
     outside: tuple[str, ...] = ()
     """Those of `done` that were scanned outside the stop's tolerance."""
     reason: str = ""
@@ -160,6 +166,7 @@ def resumed(run: Run, by: str) -> Change:
     going = changed(
         run, state="HOMING" if run.homing else "RUNNING", reason=run.homing_reason,
         stop_state=run.stop_state if run.stop_state in ("SCANNING", "VERIFYING") else "WAITING",
+        offered=False,
     )  # fmt: skip
     if run.state == "HELD":
         going = changed(going, attempt=0, approaches=0)
@@ -237,7 +244,10 @@ def with_done(run: Run, stop: Stop, pose: Pose | None) -> Run:
 
 def next_stop(run: Run, mission: Mission) -> Change:
     """Go on to the next stop; a new revision that waits determines itself what is next."""
-    between = changed(run, at=run.at + 1, stop_state="WAITING", attempt=0, approaches=0, scan=None)
+    at, finished = run.at + 1, {*run.done, *run.skipped}
+    while at < len(mission.stops) and mission.stops[at].id in finished:
+        at += 1
+    between = changed(run, at=at, stop_state="WAITING", attempt=0, approaches=0, scan=None)
     return Change(between) if between.next_revision is not None else next_leg(between, mission)
 
 
@@ -245,7 +255,7 @@ def next_leg(run: Run, mission: Mission) -> Change:
     """Go on to the next stop, the return leg, or the end of the run."""
     if run.at < len(mission.stops):
         return Change(run)
-    if mission.return_ is None:
+    if mission.return_ is None or run.offered:
         return ended(run, "FINISHED")
     return sent_home(run, mission, then="FINISHED", reason="all stops are behind")
 
@@ -336,6 +346,33 @@ ON_FAILURE: dict[str, Callable[[Run, Mission, str], Change]] = {
     "home": _home,
 }
 """Reaction when a stop's tries are used up; `retry` can then only ask."""
+
+
+def jumped_over(run: Run, mission: Mission, reason: str) -> Change:
+    """Leave the stop out for now, because somebody has sent the robot past it."""
+    beyond = changed(run, leg=run.at + 1, jumped=(*run.jumped, mission.stops[run.at].id))
+    return skipped(beyond, mission, reason)
+
+
+def offered(run: Run, mission: Mission, command: str) -> Change:
+    """Offer the stops that were jumped over, at the end of the route: `command` drives to the first of them.
+
+    A robot that has returned drives the route again from its start. Another one is driven there by hand.
+    """
+    at = next(index for index, stop in enumerate(mission.stops) if stop.id in run.jumped)
+    stop, returns = mission.stops[at], mission.return_ is not None
+    again = changed(
+        run, at=at, leg=0 if returns else at, attempt=0, approaches=0, offered=True, revisits=True, jumped=(),
+        skipped=tuple(name for name in run.skipped if name not in run.jumped),
+    )  # fmt: skip
+    x, y = stop.approach[0]
+    way = "" if returns else f"drive it by hand to ({x:.2f}, {y:.2f}), where the leg to {stop.id} begins; "
+    others = f" (then {', '.join(run.jumped[1:])})" if len(run.jumped) > 1 else ""
+    return held(
+        again,
+        f"{stop.id} was jumped over, and is not scanned: {way}{command} drives to it on the route"
+        f"{others}; skip ends the run without it",
+    )
 
 
 def stop_of(run: Run, mission: Mission | None) -> Stop | None:

@@ -180,6 +180,11 @@ class RunEntities:
         """Health reports of the base as values."""
         return self.flat(HEALTH)
 
+    @property
+    def vehicle_health(self) -> str:
+        """Battery, position estimate and geofence in words."""
+        return self.flat(VEHICLE_HEALTH)
+
 
 @dataclass(frozen=True)
 class Revision:
@@ -199,6 +204,7 @@ class Revision:
 
 EVENTS = "events"
 HEALTH = "health"
+VEHICLE_HEALTH = "vehicle_health"
 ROBOT = "robot"
 DRIVEN = "driven"
 UNSEEN = "unseen"
@@ -237,7 +243,7 @@ def is_embedded(entity: str) -> bool:
     parts = entity.split("/")
     if entity in (FINDINGS, REASONS) or entity.startswith((f"{MISSION}/", f"{SIGHT}/", f"{FLOOR}/")):
         return True
-    return len(parts) == 4 and f"/{parts[1]}" == FIELD and parts[3] in (EVENTS, ROBOT)
+    return len(parts) == 4 and f"/{parts[1]}" == FIELD and parts[3] in (EVENTS, ROBOT, VEHICLE_HEALTH)
 
 
 def run_of_events(entity: str) -> str | None:

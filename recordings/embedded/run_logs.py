@@ -12,6 +12,7 @@ import numpy as np
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.boots import joined_boots
 from stopgo.mission.run.events import AnyEvent, event_of
+from stopgo.mission.run.health_text import HealthWords
 from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.recordings.drawing import entities
 from stopgo.recordings.embedded.values import Values
@@ -54,7 +55,17 @@ def _log(run_id: str, values: Values, source: LogSource) -> RunLog:
         source=replace(source, notes=(*source.notes, *joined.notes)),
         poses=joined.poses,
         events=ordered,
+        health=_health(values, names),
     )
+
+
+def _health(values: Values, names: entities.RunEntities) -> tuple[HealthWords, ...]:
+    """Return the vehicle's health in words; older recordings hold none."""
+    entity = names.vehicle_health
+    ns, _ = values.columns(entity, "charge")
+    words = (values.texts(entity, name, "charge") for name in ("battery", "position_estimate", "geofence"))
+    rows = zip(ns.tolist(), *words, strict=True)
+    return tuple(HealthWords(*row) for row in sorted(rows, key=lambda row: row[0]))
 
 
 def _poses(values: Values, names: entities.RunEntities) -> dict[str, Track]:

@@ -127,6 +127,7 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
     yield section("Stops", tag("div", _stop_grid(comparison), class_="scroll"))
     if comparison.acquired is not None:
         yield tag("div", *_coverage_tables(comparison.acquired), class_="columns")
+    yield section("Health of the vehicle", _health(comparison))
     gaps = [tag("li", shown(line)) for line in comparison.sighted.lines]
     yield section("Gaps in the poses", tag("ul", *gaps) if gaps else "")
     for title, lines in subject.more.get(comparison.run_id, ()):
@@ -228,6 +229,22 @@ def _stop_cells(item: StopComparison) -> list[str]:
 
 def _clock(seconds: float | None) -> str:
     return "" if seconds is None else duration(seconds)
+
+
+UNRECORDED = "battery, position estimate and geofence: unknown; this log holds none of them"
+
+
+def _health(comparison: Comparison) -> str:
+    """Return the health at the run's begin, at each change and at its end; what is not known is unknown."""
+    log = comparison.log
+    if not log.health:
+        return tag("p", UNRECORDED)
+    seconds = log.seconds([words.robot_ns for words in log.health]).tolist()
+    rows = [
+        row([_clock(at), shown(words.battery), shown(words.position), shown(words.fence)])
+        for at, words in zip(seconds, log.health, strict=True)
+    ]
+    return grid(("run time", "battery", "position estimate", "geofence"), rows)
 
 
 def _coverage_tables(acquired: Acquired) -> Iterator[str]:

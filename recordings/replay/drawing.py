@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, StateReport
+from stopgo.mission.run.events import UNKNOWN_CHARGE, AnyEvent, Pose, PoseReport, StateReport
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.runs.field import FieldRecording
@@ -49,7 +49,7 @@ def _event_and_state(replay: Replay, event: AnyEvent) -> Iterator[StateReport | 
         state="FINISHED" if kind == "Finished" else "ABORTED" if kind == "Aborted" else "RUNNING",
         run_id=event.run_id, mission_id=event.mission_id, revision=event.revision,
         stop=getattr(event, "stop", None), stop_state="SCANNING" if kind == "Arrived" else "NAVIGATING",
-        done=(), skipped=(), battery=battery[-1] if battery else None, last_event=event.number,
+        done=(), skipped=(), battery=battery[-1] if battery else UNKNOWN_CHARGE, last_event=event.number,
     )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ from stopgo.mission.run.events import (
     StateReport,
     Unconfirmed,
 )
-from stopgo.mission.run.health_text import health_text
+from stopgo.mission.run.health_text import health_text, health_words
 from stopgo.mission.run.run_log import Track
 from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
 from stopgo.mission.stages.sight import Sight
@@ -79,7 +79,7 @@ class RunDrawing:
         self._acquired = AcquiredDrawing(sights[-1]) if sights else None
         self._thinner, self._trail, self._cross_track = Thinner(), Trail(), DelayedDeviation(mission)
         self._stops: dict[str, bool | None] = {}
-        self._vehicle_health: tuple[bool | None, ...] = (None, None, None)
+        self._vehicle_health: tuple[bool | None, ...] | None = None
         self._style()
         self._describe()
 
@@ -125,17 +125,26 @@ class RunDrawing:
         stop_state = "" if report.stop_state is None else report.stop_state
         self._at(self.names.flat(entities.STOP_STATE), rr.StateChange(state=stop_state), report.robot_ns)
         self._at(self.names.flat(entities.STOP), rr.StateChange(state=report.stop or ""), report.robot_ns)
-        if report.battery is not None:
-            battery = rr.Scalars(report.battery * 100)
+        if report.charge is not None:
+            battery = rr.Scalars(report.charge * 100)
             self._at(self.names.metric(entities.METRIC_BATTERY), battery, report.robot_ns)
         self._note_vehicle_health(report)
 
     def _note_vehicle_health(self, report: StateReport) -> None:
-        """Log the health of an autopilot's vehicle whenever it changes."""
-        health = (report.battery_ok, report.position_ok, report.fence_ok)
-        if health == self._vehicle_health:
+        """Write the vehicle's health at the begin, whenever it changes and at the end; log the changes."""
+        before, health = self._vehicle_health, (report.battery_ok, report.position_ok, report.fence_ok)
+        if health == before and report.state not in ("FINISHED", "ABORTED"):
             return
         self._vehicle_health = health
+        words = health_words(report)
+        values = {
+            "charge": report.battery, "battery": words.battery,
+            "position_estimate": words.position, "geofence": words.fence,
+        }  # fmt: skip
+        archetype = rr.DynamicArchetype("VehicleHealth", components=values)
+        self._at(self.names.vehicle_health, archetype, report.robot_ns)
+        if health == (before or (None, None, None)):
+            return
         level = "WARN" if False in health else "INFO"
         self._at(self.names.log, rr.TextLog(health_text(report), level=level), report.robot_ns)
 
@@ -153,9 +162,10 @@ class RunDrawing:
 
     def health(self, report: Health) -> None:
         """Write the base's health, and log each change of a value that stops a robot."""
-        known = {name: value for name in HEALTH_FIELDS if (value := getattr(report, name)) is not None}
+        values = {"battery": report.charge} | {name: getattr(report, name) for name in HEALTH_FIELDS}
+        known = {name: value for name, value in values.items() if value is not None}
         self._at(self.names.health, rr.DynamicArchetype("Health", components=known), report.robot_ns)
-        stops = {name: getattr(report, name) for name in HEALTH_FIELDS[2:]}
+        stops = {name: getattr(report, name) for name in HEALTH_FIELDS[1:]}
         changed = {name for name, value in stops.items() if bool(value) != bool(self._stops.get(name))}
         self._stops = stops
         for name in sorted(changed):
@@ -336,7 +346,7 @@ class RunDrawing:
         self.canvas.columns(entity, indexes, *groups)
 
 
-HEALTH_FIELDS = ("battery", "localisation", "emergency_stop", "safety_field")
+HEALTH_FIELDS = ("localisation", "emergency_stop", "safety_field")
 EVENT_FIELDS = (
     *("event", "number", "revision", "stop", "reason", "deviation_m", "commander"),
     *("file", "size", "sha256", "points"),

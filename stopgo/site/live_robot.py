@@ -141,6 +141,17 @@ class LiveRobot:
         self._collector: RunCollector | None = None
         self._recorded: set[tuple[str | None, int | None]] = set()
 
+    def work(self, stopped: threading.Event) -> None:
+        """Follow the robot until `stopped`; a fault that ends this is shown, and STOP works all the same."""
+        try:
+            self.follow(stopped)
+        except Exception as error:  # noqa: BLE001  where the robot's thread ends
+            if not stopped.is_set():
+                name = type(error).__name__
+                self._set_trouble(
+                    (f"unexpected error ({name}: {error}); restart stopgo site, and report it",)
+                )
+
     def follow(self, stopped: threading.Event) -> None:
         """Follow the robot until `stopped`; the fault of one run does not end it."""
         link, keys = self.station.link, self.station.keys

@@ -57,7 +57,7 @@ class RunRoom:
     def listed(self) -> dict[str, Any]:
         """Return the missions with plans and runs, the newest run's first."""
         with self._one_at_a_time:
-            index = without_repeats(index_of(self._folder.root))
+            index = without_repeats(self._index())
         plans = {plan.mission_id: (name, plan) for name, plan in index.plans()}
         missions = []
         for mission_id in files_of(index):
@@ -191,12 +191,21 @@ class RunRoom:
                 return path
         return None
 
+    def _index(self) -> RunIndex:
+        index = index_of(self._folder.root)
+        return index_of(self._folder.root) if _has_gone(self._folder.root, index) else index
+
     def _files(self, key: str) -> list[str]:
-        found = files_of(without_repeats(index_of(self._folder.root)))
+        found = files_of(without_repeats(self._index()))
         files = next((files for mission, files in found.items() if name_of(mission) == key), None)
         if files is None:
             raise InputError("no such mission in the folder any more")
         return files
+
+
+def _has_gone(root: Path, index: RunIndex) -> bool:
+    """Return True if a file was renamed while the folder was read, as at the end of a run."""
+    return any(file.fault and not (root / name).exists() for name, file in index.files.items())
 
 
 def without_repeats(index: RunIndex) -> RunIndex:

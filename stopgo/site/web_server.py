@@ -43,8 +43,8 @@ from stopgo.site.web_app import SiteParts, web_app
 from stopgo.site.web_viewer import WebViewer
 
 HERE = "127.0.0.1"
-GATHER_S = 1.0
-"""Time for the first robots to be found; others are added when they show themselves."""
+END_S = 5.0
+"""Longest wait for a robot's thread when the site ends; the link is closed then."""
 CONNECTIONS = 128
 """Requests and streams at the same time."""
 
@@ -145,6 +145,7 @@ class SiteFleet:
         self.missions = KnownMissions(self.folder.root)
         self.robots: dict[str, LiveRobot] = {}
         self.orders = RobotOrders(self.robots, self.feed)
+        self.threads: list[threading.Thread] = []
         self._lock = threading.Lock()
 
     def add(self, name: str) -> None:
@@ -158,7 +159,9 @@ class SiteFleet:
             )
             robot = LiveRobot(station, self.feed, self.missions, self.recorder)
             self.robots[name] = robot
-        threading.Thread(target=robot.follow, args=(self.stopped,), daemon=True).start()
+        thread = threading.Thread(target=robot.work, args=(self.stopped,), daemon=True)
+        self.threads.append(thread)
+        thread.start()
 
     def recorder(
         self, robot: str, run_id: str, known: KnownMission | None
@@ -211,6 +214,8 @@ def _fleet(
         finally:
             stopped.set()
             fleet.orders.close()
+            for thread in fleet.threads:
+                thread.join(END_S)
 
 
 def _later(work: Callable[[str], None], name: str) -> None:

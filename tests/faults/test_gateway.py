@@ -152,7 +152,7 @@ def driven(site: Site, befalls: Befalls, chance: random.Random) -> list[Pose]:
                 mishap = befalls.pop(0)[1]
                 before = newest(site)
                 mishap(site, chance)
-                if mishap is taken_by_hand and not site.line.roughness.loss:
+                if mishap is taken_by_hand:  # also over a link that loses frames
                     site.wait(TOLD_S)
                     assert newest(site) > before, "untold"
                 break

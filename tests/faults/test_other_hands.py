@@ -21,6 +21,7 @@ from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
 from tests.faults.test_gateway import (
     ALL,
+    TOLD_S,
     WANDERS_M,
     Site,
     begun_again,
@@ -30,6 +31,7 @@ from tests.faults.test_gateway import (
     driven,
     held,
     moment,
+    newest,
     switched_off,
     taken_by_hand,
 )
@@ -41,10 +43,16 @@ SEEDS = range(size(short=3, full=100))
 def driven_on(site: Site, chance: random.Random) -> None:
     """By another station's set points, which ArduPilot takes in its guided mode from anybody."""
     peer, (north, east) = site.operator.peer, site.operator.place()
+    guided = site.operator.mode() == site.operator.autopilot.modes.name(site.operator.autopilot.modes.guided)
+    scans = guided and site.station.status().stop_state == "SCANNING"
+    before = newest(site)
     angle = chance.uniform(0.0, math.tau)
     point = (north + 0.2 * math.cos(angle), east + 0.2 * math.sin(angle))
     for _ in range(3):
         peer.send(position_setpoint(peer.who, point, down=0.0, now_ms=0))
+    if scans:  # the attempt has failed in time
+        site.wait(TOLD_S)
+        assert site.station.status().stop_state != "SCANNING" or newest(site) > before, "untold"
 
 
 SECOND = (driven_on, begun_again, cut, switched_off, held, taken_by_hand, disturbed)

@@ -80,7 +80,7 @@ class Tab:
                 value = self.run(script)
             except AssertionError:  # while the page is loaded
                 value = None
-            if value:
+            if value or value == {}:  # an element has no value of its own
                 return value
             time.sleep(0.03)
         text = self.run("document.body.innerText")

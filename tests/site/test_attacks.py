@@ -196,3 +196,13 @@ def test_an_unknown_robot_gets_no_order(parts: SiteParts) -> None:
     answer = Page(parts).post("/api/robots/r9/orders", {"id": "1", "verb": "start"})
     assert (answer.status_code, answer.json()["error"]) == (400, "robot 'r9': not on this site")
     assert isinstance(parts.orders, RobotOrders)
+
+
+def test_the_viewers_pages_read_recordings_alone(tmp_path: Path) -> None:
+    """Rerun's viewer has another port; it may read recordings whose secret names it was given."""
+    viewer = "http://127.0.0.1:9090"
+    page = Page(parts_of(tmp_path, viewer=lambda: viewer))
+    assert page.get("/recordings/guessed.rrd", Origin=viewer).status_code == 404
+    assert page.get("/recordings/guessed.rrd", Origin="http://127.0.0.1:9091").status_code == 403
+    assert page.get("/api/me", Origin=viewer).status_code == 403
+    assert page.post("/api/stop", STOP, Origin=viewer).status_code == 403

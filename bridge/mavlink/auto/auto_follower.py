@@ -88,7 +88,7 @@ class AutoFollower:
         self._observer = observer
         self._commands = commands
         self._guard = ListGuard(book, peer, observer)
-        self._others = ExternalChanges(book, observer, self._guard)
+        self._others = ExternalChanges(book, peer, observer, self._guard)
         self._pending = PendingCommands(book, peer, observer, commands, self._guard)
         self._looks_only = looks_only
         self._closing = threading.Event()
@@ -204,6 +204,8 @@ class AutoFollower:
         has_gone = has_left(run, listed, observed)
         ends = has_gone or run.stop_state == "VERIFYING"
         observed = replace(observed, is_ours=ends and self._is_ours(run, listed, now_ns))
+        if observed.is_jumped:
+            observed = replace(observed, jumped_by=self._others.jumped_by())
         if not has_gone:
             return observed
         stop = (run.run_id or "", run.at, run.attempt)

@@ -28,6 +28,7 @@ REPEATS = 5
 """Number of times that a message without answer is sent within `SHOWS_S`."""
 ASK_AGAIN_NS = 500_000_000
 REPEATED_HZ = {
+    MessageId.HEARTBEAT: 4.0,
     MessageId.MISSION_CURRENT: 5.0,
     MessageId.MISSION_ITEM_REACHED: 2.0,
     MessageId.LOCAL_POSITION_NED: 10.0,
@@ -39,6 +40,7 @@ REPEATED_HZ = {
     MessageId.ESTIMATOR_STATUS: 1.0,
     MessageId.FENCE_STATUS: 1.0,
     MessageId.GPS_GLOBAL_ORIGIN: 0.5,
+    MessageId.RC_CHANNELS: 4.0,
 }
 """Wanted rate of each message, in Hz; so a lost one is followed by another."""
 

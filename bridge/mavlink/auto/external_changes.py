@@ -6,6 +6,8 @@ import uuid
 
 from stopgo.bridge.mavlink.auto.list_guard import ListGuard
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer
+from stopgo.mission.mavlink.autopilots.kind import AUTO
 from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
@@ -23,8 +25,9 @@ REMEMBERED_NS = 60 * 10**9
 class ExternalChanges:
     """Finds the change to a run that somebody else has caused, with the name of who caused it if known."""
 
-    def __init__(self, book: Logbook, observer: Observer, guard: ListGuard) -> None:
+    def __init__(self, book: Logbook, peer: Peer, observer: Observer, guard: ListGuard) -> None:
         self._book = book
+        self._peer = peer
         self._observer = observer
         self._guard = guard
 
@@ -32,6 +35,8 @@ class ExternalChanges:
         """The change by somebody else, once the vehicle's mode has settled and is explained."""
         settled = self._observer.status.mode_ns >= self._book.changed_ns + SETTLED_NS
         if not (settled and self._observer.mode_explained(self._book.clock.now_ns())):
+            return None
+        if self._peer.foreign.awaits_channels(self._mode_age_s):
             return None
         if self._guard.difference(listed, run):  # then no mode of the vehicle lets the run go on
             return self.changed_list(run, listed)
@@ -44,20 +49,25 @@ class ExternalChanges:
 
     def _set_back(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
         """Hold the run of a vehicle whose item somebody has set back, to a leg that lies behind the run's."""
-        if run.state != "RUNNING" or not observed.drives or run.at >= len(listed.stops):
-            return None
         position = self._observer.position
-        if observed.place >= listed.stops[min(run.leg, run.at)].first or not position.went_back:
+        if not observed.drives or observed.place >= listed.end or not position.went_back:
+            return None
+        if run.state == "HOMING":  # whatever was set before the run went on is not meant
+            is_behind = observed.place < listed.stops[-1].after and position.since_ns > self._book.changed_ns
+        else:
+            is_behind = run.state == "RUNNING" and observed.place < _first_of(run, listed)
+        if not is_behind:
             return None
         if not self._guard.is_ours(listed, position.since_ns):
             self._guard.want()  # another list, perhaps: that is said first
             return None
         stop = listed.sent.placed[observed.place].stop
         to = f" (to {stop}, which is behind)" if stop else ""
+        on = listed.stops[run.at].stop if run.at < len(listed.stops) else "the end"
         return runs.held(
             run,
-            f"{self._by(observed)} has set the vehicle's current item back to"
-            f" {listed.sequence(observed.place)}{to}; retry drives on to {listed.stops[run.at].stop}",
+            f"{self._item_set_by(position.since_ns)} has set the vehicle's current item back to"
+            f" {listed.sequence(observed.place)}{to}; retry drives on to {on}",
         )
 
     def _stalled(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
@@ -90,11 +100,38 @@ class ExternalChanges:
         return runs.started(run, run_id=uuid.uuid4().hex[:12], now_ns=now_ns, by=by)
 
     def _by(self, observed: Observation) -> str:
-        """Who changed the mode: the author of a recent command for it whose outcome was unknown."""
-        ordered = self._book.ordered
-        if ordered is None or not self._recent(ordered) or ordered.mode != observed.mode:
-            return SOMEBODY
-        return ordered.by
+        """Who changed the mode, or disarmed the vehicle.
+
+        First the author of a recent command for it whose outcome was unknown, then a station whose command
+        was heard. A remote control counts only without a failsafe, which may move its channels itself.
+        """
+        ordered, foreign, age_s = self._book.ordered, self._peer.foreign, self._mode_age_s
+        if ordered is not None and self._recent(ordered) and ordered.mode == observed.mode:
+            return ordered.by
+        if observed.mode == AUTO and not observed.armed:
+            station = foreign.station("arming", age_s)
+        else:
+            station = foreign.station("mode", age_s, self._peer.autopilot.mode_of(self._peer.heartbeat))
+        return station or ("" if observed.failsafe else foreign.remote_control(age_s)) or SOMEBODY
+
+    @property
+    def _mode_age_s(self) -> float:
+        """Seconds since the vehicle was first seen in its present mode."""
+        return (self._book.clock.now_ns() - self._observer.status.mode_began_ns) / 1e9
+
+    def jumped_by(self) -> str:
+        """Who has made an item beyond the run's stop the current one."""
+        return self._item_set_by(self._observer.position.jumped_ns)
+
+    def _item_set_by(self, seen_ns: int) -> str:
+        """Who has set the current item, which was seen then."""
+        age_s = (self._book.clock.now_ns() - seen_ns) / 1e9
+        return self._peer.foreign.station("item", age_s) or SOMEBODY
 
     def _recent(self, ordered: Ordered) -> bool:
         return self._book.clock.now_ns() < ordered.until_ns + REMEMBERED_NS
+
+
+def _first_of(run: Run, listed: ListedMission) -> int:
+    """Return the first item of the run's leg; 0 once all stops are behind."""
+    return listed.stops[min(run.leg, run.at)].first if run.at < len(listed.stops) else 0

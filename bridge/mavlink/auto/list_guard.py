@@ -61,6 +61,8 @@ class ListGuard:
         self._failed_ns = 0
         self._wanted = False
         self._pause_ns = SOONEST_CHECK_NS
+        self._least_ns = CHECK_NS
+        """Shortest time that a comparison took: a longer one was held up by losses, not by a slow link."""
         self._uploader: tuple[Who, int] | None = None
         """Station whose upload was heard last, and when."""
 
@@ -96,8 +98,8 @@ class ListGuard:
             except (NegativeResult, RobotUnreachable):
                 self._wanted, self._failed_ns = True, began_ns
                 return
-            taken_ns = self._book.clock.now_ns() - began_ns
-            self._pause_ns = max(SOONEST_CHECK_NS, min(CHECK_NS, SHARE * taken_ns))
+            self._least_ns = min(self._least_ns, self._book.clock.now_ns() - began_ns)
+            self._pause_ns = max(SOONEST_CHECK_NS, min(CHECK_NS, SHARE * self._least_ns))
             number = number if number == self._observer.position.mission_id else 0
             self._last = ListComparison(listed, began_ns, found, number)
             if not found and self._uploader is not None and self._uploader[1] < began_ns:

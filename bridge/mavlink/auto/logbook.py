@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -83,11 +84,13 @@ class Moment(msgspec.Struct, frozen=True):
 class Logbook:
     """One vehicle's run in the station's journal."""
 
-    def __init__(self, journal: Journal, robot: str, clock: Clock) -> None:
+    def __init__(self, journal: Journal, robot: str, clock: Clock, address: str = "") -> None:
+        """`address`: options of a command to this vehicle, after a space."""
         self.journal = journal
         self.robot = robot
         self.clock = clock
         self.boots = VehicleBoots(journal)
+        self._address = address
         self.own_order: Ordered | None = None
         """The command that this process carries out; it counts before the journal has it."""
         self._listed: tuple[Sent, ListedMission] | None = None
@@ -114,7 +117,7 @@ class Logbook:
         items = self.journal.fact("items", PackedItems)
         assert stored is not None and items is not None
         mission = msgspec.json.decode(stored[1], type=Mission)
-        return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList))
+        return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList), self._address)
 
     def scanned_files(self, run: Run) -> frozenset[ScanFile]:
         """Name and sha256 of each scan that has counted in the run."""
@@ -236,7 +239,9 @@ def logbook(url: Url, vehicle: int, state: Path | None = None, *, make: bool = T
         raise InputError(f"--state {folder}: there is no such folder; name the folder of the push")
     with shared_journal(folder, robot) as journal:
         wall = WallClock()
-        yield Logbook(journal, robot, WallClock(origin_ns=max(wall.now_ns(), journal.newest_ns + 1)))
+        clock = WallClock(origin_ns=max(wall.now_ns(), journal.newest_ns + 1))
+        options = "" if state is None else f" --state {shlex.quote(str(state))}"
+        yield Logbook(journal, robot, clock, f" --mavlink {url}{options}")
 
 
 def name_of(vehicle: int) -> str:

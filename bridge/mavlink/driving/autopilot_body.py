@@ -29,14 +29,25 @@ class AutopilotBody:
     insecure: bool = False
     patience_s: float = 30.0
     """Longest wait for the vehicle, and for its position."""
+    set_origin: bool = False
+    """The mission's origin may be given to an autopilot that has none."""
+    set_timeout: bool = False
+    """The time that it drives on without us may be set."""
     guards: bool = False
     """A process of its own stops the vehicle if this program ends or hangs while it drives."""
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:
         url, key = read_link(self.url, self.signing_key, insecure=self.insecure, option="--controller")
-        with on_board(url, signing_key=key, vehicle=self.vehicle, timeout_s=self.patience_s) as autopilot:
+        with on_board(
+            url,
+            signing_key=key,
+            vehicle=self.vehicle,
+            timeout_s=self.patience_s,
+            sets_timeout=self.set_timeout,
+        ) as autopilot:
             check_trigger(autopilot, self.trigger)
+            autopilot.origin_keeper.consents = self.set_origin
             base = MavlinkBase(autopilot, clock=clock, arm=self.arm)
             scanner = MavlinkScanner(autopilot, clock=clock, trigger=self.trigger)
 

@@ -48,8 +48,11 @@ STREAMS = {
     "EKF_STATUS_REPORT": (MessageId.EKF_STATUS_REPORT, 1),
     "ESTIMATOR_STATUS": (MessageId.ESTIMATOR_STATUS, 1),
     "FENCE_STATUS": (MessageId.FENCE_STATUS, 1),
+    "RC_CHANNELS": (MessageId.RC_CHANNELS, 4),
 }
 """Wanted messages by name: number of the message, times a second."""
+UNANSWERED, SELDOM_S = 5, 30.0
+"""Requests for a message that never came, after which it is requested this seldom: some vehicles lack it."""
 
 
 class NewestMessages(MessageQueue):
@@ -121,6 +124,9 @@ class AutopilotTelemetry:
     def __init__(self, peer: Peer, newest: NewestMessages) -> None:
         self._peer = peer
         self._newest = newest
+        self._boots = peer.boots
+        self._unanswered: Counter[str] = Counter()
+        self._asked_s: dict[str, float] = {}
 
     @property
     def has_pose(self) -> bool:
@@ -187,12 +193,25 @@ class AutopilotTelemetry:
     def request_streams(self) -> None:
         """Request each message that comes too seldom: a restarted autopilot sends at its default rates."""
         came = self._newest.take_counts()
+        if self._peer.boots != self._boots:
+            self._boots = self._peer.boots
+            self._unanswered.clear()
         for name, (number, hertz) in STREAMS.items():
             missing = self._newest.newest(name, 3.0 / hertz + 1.0) is None
-            if missing or came[name] < RARE * hertz * ASK_S - 1:
+            if (missing or came[name] < RARE * hertz * ASK_S - 1) and self._may_ask(name, came[name]):
                 self._peer.send(interval(self._peer.who, number, hertz))
         if self._newest.newest("GPS_GLOBAL_ORIGIN", ASK_ORIGIN_S) is None:
             self._peer.request(MessageId.GPS_GLOBAL_ORIGIN)
+
+    def _may_ask(self, name: str, came: int) -> bool:
+        """True unless a message that never came was requested a while ago; poses are always requested."""
+        known = came > 0 or name in POSE or self._newest.newest(name) is not None
+        self._unanswered[name] = 0 if known else self._unanswered[name] + 1
+        now_s = time.monotonic()
+        if self._unanswered[name] > UNANSWERED and now_s < self._asked_s[name] + SELDOM_S:
+            return False
+        self._asked_s[name] = now_s
+        return True
 
     def _report(self, name: str) -> Message:
         report = self._newest.newest(name)

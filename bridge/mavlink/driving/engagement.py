@@ -101,13 +101,13 @@ class Engagement:
             self._control.known_mode = None
             self.begin(interrupt)
             return True
-        end_if(self._control.mode_change() or ("" if self._peer.armed else "the autopilot was disarmed"))
+        end_if(self._control.mode_change() or self._control.disarming() or self._control.other_hands())
         self._last_position = self._telemetry.position()
         return was_late
 
     def release(self) -> None:
         """Hold after a drive that ended early, unless somebody else has the vehicle; await standstill."""
-        if self._control.mode_change() and not self._telemetry.why_unknown():
+        if self._control.is_changed and not self._telemetry.why_unknown():
             self._control.accept_mode()
         else:
             self._control.stop()

@@ -19,6 +19,10 @@ from stopgo.mission.run.scans import needs_heading
 
 ESTIMATED = Rest(metres=0.005, radians=0.005)
 """An estimator of a stationary vehicle drifts by some millimetres."""
+NO_ORIGIN = (
+    "the autopilot has no origin (GPS_GLOBAL_ORIGIN); set it to the mission's, or start stopgo robot with"
+    " --set-origin"
+)
 
 
 class MavlinkBase:
@@ -35,7 +39,7 @@ class MavlinkBase:
 
     def take(self, mission: Mission) -> None:
         """Report poses in this mission's frame from now on, and drive in it."""
-        self._frame.mission = mission
+        self._frame.mission = self._autopilot.origin_keeper.mission = mission
 
     def pose(self) -> Pose:
         return self._frame.pose()
@@ -73,7 +77,7 @@ class MavlinkBase:
         if unknown:
             return unknown
         if self._autopilot.telemetry.origin() is None:
-            return "the autopilot has no origin (GPS_GLOBAL_ORIGIN); set it to the mission's"
+            return NO_ORIGIN
         wrong = "" if self._frame.mission is None else self.unfit(self._frame.mission)
         return (
             wrong

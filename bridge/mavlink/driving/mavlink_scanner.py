@@ -60,6 +60,7 @@ class StandstillWatch:
         self._autopilot = autopilot
         self._motion = ScanMotion(tolerance_m)
         self._boots = autopilot.peer.boots
+        self._began_s = time.monotonic()
         self._was_taken = bool(autopilot.control.other_control())
         """True if it was in such a mode before: a restarted autopilot may be scanned from as it is."""
         self._taken_s: float | None = None
@@ -73,7 +74,10 @@ class StandstillWatch:
         taken = "" if self._was_taken else self._autopilot.control.other_control()
         self._taken_s = (self._taken_s or time.monotonic()) if taken else None
         if taken and time.monotonic() - (self._taken_s or math.inf) >= BOOT_SHOWS_S:
-            return f"somebody took the vehicle during the scan: {taken}"
+            return f"the vehicle was taken during the scan: {taken}"
+        steered = self._autopilot.control.other_hands(time.monotonic() - self._began_s)
+        if steered:
+            return f"{steered} during the scan"
         self._look()
         return self._motion.why
 
@@ -143,7 +147,7 @@ class MavlinkScanner:
         """Have the vehicle stop scanning and stand, unless somebody has switched its mode."""
         if under_way:
             self._break_off()
-        if not self._autopilot.control.mode_change():
+        if not self._autopilot.control.is_changed:
             self._autopilot.control.stop()
 
     def _next_index(self, waiting: MessageQueue) -> int | None:

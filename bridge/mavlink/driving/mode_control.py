@@ -12,11 +12,13 @@ import time
 
 from stopgo.bridge.mavlink.driving.autopilot_telemetry import NewestMessages
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
+from stopgo.bridge.mavlink.vehicle_link.foreign_commands import JUST_NOW_S, Effect
 from stopgo.bridge.mavlink.vehicle_link.messages import command_long
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.autopilots.kind import Mode
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.failsafes import UNNAMED
+from stopgo.mission.mavlink.following.steps import SOMEBODY
 from stopgo.mission.mavlink.items import Command
 
 TICK_S = 0.1
@@ -89,22 +91,51 @@ class ModeControl:
         name = self._modes.name(mode)
         return f"the autopilot is in {name}: somebody else drives it; to hand it over, switch it to HOLD"
 
-    def mode_change(self) -> str:
-        """Report a change of mode that somebody else made since the known mode; empty if there was none."""
+    @property
+    def is_changed(self) -> bool:
+        """True if somebody else has changed the mode since the known one."""
         mode = self.mode()
         ours = self._stop_pending.is_set() and mode == self._modes.hold
-        if ours or self.known_mode in (None, mode):
-            return ""
-        return f"{self._author()} switched the autopilot to {self._modes.name(mode)}"
+        return not ours and self.known_mode not in (None, mode)
 
-    def _author(self) -> str:
-        """Who changed the mode: a failsafe, if the autopilot reports one, else somebody."""
+    def mode_change(self) -> str:
+        """Report a change of mode that somebody else made since the known mode; empty if there was none."""
+        return self._switched() if self.is_changed else ""
+
+    def _switched(self) -> str:
+        mode = self.mode()
+        return f"{self._author('mode', mode)} switched the autopilot to {self._modes.name(mode)}"
+
+    def disarming(self) -> str:
+        """Report a disarmed autopilot, and who disarmed it; empty if it is armed."""
+        return "" if self._peer.armed else f"the autopilot was disarmed by {self._author('arming')}"
+
+    def other_hands(self, within_s: float = JUST_NOW_S) -> str:
+        """Report whoever else has steered the vehicle in the guided mode; empty if none was heard."""
+        if not self.is_in_guided_mode:
+            return ""
+        station = self._peer.foreign.sends_set_points(within_s)
+        if station:
+            return f"{station} sends the vehicle set points"
+        moved = self._peer.foreign.sticks_moved(within_s)
+        return f"{moved} steers the vehicle" if moved else ""
+
+    def _author(self, effect: Effect, mode: Mode | None = None) -> str:
+        """Who did that: our guard, a station that was heard, a failsafe, a remote control, or not known."""
         if time.monotonic() - self._guard_stop_s < GUARD_S:
             return "the gateway's own guard (its program did not run for a while)"
+        station = self._peer.foreign.station(effect, mode=mode)
+        if station:
+            return station
         failsafe = self._newest.recent_failsafe
         if failsafe is not None:
             return str(failsafe)
-        return UNNAMED if self._kind.in_failsafe(self._peer.heartbeat) else "somebody"
+        if self._kind.in_failsafe(self._peer.heartbeat):
+            return UNNAMED
+        seen_s = time.monotonic()
+        while self._peer.foreign.awaits_channels(time.monotonic() - seen_s) and not self._closing.is_set():
+            self._closing.wait(TICK_S)
+        return self._peer.foreign.remote_control(time.monotonic() - seen_s) or SOMEBODY
 
     def accept_mode(self) -> None:
         """Take the reported mode as known: an operator who commands to go on knows it.
@@ -131,7 +162,7 @@ class ModeControl:
     def hold_after_restart(self, boot_mode: Mode) -> str:
         """Put an autopilot that restarted in `boot_mode` on hold; return why not, else empty."""
         if self.mode() not in (boot_mode, self._modes.hold):
-            return f"somebody switched the autopilot to {self._modes.name(self.mode())}"
+            return self._switched()
         self.known_mode = None
         sent_s = time.monotonic()
         why = refusal(self._peer, Command.DO_SET_MODE, *self._modes.hold.params, what="the mode to hold")

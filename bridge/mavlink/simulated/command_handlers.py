@@ -67,6 +67,7 @@ def handlers(vehicle: Vehicle) -> Handlers:
         "SET_GPS_GLOBAL_ORIGIN": lambda who, message: _set_origin(vehicle, message),
         "SET_POSITION_TARGET_LOCAL_NED": lambda who, message: _target_local(vehicle, message),
         "SET_POSITION_TARGET_GLOBAL_INT": lambda who, message: _target_global(vehicle, message),
+        "RC_CHANNELS_OVERRIDE": lambda who, message: _override(vehicle, message),
     }
 
 
@@ -322,6 +323,12 @@ def _set_origin(vehicle: Vehicle, message: Message) -> None:
     lat, lon = message.latitude / STEPS_PER_DEGREE, message.longitude / STEPS_PER_DEGREE
     if abs(lat) <= NORTHMOST and abs(lon) <= 180:
         vehicle.set_origin(SiteOrigin(lat=lat, lon=lon, alt=message.altitude / 1000, heading_deg=0.0))
+
+
+def _override(vehicle: Vehicle, message: Message) -> None:
+    mode = vehicle.remote_control.override([getattr(message, f"chan{nth}_raw") for nth in range(1, 9)])
+    if mode is not None:
+        vehicle.set_mode(mode)
 
 
 def _target_local(vehicle: Vehicle, message: Message) -> None:

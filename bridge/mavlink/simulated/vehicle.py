@@ -16,6 +16,7 @@ from stopgo.bridge.mavlink.simulated.guided_target import GuidedTarget
 from stopgo.bridge.mavlink.simulated.lasting_failsafes import LastingFailsafes
 from stopgo.bridge.mavlink.simulated.parameters import Parameters, parameter_handlers
 from stopgo.bridge.mavlink.simulated.real_drive import RealDrive
+from stopgo.bridge.mavlink.simulated.remote_control import RemoteControl
 from stopgo.bridge.mavlink.simulated.rover import STANDING, Rover
 from stopgo.bridge.mavlink.simulated.steering import LAWS
 from stopgo.bridge.mavlink.simulated.streams import Streams
@@ -89,14 +90,13 @@ class Vehicle:
     ) -> None:  # fmt: skip
         self.autopilot = autopilot = setup.autopilot
         self._setup, self._wall, self._transmit, self._makers = setup, wall, send, makers
-        self._mishaps = Mishaps(setup.faults)
-        self._saved_ns = 0
+        self._mishaps, self._saved_ns = Mishaps(setup.faults), 0
         self.time = VehicleClock(clock, wall, boots_by_wall=setup.faults.any("jitter") is not None)
         self.mode: ModeName = "manual"
         self.armed = False
         self.failsafe = False
         """True while it holds because setpoints were missing, and no command has come since."""
-        self.failsafes = LastingFailsafes(setup.faults)
+        self.failsafes, self.remote_control = LastingFailsafes(setup.faults), RemoteControl()
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setup.state)
@@ -307,6 +307,8 @@ class Vehicle:
             self.failsafes.begin(int(failsafe.amount), self.time.wall_ns)
             self.text(self.autopilot.failsafe_texts[int(failsafe.amount)])
             self.set_mode("hold")
+        for switch in self._mishaps.by("switch", up_s):
+            self.set_mode(self.remote_control.switch(int(switch.amount)))
 
     def _end_scan(self) -> None:
         message, why = self.camera.end(self.now_ns, self.time.boot_ms)

@@ -12,13 +12,15 @@ from stopgo.mission.errors import InputError
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
     "beside", "finish", "scanner", "unsigned", "unplaced", "camera", "jump", "gap", "restart",
-    "failsafe", "lostpicture", "stuck",
+    "failsafe", "lostpicture", "stuck", "switch",
 ]  # fmt: skip
 
 
 MOST_JITTER_MS = 60_000
 RESULTS = range(15)
 """MAV_MISSION_RESULT without OPERATION_CANCELLED, by which a vehicle refuses no item."""
+POSITIONS = range(3)
+"""Positions of a remote control's mode switch that the fault sets."""
 CAUSES = range(6)
 """Causes of a failsafe, in the order of `Autopilot.failsafe_texts`."""
 
@@ -49,6 +51,8 @@ FAULTS: dict[VehicleFaultKind, str] = {
     "restart": "N seconds after it was switched on, it reboots, and takes AMOUNT seconds more for that",
     "failsafe": "N seconds after it was switched on, a failsafe holds it; AMOUNT is the cause: 0 battery,"
     " 1 remote control, 2 ground station, 3 geofence, 4 crash, 5 position estimate",
+    "switch": "N seconds after it was switched on, somebody moves the mode switch of its remote control;"
+    " AMOUNT is the position: 0 manual, 1 hold, 2 auto",
     "stuck": "on the path to item N it stands, in AUTO, for AMOUNT s (0: until AUTO is commanded again)",
     "lostpicture": "the report of scan N is not sent, unless a station requests it",
     "unplaced": "its origin came too soon: it reports it, but no position on earth (N means nothing)",
@@ -128,6 +132,9 @@ def _nonsense(fault: VehicleFault) -> str | None:
         "jitter": (at > MOST_JITTER_MS, f"N is milliseconds, 0 to {MOST_JITTER_MS}, such as jitter@300"),
         "gap": (amount == 0, f"AMOUNT is seconds, more than 0, such as gap@{at}=2"),
         "failsafe": (amount not in CAUSES, f"AMOUNT is the cause, 0 to {CAUSES[-1]}, such as {kind}@{at}=3"),
+        "switch": (
+            amount not in POSITIONS, f"AMOUNT is the position, 0 to {POSITIONS[-1]}, such as {kind}@{at}=1"
+        ),
         "nack": (amount not in RESULTS, f"{results}, such as nack@{at}=5"),
     }  # fmt: skip
     wrong, why = rules.get(kind, (False, ""))

@@ -157,6 +157,12 @@ def item_reached(vehicle: Vehicle) -> Message | None:
     return None if vehicle.reached is None else dialect.MAVLink_mission_item_reached_message(vehicle.reached)
 
 
+def rc_channels(vehicle: Vehicle) -> Message:
+    channels = vehicle.remote_control.channels
+    values = [*channels, *[65_535] * (18 - len(channels))]
+    return dialect.MAVLink_rc_channels_message(vehicle.time.boot_ms, len(channels), *values, 200)
+
+
 def image_captured(vehicle: Vehicle) -> Message | None:
     """Report of the scan that ended last."""
     return vehicle.camera.newest
@@ -197,6 +203,7 @@ MAKERS: dict[int, Maker] = {
     MessageId.MISSION_ITEM_REACHED: item_reached,
     MessageId.GPS_GLOBAL_ORIGIN: origin,
     MessageId.VFR_HUD: vfr_hud,
+    MessageId.RC_CHANNELS: rc_channels,
     MessageId.BATTERY_STATUS: battery_status,
     MessageId.AUTOPILOT_VERSION: autopilot_version,
     MessageId.HOME_POSITION: home,

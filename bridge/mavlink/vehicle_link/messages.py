@@ -69,6 +69,13 @@ def parameter_request(to: Who, name: str) -> Message:
     return dialect.MAVLink_param_request_read_message(to.system, to.component, name.encode(), -1)
 
 
+def parameter_setting(to: Who, name: str, value: float) -> Message:
+    """Sets a parameter of type float32."""
+    return dialect.MAVLink_param_set_message(
+        to.system, to.component, name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32
+    )
+
+
 def set_current(to: Who, sequence: int) -> Message:
     """Makes an item the current one; there is no answer, but MISSION_CURRENT shows it."""
     return dialect.MAVLink_mission_set_current_message(to.system, to.component, sequence)

@@ -1,12 +1,13 @@
-"""Reading of a vehicle's parameters by name: requested together, and again those that have not come."""
+"""A vehicle's parameters by name: requested together, and again those that have not come; or set."""
 
 from __future__ import annotations
 
+import math
 import struct
 import time
 from collections.abc import Collection
 
-from stopgo.bridge.mavlink.vehicle_link.messages import parameter_request
+from stopgo.bridge.mavlink.vehicle_link.messages import parameter_request, parameter_setting
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.mavlink.telemetry import Message
 
@@ -32,6 +33,22 @@ def read_parameters(peer: Peer, names: Collection[str]) -> dict[str, float]:
                 if message.param_id in names:
                     found[message.param_id] = value_of(message, bytewise=peer.autopilot.whole_bytewise)
                     until = time.monotonic() + ROUND_S
+    return found
+
+
+def set_parameter(peer: Peer, name: str, value: float) -> float | None:
+    """Set a parameter of type float32; return the value that the vehicle then reports, `None` if none."""
+    found: float | None = None
+    with peer.waiting("PARAM_VALUE") as waiting:
+        for _ in range(ROUNDS):
+            peer.send(parameter_setting(peer.who, name, value))
+            until = time.monotonic() + ROUND_S
+            while (message := waiting.get(until - time.monotonic())) is not None:
+                if message.param_id == name:
+                    found = float(message.param_value)
+                    until = -math.inf
+            if found is not None:
+                break
     return found
 
 

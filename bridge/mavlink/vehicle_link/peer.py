@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
+from stopgo.bridge.mavlink.vehicle_link.foreign_commands import ForeignCommands
 from stopgo.bridge.mavlink.vehicle_link.messages import (
     command_int,
     command_long,
@@ -124,13 +125,20 @@ class Peer:
     """A vehicle that was found on a wire."""
 
     def __init__(
-        self, wire: Wire, newest: Newest, autopilot: Autopilot, patience_s: float = PATIENCE_S
+        self,
+        wire: Wire,
+        newest: Newest,
+        autopilot: Autopilot,
+        foreign: ForeignCommands,
+        patience_s: float = PATIENCE_S,
     ) -> None:
         assert newest.of is not None
         self.wire = wire
         self.who = newest.of
         self.autopilot = autopilot
         """The kind of its autopilot."""
+        self.foreign = foreign
+        """What others command it, as far as it is heard."""
         self.patience_s = patience_s
         self.round_trips = RoundTrips()
         self.in_order = False
@@ -411,8 +419,10 @@ def found(
     heartbeat = _selected(wire, beats, vehicle, timeout_s)
     newest = Newest(sender(heartbeat))
     newest.put(heartbeat)
-    with wire.filling(newest):
-        yield Peer(wire, newest, autopilot_of(heartbeat.autopilot), timeout_s)
+    autopilot = autopilot_of(heartbeat.autopilot)
+    foreign = ForeignCommands(sender(heartbeat), wire.me, autopilot)
+    with wire.filling(newest), wire.filling(foreign):
+        yield Peer(wire, newest, autopilot, foreign, timeout_s)
 
 
 def _heartbeats(

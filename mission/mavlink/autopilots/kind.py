@@ -80,6 +80,10 @@ class Modes:
         return self.names.get(mode, f"{main} {mode.sub}" if mode.sub else main)
 
 
+ALONE_S = 0.5
+"""Longest time that a vehicle should drive on without the computer that steers it."""
+
+
 @dataclass(frozen=True)
 class Driving:
     """Control of a vehicle from outside, in its mode `guided`."""

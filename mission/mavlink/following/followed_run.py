@@ -87,6 +87,8 @@ class FollowedRun:
         """End the log: no scan can be confirmed later."""
         while self._step(now_ns + GRACE_NS + 1):
             pass
+        if self._run.offered:  # nobody drove to the stops that were jumped over
+            self._take(runs.ended(self._run, "FINISHED"), now_ns)
 
     def _step(self, now_ns: int) -> bool:
         """Apply the observation of the current stop; return True if the run went on to another stop."""

@@ -24,6 +24,8 @@ class Jump:
     """Index of the item before it."""
     end: int
     """Index of the item after it."""
+    ns: int
+    """Time when it was seen."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,9 @@ class Work:
     """True if all is done."""
     since_ns: int
     since_ms: int
-    """The same on the vehicle's own clock."""
+    """The same on the vehicle's own clock; 0 as long as that is not known."""
+    begin_seen: bool
+    """True if the item before it was seen; else it may have become current long before."""
 
 
 class ListPosition:
@@ -104,6 +108,11 @@ class ListPosition:
             return False
         return jump.first < listed.stops[run.at].after <= jump.end
 
+    @property
+    def jumped_ns(self) -> int:
+        """Time of the last jump."""
+        return 0 if self._jump is None else self._jump.ns
+
     def is_at_stop(self, listed: ListedMission | None) -> bool:
         """Return True if the vehicle is at a stop, and not driving."""
         if listed is None or self._current is None:
@@ -120,8 +129,11 @@ class ListPosition:
         """Take a report of the current item at a time of the vehicle; return True if it is the same."""
         self._current = TimestampedMessage(message, now_ns)
         before = self._work
-        work = Work(message.seq, message.mission_state == MissionState.COMPLETE, now_ns, boot_ms)
+        complete = message.mission_state == MissionState.COMPLETE
+        work = Work(message.seq, complete, now_ns, boot_ms, begin_seen=before is not None)
         if before is not None and (before.sequence, before.complete) == (work.sequence, work.complete):
+            if before.since_ms == 0:
+                self._work = replace(before, since_ms=boot_ms)
             return True
         if before is not None and listed is not None:
             self._note_jump(listed, before, work)
@@ -137,6 +149,7 @@ class ListPosition:
             self._jump = replace(self._jump, end=place) if self._jump.listed is listed else None
         if place <= first or not 0 < before.since_ms <= now.since_ms:
             return
+        waits_s = listed.wait_s(first if before.begin_seen else first + 1, place)
         passed_s = max((now.since_ns - before.since_ns) / 1e9, (now.since_ms - before.since_ms) / 1e3)
-        if listed.wait_s(first, place) > passed_s + JUMP_SLACK_S:
-            self._jump = Jump(listed, first, place)
+        if waits_s > passed_s + JUMP_SLACK_S:
+            self._jump = Jump(listed, first, place, now.since_ns)

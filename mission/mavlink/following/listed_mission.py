@@ -35,6 +35,8 @@ class ListedMission:
     sent: ItemList
     stops: tuple[StopItems, ...]
     """One for each of the mission's stops, in their order."""
+    address: str = ""
+    """Options of a command to this vehicle, after a space; empty if it is only observed."""
 
     @property
     def end(self) -> int:
@@ -61,7 +63,7 @@ class ListedMission:
         return next((one.item.params[1] for one in self.sent.placed if one.role == "speed"), None)
 
 
-def listed_mission(mission: Mission, sent: ItemList) -> ListedMission:
+def listed_mission(mission: Mission, sent: ItemList, address: str = "") -> ListedMission:
     """Return a mission with the list that it was sent as.
 
     Raises
@@ -69,9 +71,8 @@ def listed_mission(mission: Mission, sent: ItemList) -> ListedMission:
     InputError
         If a stop of the mission is not in the list.
     """
-    return ListedMission(
-        _forward(mission), sent, tuple(_stop_items(stop.id, sent.placed) for stop in mission.stops)
-    )
+    stops = tuple(_stop_items(stop.id, sent.placed) for stop in mission.stops)
+    return ListedMission(_forward(mission), sent, stops, address)
 
 
 def _forward(mission: Mission) -> Mission:

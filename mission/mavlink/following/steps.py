@@ -21,12 +21,9 @@ from stopgo.mission.run.scans import ScanFailed, ScanResult, heading_error
 from stopgo.mission.run.states import Change, Run, changed
 from stopgo.mission.run.tolerance import deviation, is_outside
 
-SOMEBODY = "the vehicle's operator"
-"""Commander of commands that were not sent from here."""
-JUMPED = (
-    f"{JUMPED_OVER}: the vehicle's current item was set beyond it; drive to it again by"
-    " stopgo start --again, or plan a follow-up mission (stopgo review)"
-)
+SOMEBODY = "somebody (not known who)"
+"""Commander of commands that were not sent from here, and whose sender was not heard."""
+BEYOND = "the vehicle's current item was set beyond it; it is offered again at the end of the route"
 LATE_REPORTS = ("NAVIGATING", "SCANNING")
 """States in which a scanner's report is still expected after the stop was left."""
 GRACE_NS = 2 * 10**9
@@ -59,6 +56,8 @@ class Observation:
     """True if no scanner report, with its pose, is expected any more."""
     is_jumped: bool = False
     """True if somebody has made a later item the current one before the current stop's waits were over."""
+    jumped_by: str = SOMEBODY
+    """Whoever did that."""
     failsafe: str = ""
     """Failsafe that put it in its present mode, with its cause; empty if it reports none."""
     moved: str = ""
@@ -98,7 +97,16 @@ def steps(run: Run, listed: ListedMission, observed: Observation) -> tuple[Chang
 
 
 def step(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
-    """Return the next change, if there is any."""
+    """Return the next change, if there is any; stops that were jumped over are offered before the end."""
+    change = _next(run, listed, observed)
+    if change is None or change.run.state != "FINISHED" or not change.run.jumped:
+        return change
+    *before, _ = change.events  # without Finished
+    offer = runs.offered(change.run, listed.mission, f"stopgo retry{listed.address}")
+    return Change(offer.run, (*before, *offer.events))
+
+
+def _next(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
     if run.state == "PAUSED":
         return _ends_scan(run, listed, observed)
     if run.state == "HOMING":
@@ -145,7 +153,7 @@ def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopI
 def _passed(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
     """Check a stop that the vehicle has left before its arrival was seen."""
     if observed.is_jumped:
-        return _jumped(run, listed)
+        return _jumped(run, listed, observed)
     if observed.stood is None:
         over = observed.report_overdue and observed.is_ours
         return _unconfirmed(run, listed, None, "no pose of the vehicle at the stop") if over else None
@@ -192,7 +200,7 @@ def _late(run: Run, listed: ListedMission, observed: Observation, items: StopIte
     if observed.place < items.after or not (observed.report_overdue and observed.is_ours):
         return None
     if observed.is_jumped:
-        return _jumped(run, listed)
+        return _jumped(run, listed, observed)
     return _unconfirmed(run, listed, observed.stood, "no scan report from the vehicle")
 
 
@@ -230,9 +238,8 @@ def _unconfirmed(run: Run, listed: ListedMission, pose: Pose | None, reason: str
     return Change(behind.run, (event, *behind.events))
 
 
-def _jumped(run: Run, listed: ListedMission) -> Change:
-    """Skip a stop that somebody has jumped over."""
-    return runs.skipped(changed(run, leg=run.at + 1), listed.mission, JUMPED)
+def _jumped(run: Run, listed: ListedMission, observed: Observation) -> Change:
+    return runs.jumped_over(run, listed.mission, f"{JUMPED_OVER} {observed.jumped_by}: {BEYOND}")
 
 
 STEPS: dict[str, Callable[[Run, ListedMission, Observation, StopItems], Change | None]] = {
@@ -251,9 +258,13 @@ def tried_again(before: Run, after: Run) -> bool:
 
 
 def after_skipped(run: Run, listed: ListedMission, observed: Observation) -> int | None:
-    """Return the item to go on with for a vehicle at a skipped stop; `None` if it is not there."""
+    """Return the item to go on with for a vehicle at a skipped stop; `None` if it is not there.
+
+    A vehicle that drives the route again passes the finished stops in the same way.
+    """
+    passed = (*run.skipped, *run.done) if run.revisits else run.skipped
     for items in listed.stops[: run.at]:
-        if items.stop in run.skipped and items.at < observed.place < items.after < listed.end:
+        if items.stop in passed and items.at < observed.place < items.after < listed.end:
             return items.after
     return None
 

@@ -83,6 +83,11 @@ class VehicleStatus:
         return 0 if self._heartbeat is None else self._heartbeat.ns
 
     @property
+    def mode_began_ns(self) -> int:
+        """Time when it was first in its present mode, armed or disarmed as now."""
+        return self._mode_began_ns
+
+    @property
     def armed(self) -> bool:
         beat = self._heartbeat
         return beat is not None and bool(beat.message.base_mode & ModeFlag.SAFETY_ARMED)

@@ -1,6 +1,7 @@
 // Looking back: missions of the folder with their runs, reports, Rerun's viewer, downloads, and what is missing.
 import { read, send } from "./api.js";
 import { fill, h, say } from "./dom.js";
+import { onChange } from "./store.js";
 import { percent, t } from "./words.js";
 
 const FORMS = ["pdf", "svg", "dxf", "csv", "json"];
@@ -11,6 +12,9 @@ export function makeBack(main, me) {
   const note = h("p", { class: "notice", role: "status" }, t("reading_runs"));
   fill(main, h("section", { "aria-label": t("tab_back") }, note, list));
   load(list, note, me);
+  return onChange((kinds) => {
+    if (kinds.has("recording")) load(list, note, me);
+  });
 }
 
 async function load(list, note, me) {

@@ -191,7 +191,9 @@ function showCard(view, name, card) {
     .sort((a, b) => b.value.number - a.value.number)[0]?.value;
   const stands = ["HELD", "PAUSED", "HOMING", "ABORTED"].includes(state.state);
   say(card.reason, stands && held ? eventText(held) : "");
-  say(card.trouble, (state.trouble ?? []).map((one) => (has(`trouble_${one}`) ? t(`trouble_${one}`) : one)).join("; "));
+  const troubles = (state.trouble ?? []).map((one) => (has(`trouble_${one}`) ? t(`trouble_${one}`) : one));
+  const recording = get("recording", name)?.trouble;
+  say(card.trouble, [...troubles, ...(recording ? [t("not_recorded", { reason: recording })] : [])].join("; "));
   if (card.orders) showOrders(card.orders, name, state, holder);
 }
 

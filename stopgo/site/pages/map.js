@@ -29,7 +29,7 @@ export function floorLayers(drawing) {
       svg("path", { d, class: `layer ${kind}`, fill: area || null, stroke: stroke || null, "fill-rule": "evenodd", ...fixed })),
     names.map(([name, x, y]) => {
       const [px, py] = place(frame, x, y);
-      return svg("text", { x: px, y: py + 2.2 * size, class: "room", "font-size": size, "text-anchor": "middle" }, name);
+      return svg("text", { x: px, y: py + 1.5 * size, class: "room", "font-size": size, "text-anchor": "middle" }, name);
     }),
   ];
 }
@@ -90,8 +90,8 @@ export function setFrame(map, frame) {
   map.setAttribute("viewBox", `0 0 ${frame.width} ${frame.height}`);
 }
 
-export function legend(entries) {
-  return h("ul", { class: "legend" }, entries.map((kind) => h("li", {}, sample(kind), t(`legend_${kind}`))));
+export function legend(entries, words = {}) {
+  return h("ul", { class: "legend" }, entries.map((kind) => h("li", {}, sample(kind), t(words[kind] ?? `legend_${kind}`))));
 }
 
 function sample(kind) {

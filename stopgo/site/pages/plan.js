@@ -22,7 +22,7 @@ export function makePlan(main, me) {
   const may = me.role === "operator";
   fill(main, h("div", { class: "planning" },
     h("section", { class: "floor", "aria-label": t("tab_plan") }, view.note, map, view.hand,
-      legend(["seen", "unplanned", "hidden", "stop_waiting"])),
+      legend(["seen", "unplanned", "hidden", "stop_waiting"], { seen: "legend_covered", stop_waiting: "legend_stop" })),
     h("aside", {}, may ? view.form : h("p", { class: "notice" }, t("viewer_cannot_plan")),
       h("h2", {}, t("variants")), view.variants, h("h2", {}, t("findings")), view.findings)));
   map.addEventListener("click", (event) => pressedMap(view, event));
@@ -203,6 +203,7 @@ async function show(view, one) {
     drawStops(view, drawing);
     return;
   }
+  if (one.error) say(view.note, one.state === "failed" ? one.error : t("variant_cancelled"));
   if (one.drawing && view.drawing?.made !== one.number) showFloor(view, { ...one.drawing, made: one.number });
   if (!view.drawing || !one.drawing) return;
   const frame = view.drawing.frame;
@@ -255,12 +256,13 @@ function pressedMap(view, event) {
 }
 
 // A change by hand is a new variant beside this one: all other stops stay, so the difference is its cost.
+// A stop in a doorway cannot be required; the planner chooses it again where it is needed.
 function edit(view, { without = null, at = null }) {
   const base = variantsShown().find((one) => one.number === chosen.shown);
   const drawing = drawings.get(chosen.shown);
   if (!base || !drawing) return;
   const gone = drawing.stops.find((stop) => stop.id === without);
-  const required = drawing.stops.filter((stop) => stop.id !== without).map((stop) => [stop.x, stop.y]);
+  const required = drawing.stops.filter((stop) => stop.id !== without && !stop.doorway).map((stop) => [stop.x, stop.y]);
   if (at) required.push(at);
   const far = gone && at ? Math.hypot(at[0] - gone.x, at[1] - gone.y) : Infinity;
   const radius = Math.min(FORBIDDEN_M, 0.5 * far);

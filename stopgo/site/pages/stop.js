@@ -62,7 +62,7 @@ function show(list) {
 }
 
 export function lineOf(record) {
-  const parts = [`${record.robot}:`, t("sent_at", { time: clock(record.sent_at * 1000) })];
+  const parts = [t("sent_at", { time: clock(record.sent_at * 1000) })];
   let kind = "wait";
   if (record.outcome === "unknown" || record.outcome === "not_sent") {
     kind = "bad";
@@ -76,7 +76,7 @@ export function lineOf(record) {
     kind = "good";
     parts.push(t("standing_at", { time: clock(record.standing_at * 1000) }));
   } else parts.push(standing(record));
-  return [kind, parts.join(" · ")];
+  return [kind, `${record.robot}: ${parts.join(" · ")}`];
 }
 
 function standing(record) {

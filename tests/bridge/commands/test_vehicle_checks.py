@@ -168,7 +168,16 @@ def test_one_that_steers_like_a_car_is_wrong_for_a_mission(capsys: pytest.Captur
             ["read back every 2 s", "the autopilot has a camera", "SCR_ENABLE is not reported"],
         ),
         ("ardupilot", (VehicleFault("camera", 1),), ["component 100 has a camera"]),
-        ("px4", (), ["by its id", "px4 has none", "drives on for 1 s (COM_OF_LOSS_T)"]),
+        (
+            "px4",
+            (),
+            [
+                "by its id",
+                "px4 has none",
+                "drives on for 1 s (COM_OF_LOSS_T); stopgo robot --set-timeout",
+                "by the channel that moved",
+            ],
+        ),
         (
             "px4",
             (VehicleFault("failsafe", 900, 3.0),),
@@ -186,7 +195,7 @@ def test_it_prints_what_the_vehicle_can_do(
     with vehicle_on(Url("udpin", "127.0.0.1", port), setup):
         main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}"])
     can = [line for line in capsys.readouterr().out.splitlines() if line.startswith("ok     can")]
-    assert len(can) == 5
+    assert len(can) == 6
     assert [words for words in expected if words not in "\n".join(can)] == []
 
 

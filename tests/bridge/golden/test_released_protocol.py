@@ -94,3 +94,27 @@ def test_what_a_robot_of_the_released_protocol_publishes_is_read(change: Change)
 def test_a_mission_of_the_released_version_has_its_digest_still() -> None:
     mission = sent_mission()
     assert digest_of(mission) == mission.digest == json.loads(traffic(VERSION)[0]["request"])["digest"]
+
+
+class ReleasedState(msgspec.Struct, kw_only=True):
+    """The fields of a state that a station of 0.1 cannot do without, and their types there."""
+
+    robot: str
+    boot_id: str
+    seq: int
+    robot_ns: int
+    state: str
+    done: tuple[str, ...]
+    skipped: tuple[str, ...]
+    battery: float
+    last_event: int
+
+
+def test_a_station_of_the_released_protocol_reads_the_state_of_a_robot_that_knows_no_charge(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    field = Field()
+    monkeypatch.setattr(field.base, "battery", lambda: None)
+    sent = msgspec.json.encode(field.report())
+    assert msgspec.json.decode(sent, type=ReleasedState).battery == -1.0
+    assert decode(sent, StateReport).charge is None

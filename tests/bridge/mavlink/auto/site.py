@@ -34,7 +34,8 @@ from tests.mission.mavlink.following.worlds import told, tour
 from tests.ports import free_port
 
 SPEED_UP = 5.0
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
+"""Of simulated time."""
 TUNED = {"px4": {"NAV_ACC_RAD": 0.1}}
 """As PX4 comes, half a metre from a stop is there."""
 KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}

@@ -58,4 +58,4 @@ def test_a_reboot_is_told_before_the_mode_that_it_brought_about() -> None:
 
 
 def test_a_mode_that_somebody_chose_is_told_as_theirs() -> None:
-    assert told_at_first_look(boot_ms=90_300) == ["mode MANUAL, by the vehicle's operator"]
+    assert told_at_first_look(boot_ms=90_300) == ["mode MANUAL, by somebody (not known who)"]

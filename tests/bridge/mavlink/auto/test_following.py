@@ -168,4 +168,4 @@ def test_a_run_that_somebody_else_has_started_is_told_as_theirs(tmp_path: Path) 
         peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
         peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)
     assert told(site.events) == ALL
-    assert "operator" in getattr(site.events[0], "commander", "")
+    assert "somebody" in getattr(site.events[0], "commander", "")

@@ -103,7 +103,7 @@ def test_a_mode_that_somebody_else_chooses_is_told_as_theirs(tmp_path: Path) -> 
         until(site, lambda events, run: "Scanned S1" in told(events))
         by_hand(peer, (0, 0))
         until(site, lambda events, run: run.state == "PAUSED")
-        assert "MANUAL" in site.run.reason and "operator" in site.run.reason
+        assert "MANUAL" in site.run.reason and "not known who" in site.run.reason
         by_hand(peer, (10, 0))
     paused = [event for event in site.events if isinstance(event, Paused | Resumed)]
     assert told(paused) == ["Paused", "Resumed"]

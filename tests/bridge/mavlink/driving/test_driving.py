@@ -159,7 +159,7 @@ def test_an_operators_hold_is_never_changed_back_before_a_retry(tmp_path: Path, 
         until(reports, is_driving(0.5))
         operator.hold()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody switched the autopilot to HOLD" in held.reason
+        assert "somebody (not known who) switched the autopilot to HOLD" in held.reason
         assert (operator.mode(), station.status().state) == ("HOLD", "HELD")
         station.command("retry")
         until(reports, is_state("FINISHED"))
@@ -174,7 +174,7 @@ def test_who_drives_by_hand_keeps_the_vehicle_until_it_is_handed_over(tmp_path: 
         until(reports, is_driving(0.5))
         operator.manual()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody switched the autopilot to MANUAL" in held.reason
+        assert "somebody (not known who) switched the autopilot to MANUAL" in held.reason
         with pytest.raises(
             NegativeResult, match="somebody else drives it; to hand it over, switch it to HOLD"
         ):
@@ -209,7 +209,7 @@ def test_a_hold_during_a_scan_keeps_the_next_leg_from_being_driven(tmp_path: Pat
         until(reports, lambda report: getattr(report, "stop_state", "") == "SCANNING")
         operator.hold()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody switched the autopilot to HOLD" in held.reason
+        assert "somebody (not known who) switched the autopilot to HOLD" in held.reason
         assert scanned(station) == ["s1"]
 
 

@@ -93,8 +93,12 @@ class Camera:
             self.poses.pop(0)
         return present[3]
 
-    def mode_change(self) -> str:
-        return self.switched
+    @property
+    def is_changed(self) -> bool:
+        return bool(self.switched)
+
+    def other_hands(self, within_s: float) -> str:
+        return ""
 
     def other_control(self) -> str:
         return self.taken
@@ -231,7 +235,7 @@ def test_a_scan_during_which_somebody_takes_the_vehicle_has_failed_at_once() -> 
     slow = Scan(profile="default", duration_s=2.0, timeout_s=3000.0)
     scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
     failed = scanner.scan("run-s2-1", slow, interrupt=Event())
-    assert isinstance(failed, ScanFailed) and "somebody took the vehicle during the scan" in failed.reason
+    assert isinstance(failed, ScanFailed) and "the vehicle was taken during the scan" in failed.reason
     assert camera.stops == 0
 
 

@@ -84,7 +84,7 @@ def test_each_cause_that_lasts_is_named_with_what_clears_it() -> None:
 
 def test_a_missing_remote_control_counts_only_for_a_run_that_was_paused_for_it() -> None:
     lost = VehicleHealth(remote_control=False)
-    assert lost.lasting() == "" and lost.lasting("mode HOLD, by the vehicle's operator") == ""
+    assert lost.lasting() == "" and lost.lasting("mode HOLD, by somebody (not known who)") == ""
     assert "switch the remote control on" in lost.lasting(
         'mode HOLD, by the autopilot\'s failsafe (remote control lost: "Throttle Failsafe")'
     )
