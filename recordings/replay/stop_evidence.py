@@ -16,8 +16,7 @@ import numpy as np
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.document import Point
-from stopgo.mission.mavlink.following.steps import JUMPED
-from stopgo.mission.run.events import Aborted, Finished
+from stopgo.mission.run.events import JUMPED_OVER, Aborted, Finished
 from stopgo.mission.run.tolerance import is_outside
 from stopgo.recordings.logs.telemetry_log import FORMAT
 from stopgo.recordings.replay.fit_error import fit_error_m
@@ -111,7 +110,7 @@ def _why_not_the_end(replay: Replay, number: int, item: StopComparison) -> str:
         long_enough(match.standstill, stop) and not is_outside(match.away_m, stop.tolerance_m)
         for match in replay.at(number)
     )
-    return STOOD if followed and item.reason == JUMPED and stood else ""
+    return STOOD if followed and (item.reason or "").startswith(JUMPED_OVER) and stood else ""
 
 
 def _within(item: StopComparison, number: int, errors: PositionErrors) -> Certainty:
