@@ -1,6 +1,6 @@
 """Pairs of positions on many floors: simulated registration against the rules that predict it.
 
-`python -m benchmarks.registration simulate pairs.jsonl 0 1` simulates (hours); with the file's name alone it
+`python -m benchmarks.registration simulate pairs.jsonl 0 1` simulates (10 minutes of processor time); with the file's name alone it
 counts every pair by each rule and puts the table into the README.
 """
 
@@ -26,20 +26,24 @@ from stopgo.mission.proof.plan_proof import Simulation, within_tolerance
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
 from stopgo.planner.candidates import candidates
+from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.overlap import LEAST_HOLD_M, boundary, overlaps_of, pairs
 from stopgo.planner.scan_simulation import registration
-from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
+from stopgo.planner.scan_simulation.casting import SolidScene, distances
+from stopgo.planner.scan_simulation.extrusion import NONE
+from stopgo.planner.scan_simulation.scanning import CLOUD_DEG, SPARSE_M
 from stopgo.planner.scan_simulation.verification import _ScanSite as ScanSite
 from stopgo.planner.space.navigable import navigable
 
 ALONE = Settings(register=False)
 """Candidates without doorways, of which any may be required as a position."""
-POSITIONS = 11
-"""Positions on each floor; two rounds with different ones."""
-ROUNDS = 2
-SEEDS = (1, 2)
-"""Seeds of the pose errors; each gives two starts."""
+POSITIONS, CLUSTER = 20, 10
+"""Positions on each floor, and of each cluster."""
+STARTS = 2
+LEVEL = 10
+PLAIN_M, PLAIN_END_M = 0.1, 0.003
+"""Hold, and end of the first start, with which a pair is plain."""
 STOREYS = {
     "office": ("Level 2",),
     "school": ("u4pyxnN8d1", "w85seUQP"),
@@ -70,61 +74,112 @@ def floors() -> Iterator[tuple[str, FloorPlan, Settings]]:
 
 def standing(floor: FloorPlan, settings: Settings, xy: FloatArray) -> Candidates:
     """Candidates at given positions."""
-    found = candidates(navigable(floor, replace(settings, use=tuple(map(tuple, xy.tolist())))))
-    return replace(found, reason=frozen(np.where(found.must, KEPT, OUTSIDE), np.int64))
+    found = candidates(navigable(floor, settings))
+    poses = np.column_stack([xy, np.zeros(len(xy))])
+    joined = with_scans(found, poses)
+    chosen = np.arange(len(joined.xy)) >= len(found.xy)
+    return replace(joined, reason=frozen(np.where(chosen, KEPT, OUTSIDE), np.int64))
 
 
 def positions(floor: FloorPlan, settings: Settings, seed: int) -> FloatArray:
-    """Reachable candidates chosen at random."""
+    """Reachable candidates in clusters, chosen at random: most pairs of a cluster share surfaces."""
     found = candidates(navigable(floor, settings))
-    random = np.random.default_rng(seed)
-    rows = random.permutation(found.kept)[:POSITIONS]
-    return np.asarray(found.xy[np.sort(rows)])
+    kept, random = found.xy[found.kept], np.random.default_rng(1000 + seed)
+    chosen: list[int] = []
+    while len(chosen) < min(POSITIONS, len(kept)):
+        away = np.hypot(*(kept - kept[random.integers(len(kept))]).T)
+        near = np.argsort(away)[: max(60, len(kept) // 4)].tolist()
+        pool = [k for k in near if k not in chosen]
+        chosen += random.permutation(pool)[: min(CLUSTER, POSITIONS - len(chosen))].tolist()
+    return np.asarray(kept[np.sort(chosen)])
+
+
+def cloud(site: ScanSite, position: FloatArray, simulation: Simulation, seed: list[int]) -> FloatArray:
+    """A scan's cloud as `prove` keeps it, with dense rays only at upright surfaces where few are sparse (n, 3)."""
+    scene = SolidScene(site.solids, position, see_through=False, open_door=NONE)
+    step = np.radians(CLOUD_DEG)
+    azimuth, elevation = (np.arange(round(360 / CLOUD_DEG)) + 0.5) * step, (np.arange(-165, 165) + 0.5) * step
+    azimuth, elevation = (item.ravel() for item in np.meshgrid(azimuth, elevation, indexing="ij"))
+    few, far, normal = _hits(site, scene, position, azimuth, elevation)
+    slope = np.abs((few * normal).sum(axis=1))
+    within = far * np.cos(elevation) <= simulation.joining_m + 0.5
+    sparse = within & (np.abs(normal[:, 2]) < registration.UPRIGHT) & (far * step > SPARSE_M * slope)
+    every = round(CLOUD_DEG / simulation.step_deg)
+    offset = (np.arange(every) - (every - 1) / 2) * step / every
+    across, upwards = (item.ravel() for item in np.meshgrid(offset, offset))
+    dense = [
+        (turn[sparse][:, None] + more[None]).ravel()
+        for turn, more in ((azimuth, across), (elevation, upwards))
+    ]
+    many, beyond, _ = _hits(site, scene, position, *dense)
+    found = np.concatenate(
+        [(few * far[:, None])[~sparse & np.isfinite(far)], (many * beyond[:, None])[np.isfinite(beyond)]]
+    )
+    found = found[np.hypot(*found[:, :2].T) <= simulation.joining_m]
+    noise = np.random.default_rng(seed).normal(0.0, simulation.noise_m, len(found))
+    return np.asarray(found * (1 + noise / np.linalg.norm(found, axis=1))[:, None])
+
+
+def _hits(
+    site: ScanSite, scene: SolidScene, position: FloatArray, azimuth: FloatArray, elevation: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Directions (n, 3), distances (n,), and normals (n, 3) of the surfaces met; infinity where none is."""
+    level = np.cos(elevation)
+    towards = np.stack([np.cos(azimuth) * level, np.sin(azimuth) * level, np.sin(elevation)], axis=1)
+    met = scene.cast(towards[:, None])[:, 0]
+    hit = met != NONE
+    far, normal = np.full(len(towards), np.inf), np.zeros(towards.shape)
+    far[hit] = distances(site.solids, position, met[hit], towards[hit])
+    normal[hit] = site.solids.normal[met[hit]]
+    return towards, far, normal
+
+
+def thinned(surface: registration.OrientedCloud) -> registration.OrientedCloud:
+    """The cloud with one of LEVEL points of floor and ceiling: these hold height and tilt only."""
+    kept = surface.upright.copy()
+    kept[np.flatnonzero(~kept)[::LEVEL]] = True
+    return registration.OrientedCloud(frozen(surface.points[kept]), frozen(surface.normals[kept]))
 
 
 def simulated(name: str, floor: FloorPlan, settings: Settings, seed: int) -> Iterator[dict[str, Any]]:
-    """Every pair of positions with shared surfaces, registered from several starts."""
+    """Every pair of positions with shared surfaces, registered from both sides of its weakest direction.
+
+    Where the plan's hold is PLAIN_M and the first start ends well, it is the only one.
+    """
     simulation = Simulation(range_m=settings.range, ceiling_m=floor.ceiling_m or 2.7)
     site = ScanSite.of(navigable(floor, settings), simulation, None)
-    xy = positions(floor, settings, seed)
+    found = standing(floor, settings, positions(floor, settings, seed))
+    xy, overlaps = found.xy[found.kept], overlaps_of(found)
     at = np.column_stack([xy - site.solids.origin, np.full(len(xy), simulation.height_m)])
-    poses = [ScannerPose(frozen(place), 0.0, number=k) for k, place in enumerate(at)]
-    clouds = [scanned(site.solids, site.strips, pose, simulation).cloud for pose in poses]
-    surfaces = [registration.surface_of(cloud) for cloud in clouds]
+    surfaces = [
+        thinned(registration.surface_of(cloud(site, place, simulation, [seed, k])))
+        for k, place in enumerate(at)
+    ]
     for i, j in combinations(range(len(xy)), 2):
         two = registration._CloudPair(surfaces[i], surfaces[j], registration._shift(at[j] - at[i]))
         if not two.meets or two.shared_points < registration.LEAST_POINTS:
             continue
-        errors = []
-        for start_seed in SEEDS:
-            starts = registration._starts(two, replace(simulation, seed=start_seed), (i, j))
-            for start in starts:
-                errors.append(two.error(two.aligned(start)))
-                if errors[-1][0] >= 0.05:
-                    break
-            if errors[-1][0] >= 0.05:
+        near = overlaps.of(i)
+        plain = bool((near.hold_m[near.other == j] >= PLAIN_M).any())
+        errors, moved = [], two.moved_m(simulation)
+        for start in registration._starts(two, simulation, (i, j))[:STARTS]:
+            errors.append(two.error(two.aligned(start, moved_m=moved)))
+            if not within_tolerance(*errors[-1]) or (plain and errors[-1][0] < PLAIN_END_M):
                 break
-        yield {
-            "floor": name,
-            "a": xy[i].tolist(),
-            "b": xy[j].tolist(),
-            "shared": two.share,
-            "free_deg": two.free_deg,
-            "errors": errors,
-        }
+        ends = {"a": xy[i].tolist(), "b": xy[j].tolist()}
+        yield {"floor": name, **ends, "shared": two.share, "free_deg": two.free_deg, "errors": errors}
 
 
 def simulate(path: Path, part: int, of: int) -> None:
     """Append the simulated pairs of every `of`-th floor to a file, one JSON object per line."""
     with path.open("a") as file:
-        for round_number in range(ROUNDS):
-            for number, (name, floor, settings) in enumerate(floors()):
-                if number % of != part:
-                    continue
-                for pair in simulated(name, floor, settings, seed=100 * round_number + number):
-                    file.write(json.dumps(pair) + "\n")
-                file.flush()
-                print(round_number, name, file=sys.stderr)
+        for number, (name, floor, settings) in enumerate(floors()):
+            if number % of != part:
+                continue
+            for pair in simulated(name, floor, settings, number):
+                file.write(json.dumps(pair) + "\n")
+            file.flush()
+            print(name, file=sys.stderr)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from stopgo.spared_modules import load_when_used
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
-    from stopgo.mission.floor.model_solids import ModelSolids
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
     from stopgo.mission.stages.seen_area import SeenSurface
@@ -77,7 +76,7 @@ def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool
     from stopgo.planner.commands.outputs import names
 
     load_when_used()
-    from stopgo.planner.floors import model_solids, options_of, read_floor, standing_bodies
+    from stopgo.planner.floors import options_of, read_floor, standing_bodies
 
     read = read_floor(floor, options_of(settings))
     folder = result_folder(writing.out)
@@ -87,9 +86,7 @@ def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool
         writing.recorder.start()
     with _print_findings_on_error(read):
         made = plan(read, settings, observe=writing.watch.observe, all_parts=all_parts)
-    bodies = ModelBodies(
-        standing_bodies(floor, options_of(settings)), model_solids(floor, options_of(settings))
-    )
+    bodies = standing_bodies(floor, options_of(settings))
     reports = [_write_part(made, number, folder, writing, bodies) for number in range(len(made.parts))]
     _set_aside_old(folder, len(reports), read, settings)
     if made.divided is None:
@@ -133,7 +130,7 @@ def _write_part(
     number: int,
     folder: Path,
     writing: _Writing,
-    bodies: ModelBodies,
+    bodies: Sequence[StandingBody],
 ) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
     from stopgo.planner.checking.model_clearance import too_near
@@ -146,7 +143,7 @@ def _write_part(
     if recording is None:
         del files["recording"]
     watch = writing.watch
-    contents = _PartContents(part, plan, writing.options, _today(), bodies.seen_from(part, watch))
+    contents = _PartContents(part, plan, writing.options, _today(), _seen_from(part, watch))
     sheets = contents.sheets(files["sheets"])
     unwanted = [files.pop("sheets")] if sheets is None else []
     unwanted += [files.pop("picture")] if plan.divided and number else []
@@ -166,7 +163,7 @@ def _write_part(
     for path in unwanted:
         set_aside_file(path)
     watch.lap("files")
-    near = tuple(too_near(part.mission, bodies.standing, plan.settings))
+    near = tuple(too_near(part.mission, bodies, plan.settings))
     return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near, surface=contents.surface)
 
 
@@ -201,21 +198,13 @@ def _recording(part: PartPlan, recorder: RecordingProcess) -> PlanDrawing | None
     return recorder.draw(mission.id, (*part.stage_results(), mission, schedule(mission), sight))
 
 
-@dataclass(frozen=True, eq=False)
-class ModelBodies:
-    """Bodies of the floor's model: those in the robot's way, and all that stops the laser."""
+def _seen_from(part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
+    """Area that the stops of a part see; None for a floor whose heights are not known."""
+    from stopgo.planner.checking.seen_surface import seen_surface
 
-    standing: Sequence[StandingBody]
-    solids: ModelSolids | None
-    """None for a floor that is no model."""
-
-    def seen_from(self, part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
-        """Area that the stops of a part see; None for a floor that is no model."""
-        from stopgo.planner.checking.seen_surface import seen_surface
-
-        found = None if self.solids is None else seen_surface(part.route, self.solids)
-        watch.lap("surface")
-        return found
+    found = seen_surface(part.route)
+    watch.lap("surface")
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from enum import IntEnum
 from types import MappingProxyType
 
 from stopgo.mission.document.floor_source import FloorSource
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import FloatArray, Polygon
 
 
@@ -149,6 +150,8 @@ class FloorPlan:
     """Height of the next storey's floor above this one, if the model contains it."""
     ignored: tuple[IgnoredLine, ...] = ()
     """Lines of unknown meaning; a plan that crosses one reports it."""
+    solids: ModelSolids | None = field(default=None, repr=False)
+    """All that stops the laser, if the heights are known."""
 
     @property
     def digest(self) -> str:

@@ -1,4 +1,4 @@
-"""Solids of a building model on one floor: all that stops the laser, as triangles."""
+"""Solids of a floor: all that stops the laser, as triangles; of a model, or by given heights."""
 
 from __future__ import annotations
 
@@ -14,4 +14,6 @@ class ModelSolids:
     triangles: FloatArray
     """(n, 3, 3): the drawing's coordinates, and metres above the floor."""
     ceiling: float
-    """Height of the next floor above, metres."""
+    """Height of the next floor above, or of the ceiling, metres."""
+    source: str = "the model's solids"
+    """Source of the heights, in words."""

@@ -74,6 +74,17 @@ class FloorParameters:
             farthest=1e12,
         ),
     ] = None
+    heights: Annotated[
+        tuple[str, ...],
+        _floor(
+            "Lower and upper height of a kind in a drawing, or the underside of its ceiling or of lintels",
+            "m",
+            group="Scanner",
+            form="KIND=LOW..HIGH",
+            example="beams=2.4..2.8 or ceiling=2.8 or doors=2.1",
+            read=str,
+        ),
+    ] = ()
     layer_map: Annotated[
         tuple[str, ...] | None,
         _floor(

@@ -8,6 +8,7 @@ from typing import NoReturn
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.settings.element_kinds import KINDS
+from stopgo.mission.settings.given_heights import heights_by_kind
 from stopgo.mission.settings.layer_kinds import check_entries
 from stopgo.mission.settings.scanners import SCANNERS
 
@@ -156,6 +157,7 @@ def _check_lists(settings: Settings) -> None:
     if settings.targets == ():
         raise InputError(f"--targets: no kind is given; known: {known}")
     check_entries(settings.layers, key="--layer")
+    heights_by_kind(settings.heights)
     check_entries(settings.layer_map or (), key="layer_map")
     for x, y, radius in settings.avoid:
         if radius <= 0:

@@ -268,6 +268,8 @@ class Visibility(InSpace):
     method: str
     in_sight: Visibility | None = None
     """Line of sight alone, without the limits; None if that is the same."""
+    hidden_m: float = 0.0
+    """Length of targets that level rays reach, and no ray at the target's own heights: they do not count."""
 
     @property
     def space(self) -> NavigableSpace:

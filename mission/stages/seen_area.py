@@ -32,6 +32,8 @@ class SeenSurface:
     height_m: float
     kinds: Mapping[str, SeenArea]
     hidden_m: float = 0.0
+    """Length that level rays reach and no ray at the targets' own heights: it counts as not visible."""
+    source: str = "the model's solids"
 
     def as_json(self) -> dict[str, Any]:
         """Return the object of reports and of coverage.json."""
@@ -50,7 +52,9 @@ class SeenSurface:
         )
         if not told:
             return []
-        found = [f"  surface     from {self.height_m:g} m, by the model's solids: {told}"]
+        found = [f"  surface     from {self.height_m:g} m, by {self.source}: {told}"]
         if self.hidden_m >= 0.05:
-            found.append(f"              {self.hidden_m:.1f} m of counted targets are hidden at every height")
+            found.append(
+                f"              {self.hidden_m:.1f} m of targets are hidden at every height and not counted"
+            )
         return found

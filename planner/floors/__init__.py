@@ -14,8 +14,8 @@ from typing import cast
 from stopgo.mission.console.plugins import Variant
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings
+from stopgo.mission.settings.given_heights import heights_by_kind
 from stopgo.mission.settings.layer_kinds import kinds_by_name
 from stopgo.planner.floors.reader import BodiesModule, FloorFile, FloorOptions, Reader
 from stopgo.planner.floors.standing_body import StandingBody
@@ -28,7 +28,9 @@ READERS: tuple[Reader, ...] = (
         suffixes=(".dxf",),
         holds=lambda data: data.startswith(b"AutoCAD Binary DXF") or b"\nSECTION" in data[:4096],
         module="stopgo.planner.floors.dxf",
-        takes=frozenset({"layers", "layer_map", "drawing", "region", "units"}),
+        takes=frozenset(
+            {"layers", "layer_map", "drawing", "region", "units", "heights", "scan_height", "robot_height"}
+        ),
     ),
     Reader(
         kind="robot map",
@@ -84,14 +86,6 @@ def standing_bodies(path: Path, options: FloorOptions | None = None) -> tuple[St
     return cast("BodiesModule", reader.what.load()).standing(file, options)
 
 
-def model_solids(path: Path, options: FloorOptions | None = None) -> ModelSolids | None:
-    """Return all that stops the laser on the floor that `read_floor` reads; None if it is no model."""
-    file, reader, options = _opened(path, options)
-    if not reader.ours or not reader.what.has_bodies:
-        return None
-    return cast("BodiesModule", reader.what.load()).laser(file, options)
-
-
 def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
     """Return the survey of a floor's file: its contents, and the floor that these options give.
 
@@ -111,6 +105,7 @@ def options_of(settings: Settings) -> FloorOptions:
     values = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
     columns = (entry.partition("=") for entry in values.pop("schedule_columns"))
     schedule = values.pop("schedule")
+    values["heights"] = heights_by_kind(settings.heights)
     values["layer_map"] = kinds_by_name(settings.layer_map or ())
     return FloorOptions(
         d_dis=settings.d_dis,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ezdxf import disassemble
 from ezdxf.document import Drawing
@@ -19,6 +20,7 @@ from stopgo.mission.floor import Finding
 from stopgo.planner.floors.drawing import BROKEN_INPUT, legible
 from stopgo.planner.floors.layer_names import LayerReading
 from stopgo.planner.floors.layers import IGNORE, ROLES, Layers
+from stopgo.planner.geometry.instance_cache import instance_cached
 
 _PREFIX = re.compile(r"^.*(\$\d+\$|\|)")
 _NOT_DRAWN = {"ATTDEF", "VIEWPORT", "SEQEND", "POINT", "WIPEOUT", "XLINE", "RAY"}
@@ -43,6 +45,8 @@ class Shape:
     global_id: str | None = None
     why: str = ""
     """Source of this role."""
+    memo: dict[str, Any] = field(default_factory=dict, repr=False)
+    """Curves of the entity once they were computed, whatever its role is."""
 
     @property
     def is_text(self) -> bool:
@@ -76,6 +80,20 @@ class _Placement:
     """Names of the blocks it is in, outermost first."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """An entity as the walk meets it, before its layer has a meaning."""
+
+    entity: DXFEntity
+    layer: str
+    """The layer's whole name."""
+    plain: str
+    """The name without the prefix of an external reference."""
+    placed: _Placement
+    hidden: bool
+    memo: dict[str, Any] = field(default_factory=dict)
+
+
 def shapes_of(
     drawing: Drawing, *, source: Path, layers: Layers | None = None
 ) -> tuple[list[Shape], list[Finding]]:
@@ -84,24 +102,43 @@ def shapes_of(
     Shapes of layers to ignore are left out.
 
     Content of a block on layer 0 lies on its insert's layer. A hidden layer counts only if its name is known.
+    The drawing is walked once, however many meanings its layers are tried with.
     """
-    try:
-        count = entities_with_copies(drawing)
-    except RecursionError:
-        raise InputError(f"{source}: blocks lie too deep in one another; explode or purge them") from None
-    if count > _MOST:
-        raise InputError(_too_many(source))
-    walk = _OutlineWalk(drawing, source=source, layers=layers or Layers())
-    shapes = list(walk.through(drawing.modelspace(), _Placement()))
-    return shapes, walk.findings()
+    walk = _walked(drawing, source)
+    meanings = _Meanings(layers or Layers())
+    shapes = [shape for met in walk.met if (shape := meanings.shape(met)) is not None]
+    return shapes, [*meanings.findings(), *walk.findings()]
 
 
 def ignored_in(drawing: Drawing, *, source: Path, layers: Layers) -> list[tuple[str, LayerReading, int]]:
     """Return each ignored layer with the source of that meaning, and its number of entities."""
-    walk = _OutlineWalk(drawing, source=source, layers=layers)
-    for _ in walk.through(drawing.modelspace(), _Placement()):
-        pass
-    return [(layer, reading, count) for (layer, reading), count in sorted(walk.left_out.items(), key=str)]
+    meanings = _Meanings(layers)
+    for met in _walked(drawing, source).met:
+        meanings.shape(met)
+    return [(layer, reading, count) for (layer, reading), count in sorted(meanings.left_out.items(), key=str)]
+
+
+def _walked(drawing: Drawing, source: Path) -> _OutlineWalk:
+    try:
+        return _walk_of(drawing)
+    except _TooMany:
+        raise InputError(
+            f"{source}: more than {_MOST} entities; export one floor without furniture"
+        ) from None
+    except RecursionError:
+        raise InputError(f"{source}: blocks lie too deep in one another; explode or purge them") from None
+
+
+class _TooMany(Exception):
+    """A drawing has more entities than a floor."""
+
+
+@instance_cached
+def _walk_of(drawing: Drawing) -> _OutlineWalk:
+    """The one pass over a drawing."""
+    if entities_with_copies(drawing) > _MOST:
+        raise _TooMany
+    return _OutlineWalk(drawing)
 
 
 _BUILT = frozenset({*ROLES.values(), "openings"})
@@ -109,34 +146,28 @@ _BUILT = frozenset({*ROLES.values(), "openings"})
 
 
 class _OutlineWalk:
-    """One pass over a drawing, with its counts and anomalies."""
+    """One pass over a drawing, with its anomalies."""
 
-    def __init__(self, drawing: Drawing, *, source: Path, layers: Layers) -> None:
-        self._source = source
-        self._met = 0
+    def __init__(self, drawing: Drawing) -> None:
+        self._count = 0
         self._hidden = {layer.dxf.name.upper(): layer.is_frozen() for layer in _hidden_layers(drawing)}
-        self._layers = layers
-        self._given_uses: Counter[tuple[str, str]] = Counter()
-        self._used: Counter[str] = Counter()
+        self._plain: dict[str, str] = {}
         self._found: Counter[tuple[str, str]] = Counter()
-        self.left_out: Counter[tuple[str, LayerReading]] = Counter()
+        self.met: list[_Met] = list(self._through(drawing.modelspace(), _Placement()))
 
-    def through(self, entities: Iterable[DXFEntity], placed: _Placement) -> Iterator[Shape]:
+    def _through(self, entities: Iterable[DXFEntity], placed: _Placement) -> Iterator[_Met]:
         for entity in entities:
-            self._count()
+            self._count += 1
+            if self._count > _MOST:
+                raise _TooMany
             if entity.dxftype() in _NOT_DRAWN or _attribute(entity, "invisible", 0):
                 continue
             if isinstance(entity, Insert):
                 yield from self._insert(entity, placed)
             elif isinstance(entity, MLine):
-                yield from self.through(self._strands(entity), placed)
+                yield from self._through(self._strands(entity), placed)
             else:
-                yield from self._shape(entity, placed)
-
-    def _count(self) -> None:
-        self._met += 1
-        if self._met > _MOST:
-            raise InputError(_too_many(self._source))
+                yield self._met(entity, placed)
 
     def _strands(self, multiline: MLine) -> list[DXFEntity]:
         try:
@@ -145,7 +176,7 @@ class _OutlineWalk:
             self._found["bad_coordinates", f"an MLINE is skipped: {legible(str(error))}"] += 1
             return []
 
-    def _insert(self, insert: Insert, placed: _Placement) -> Iterator[Shape]:
+    def _insert(self, insert: Insert, placed: _Placement) -> Iterator[_Met]:
         name = legible(str(insert.dxf.get("name")))
         try:
             block, places = insert.block(), _places(insert, placed)
@@ -160,10 +191,10 @@ class _OutlineWalk:
         else:
             if clipped:
                 self._found["clipped_block", f"block {name} is clipped in the drawing and read whole"] += 1
-            yield from self.through(insert.attribs, placed)
+            yield from self._through(insert.attribs, placed)
             inside = self._inside(insert, placed, name=name)
             for matrix in places:
-                yield from self.through(block, replace(inside, matrix=matrix))
+                yield from self._through(block, replace(inside, matrix=matrix))
 
     def _inside(self, insert: Insert, placed: _Placement, *, name: str) -> _Placement:
         layer = _layer(insert, placed)
@@ -175,29 +206,56 @@ class _OutlineWalk:
             blocks=(*placed.blocks, name),
         )
 
-    def _shape(self, entity: DXFEntity, placed: _Placement) -> Iterator[Shape]:
+    def _met(self, entity: DXFEntity, placed: _Placement) -> _Met:
         layer = _layer(entity, placed)
-        plain = legible(_PREFIX.sub("", layer))
-        reading = self._reading(plain, placed.blocks)
-        if reading.role == IGNORE or plain.upper() == "DEFPOINTS":
-            self.left_out[plain, reading] += 1
-            return
-        if placed.frozen or layer.upper() in self._hidden:
+        if layer not in self._plain:
+            self._plain[layer] = legible(_PREFIX.sub("", layer))
+        hidden = placed.frozen or layer.upper() in self._hidden
+        return _Met(entity, layer, self._plain[layer], placed, hidden)
+
+    def findings(self) -> list[Finding]:
+        """Findings on blocks and multilines."""
+        return [Finding(code, text) for (code, text), count in self._found.items() for _ in range(count)]
+
+
+class _Meanings:
+    """Shapes of what was met, by the meanings of layers, with the counts of their uses."""
+
+    def __init__(self, layers: Layers) -> None:
+        self._layers = layers
+        self._readings: dict[tuple[str, tuple[str, ...]], LayerReading] = {}
+        self._given_uses: Counter[tuple[str, str]] = Counter()
+        self._used: Counter[str] = Counter()
+        self.left_out: Counter[tuple[str, LayerReading]] = Counter()
+
+    def shape(self, met: _Met) -> Shape | None:
+        """Return the shape; None if its layer is ignored."""
+        reading = self._reading(met.plain, met.placed.blocks)
+        if reading.role == IGNORE or met.plain.upper() == "DEFPOINTS":
+            self.left_out[met.plain, reading] += 1
+            return None
+        if met.hidden:
             if reading.role not in _BUILT:
-                self.left_out[plain, LayerReading(reading.role, "frozen or off")] += 1
-                return
-            self._used[layer] += 1
-        global_id = _global_id(entity) or placed.global_id
-        yield Shape(entity, plain, reading.role, placed.matrix, global_id, reading.why)
+                self.left_out[met.plain, LayerReading(reading.role, "frozen or off")] += 1
+                return None
+            self._used[met.layer] += 1
+        global_id = _global_id(met.entity) or met.placed.global_id
+        return Shape(
+            *(met.entity, met.plain, reading.role, met.placed.matrix, global_id, reading.why, met.memo)
+        )
 
     def _reading(self, layer: str, blocks: tuple[str, ...]) -> LayerReading:
         """Return the meaning of a layer, and count its use if the user gave it."""
-        reading = self._layers.reading(layer, blocks)
+        key = (layer, blocks)
+        if key not in self._readings:
+            self._readings[key] = self._layers.reading(layer, blocks)
+        reading = self._readings[key]
         if layer.upper() in self._layers.given:
             self._given_uses[layer, reading.role] += 1
         return reading
 
     def findings(self) -> list[Finding]:
+        """Findings on layers that the user named, and on hidden ones."""
         given = [
             Finding("layer_as_told", f"layer {layer} is taken for {role}, as given: {count} entities")
             for (layer, role), count in self._given_uses.items()
@@ -206,9 +264,7 @@ class _OutlineWalk:
             Finding("hidden_layer", f"layer {legible(layer)} is frozen or off; its {count} entities are used")
             for layer, count in self._used.items()
         ]
-        return [*given, *self._absent(), *hidden] + [
-            Finding(code, text) for (code, text), count in self._found.items() for _ in range(count)
-        ]
+        return [*given, *self._absent(), *hidden]
 
     def _absent(self) -> list[Finding]:
         """Findings on layers that the user named and the drawing does not have."""
@@ -217,10 +273,6 @@ class _OutlineWalk:
             Finding("no_such_layer", f"layer {legible(name)} is not in the drawing")
             for name in sorted(absent)
         ]
-
-
-def _too_many(source: Path) -> str:
-    return f"{source}: more than {_MOST} entities; export one floor without furniture"
 
 
 def entities_with_copies(drawing: Drawing) -> int:

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ezdxf.document import Drawing
 
@@ -23,6 +24,7 @@ from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
 from stopgo.planner.floors.linework import PATTERN, Derived, as_room_name, completed, derived
 from stopgo.planner.floors.parts import in_order, parts_of
+from stopgo.planner.floors.raised_floor import with_heights
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
 from stopgo.planner.floors.units.unit_lengths import METRES
@@ -33,8 +35,8 @@ from stopgo.planner.floors.wall_layers import (
     has_wall_layers,
     labelled,
     wall_layers,
-    with_layers,
 )
+from stopgo.planner.geometry.instance_cache import instance_cached
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
@@ -46,13 +48,24 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
         When the bytes are no complete DXF, when they show no floor, or several and none is chosen.
     """
     drawing, odd_file = open_drawing(file.data, source=file.path)
-    sheet, untold = _sheet(drawing, options, file.path)
-    floor = _floor_of(sheet, file.path, _source(file, options), untold)
+    return _read_sheet(file, options, *_sheet(drawing, options, file.path), odd_file)
+
+
+def _read_sheet(
+    file: FloorFile,
+    options: FloorOptions,
+    sheet: DxfSheet,
+    tried: WallLayers | None,
+    odd_file: Sequence[Finding],
+) -> FloorPlan:
+    """The floor of a drawing as interpreted, with the findings on its file."""
+    floor = _floor_of(sheet, file.path, _source(file, options), tried)
+    floor = with_heights(floor, options)
     return replace(floor, findings=in_order((*odd_file, *floor.findings)))
 
 
 def _sheet(drawing: Drawing, options: FloorOptions, path: Path) -> tuple[DxfSheet, WallLayers | None]:
-    """The drawing as interpreted; and layers that may hold its walls, where nothing shows it for certain."""
+    """The drawing as interpreted; and the layers tried as its walls, where no name shows any."""
 
     def derive(sheet: DxfSheet) -> Derived:
         return _derived(sheet, path)
@@ -62,7 +75,7 @@ def _sheet(drawing: Drawing, options: FloorOptions, path: Path) -> tuple[DxfShee
     found = wall_layers(drawing, options, derive, source=path)
     if found is None or not found.is_told:
         return _sheet_without_unit(drawing, options, path), found or WallLayers()
-    return _told_sheet(drawing, options, found, path), None
+    return _tried_sheet(found), found
 
 
 def _named_sheet(
@@ -78,15 +91,16 @@ def _named_sheet(
         except NothingEnclosed:
             found = wall_layers(drawing, options, derive, source=path, roles=NOT_ENCLOSING)
             if found is not None and found.is_told:
-                return _told_sheet(drawing, options, found, path), None
+                return _tried_sheet(found), found
         except InputError:
             pass  # the floor is derived again, and the message given there
     return sheet, None
 
 
-def _told_sheet(drawing: Drawing, options: FloorOptions, found: WallLayers, path: Path) -> DxfSheet:
-    sheet = labelled(sheet_of(drawing, with_layers(options, found), source=path))
-    return replace(sheet, findings=[found.finding, *sheet.findings])
+def _tried_sheet(found: WallLayers) -> DxfSheet:
+    """The sheet of the trial that found the walls."""
+    assert found.sheet is not None, "layers that show walls were tried"
+    return found.sheet
 
 
 def _sheet_without_unit(drawing: Drawing, options: FloorOptions, path: Path) -> DxfSheet:
@@ -104,7 +118,13 @@ ANY_UNIT = ("m", "cm", "mm")
 
 
 def _source(file: FloorFile, options: FloorOptions) -> FloorSource:
-    more = {"layer_map": dict(sorted(options.layer_map.items()))} if options.layer_map else {}
+    more: dict[str, Any] = {}
+    if options.layer_map:
+        more["layer_map"] = dict(sorted(options.layer_map.items()))
+    if options.heights:
+        more["heights"] = {kind: list(span) for kind, span in sorted(options.heights.items())}
+        names = ("scan_height", "robot_height")
+        more |= {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     return file.source(drawing=options.drawing, region=options.region, units=options.units, options=more)
 
 
@@ -114,11 +134,9 @@ def floor_in(drawing: Drawing, *, source: Path, digest: str, d_dis: float) -> Fl
     return _floor_of(sheet, source, FloorSource(source.name, digest))
 
 
-def _floor_of(
-    sheet: DxfSheet, path: Path, source: FloorSource, untold: WallLayers | None = None
-) -> FloorPlan:
-    if untold is not None:
-        raise InputError(f"{path}: {_no_walls(sheet, untold)}")
+def _floor_of(sheet: DxfSheet, path: Path, source: FloorSource, tried: WallLayers | None = None) -> FloorPlan:
+    if tried is not None and not tried.is_told:
+        raise InputError(f"{path}: {_no_walls(sheet, tried)}")
     made = _derived(sheet, path)
     parts = parts_of(
         made.strokes,
@@ -136,8 +154,12 @@ def _floor_of(
         openings=parts.openings,
         elements=parts.elements,
         ignored=parts.ignored,
-        findings=in_order((*sheet.findings, *made.findings, *parts.findings)),
+        findings=in_order((*_tried_findings(tried), *sheet.findings, *made.findings, *parts.findings)),
     )
+
+
+def _tried_findings(tried: WallLayers | None) -> list[Finding]:
+    return [] if tried is None else [tried.finding]
 
 
 def _derived(sheet: DxfSheet, path: Path) -> Derived:
@@ -161,7 +183,7 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
             f"{path}: the walls are {size:.4g} m across, read in {_unit_name(sheet)}; "
             "say the drawing's unit with --units, or the part that is meant with --region"
         )
-    made = derived(sheet.strokes, sheet.words)
+    made = _line_work(sheet)
     if made.cells >= PATTERN:
         raise InputError(
             f"{path}: what was taken for walls encloses {made.cells} cells smaller than a room: that is a "
@@ -174,6 +196,12 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
             "close the walls, or say which layer holds more of them (--layer NAME=walls)"
         )
     return made
+
+
+@instance_cached
+def _line_work(sheet: DxfSheet) -> Derived:
+    """Walls, doors, rooms and floor derived from a sheet's line work, once for trial and floor."""
+    return derived(sheet.strokes, sheet.words)
 
 
 class NothingEnclosed(InputError):
@@ -191,20 +219,20 @@ LARGEST_FLOOR = 2000.0
 """Greatest length of a storey, in metres."""
 
 
-def _no_walls(sheet: DxfSheet, untold: WallLayers | None = None) -> str:
+def _no_walls(sheet: DxfSheet, tried: WallLayers | None = None) -> str:
     """Message for a drawing without any known layer, with the remedy."""
     layers = sorted({shape.layer for shape in sheet.shapes}, key=str.casefold)
     why = (
         f"no closed outline on layer FLOOR, and no layer that shows walls; layers present: {_listed(layers)}"
     )
-    if untold is None or not untold.layers:
+    if tried is None or not tried.layers:
         return f"{why}; say which one holds the walls, such as {layer_option('NAME', 'walls')}"
-    if untold.refusal:
-        return f"{why}; say which one holds the walls (with {untold.option}: {untold.refusal})"
-    seen = f" ({'; '.join(untold.evidence)})" if untold.evidence else ""
+    if tried.refusal:
+        return f"{why}; say which one holds the walls (with {tried.option}: {tried.refusal})"
+    seen = f" ({'; '.join(tried.evidence)})" if tried.evidence else ""
     return (
-        f"{why}; the lines on {_listed(untold.layers)} enclose {untold.area:.4g} m²{seen}, which is not "
-        f"enough to show that they are walls; {untold.option} accepts them"
+        f"{why}; the lines on {_listed(tried.layers)} enclose {tried.area:.4g} m²{seen}, which is not "
+        f"enough to show that they are walls; {tried.option} accepts them"
     )
 
 
@@ -227,10 +255,10 @@ def metres_in(drawing: Drawing, *, source: Path, options: FloorOptions | None = 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:
     """Return the survey of a DXF: drawings, meanings of layers, elements inferred and left out."""
-    drawing, _ = open_drawing(file.data, source=file.path)
-    sheet, _ = _sheet(drawing, options, file.path)
+    drawing, odd_file = open_drawing(file.data, source=file.path)
+    sheet, tried = _sheet(drawing, options, file.path)
     try:
-        floor, refusal = read(file, options), None
+        floor, refusal = _read_sheet(file, options, sheet, tried, odd_file), None
     except InputError as error:
         floor, refusal = None, str(error)
     return Survey(

@@ -16,10 +16,11 @@ from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
 from stopgo.planner.floors.drawn_shapes import Shape, shapes_of
-from stopgo.planner.floors.layers import Layers, is_layered, missing_in
+from stopgo.planner.floors.layers import BY_GEOMETRY, Layers, is_layered, missing_in
 from stopgo.planner.floors.reader import FloorOptions
 from stopgo.planner.floors.strokes import Stroke, Word, strokes_of
 from stopgo.planner.floors.units import unit_of
+from stopgo.planner.geometry.instance_cache import instance_cached
 
 _MARGIN = 1.0
 """A stroke this near to a drawing, in metres, belongs to it."""
@@ -85,12 +86,29 @@ def layers_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> Layer
     InputError
         When nothing is drawn in the model space, or far too much.
     """
-    shapes, odd = shapes_of(drawing, source=source, layers=Layers(options.layers))
+    meanings = (options.layers, options.layer_map, options.found_layers)
+    key = tuple(tuple(sorted(names.items())) for names in meanings)
+    known = _last_seen(drawing)
+    if key not in known:
+        known.clear()
+        known[key] = _layers_seen(drawing, options, source)
+    return known[key]
+
+
+@instance_cached
+def _last_seen(drawing: Drawing) -> dict[tuple, LayersSeen]:
+    """The shapes by the meanings of layers that were asked for last."""
+    return {}
+
+
+def _layers_seen(drawing: Drawing, options: FloorOptions, source: Path) -> LayersSeen:
+    layers = Layers(options.layers, found=options.found_layers)
+    shapes, odd = shapes_of(drawing, source=source, layers=layers)
     _check_model_space(drawing, source)
     own = frozenset(shape.role for shape in shapes if not shape.is_text)
     layered = is_layered(own)
     by_name = frozenset[str]() if layered else missing_in(own)
-    layers = Layers(options.layers, options.layer_map, by_name)
+    layers = Layers(options.layers, options.layer_map, options.found_layers, by_name)
     if by_name or options.layer_map:
         shapes, odd = shapes_of(drawing, source=source, layers=layers)
         odd = [*odd, *_by_name(shapes)]
@@ -139,7 +157,7 @@ def _by_name(shapes: Sequence[Shape]) -> list[Finding]:
             "layer_by_name", f"layer {layer} is taken for {role}: {why} ({layer_option(layer)} corrects it)"
         )
         for layer, role, why in sorted(taken)
-        if why not in ("its name", "as given", "by the map")
+        if why not in ("its name", "as given", "by the map", BY_GEOMETRY)
     ]
 
 

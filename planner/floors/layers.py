@@ -18,6 +18,8 @@ ROLES: dict[str, str] = {
 }
 """Role of the shapes on each layer with one of stopgo's own names."""
 IGNORE = "ignore"
+BY_GEOMETRY = "by the line work: no name shows it"
+"""Source of a meaning that trials of the layers found."""
 OTHER = LayerReading("other", "no known name")
 NEEDED = ("floor", "rooms", "walls")
 """Roles that a layered drawing needs, in addition to doors or passages."""
@@ -33,6 +35,8 @@ class Layers:
     """Given by options of the command."""
     mapped: Mapping[str, str] = field(default_factory=lambda: _NONE)
     """Given by a file that a person may have corrected."""
+    found: Mapping[str, str] = field(default_factory=lambda: _NONE)
+    """Found by the line work."""
     by_name: frozenset[str] = frozenset()
     """Roles for which other names than stopgo's own are read."""
 
@@ -43,6 +47,8 @@ class Layers:
             return LayerReading(self.given[name], "as given")
         if name in self.mapped:
             return LayerReading(self.mapped[name], "by the map")
+        if name in self.found:
+            return LayerReading(self.found[name], BY_GEOMETRY)
         if name in ROLES:
             return LayerReading(ROLES[name], "its name")
         if not self.by_name:

@@ -13,7 +13,6 @@ from typing import Any, Literal, Protocol, cast
 
 from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.planner.floors.standing_body import StandingBody
 from stopgo.planner.floors.survey import Survey
 
@@ -45,6 +44,8 @@ class FloorOptions:
     """Meanings of layers with other names: names in capitals, kinds as in LAYER_ROLES."""
     layer_map: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """The same, from a file that `stopgo floors --write-map` wrote."""
+    found_layers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    """The same, as the reader itself found them by the line work; no user gives it."""
     drawing: int | None = None
     """Number of the drawing, of several in one model space, from 1."""
     region: tuple[float, float, float, float] | None = None
@@ -67,6 +68,8 @@ class FloorOptions:
     """CSV of GlobalIds with the start and finish of their tasks."""
     schedule_columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """Name of the CSV column for each of guid, task, start, finish."""
+    heights: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+    """Lower and upper height in metres above the floor by kind of element of a drawing."""
     furniture: Literal["obstacle", "ignore"] | None = None
     """Treatment of a model's furniture, fixtures and equipment."""
     in_progress: Literal["obstacle", "target"] | None = None
@@ -100,9 +103,6 @@ class BodiesModule(Protocol):
 
     def standing(self, file: FloorFile, options: FloorOptions) -> tuple[StandingBody, ...]:
         """Return the bodies in the robot's height on the floor that the options choose."""
-
-    def laser(self, file: FloorFile, options: FloorOptions) -> ModelSolids:
-        """Return all that stops the laser on the floor that the options choose."""
 
 
 @dataclass(frozen=True)

@@ -58,11 +58,17 @@ def sketch(shapes: Iterable[Shape]) -> list[FloatArray]:
     """Coarse points (n, 2) of each shape in drawing units, enough to measure its size."""
     sketches: list[FloatArray] = []
     for shape in shapes:
-        try:
-            sketches += [points for points, _ in _placed(shape, _COARSE)]
-        except BROKEN_INPUT:
-            continue  # strokes_of meets it again and reports it
+        if "sketch" not in shape.memo:
+            shape.memo["sketch"] = _sketch(shape)
+        sketches += shape.memo["sketch"]
     return sketches
+
+
+def _sketch(shape: Shape) -> list[FloatArray]:
+    try:
+        return [points for points, _ in _placed_curves(shape, _COARSE)]
+    except BROKEN_INPUT:
+        return []  # strokes_of meets it again and reports it
 
 
 def strokes_of(
@@ -140,7 +146,19 @@ def _width(shape: Shape, *, scale: float) -> list[Finding]:
 
 
 def _placed(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:
-    """Each curve with its points (n, 2) in the world, in drawing units."""
+    """Each curve with its points (n, 2) in the world, in drawing units; trials of layers compute it once."""
+    known = shape.memo.get("placed")
+    if known is None or (known[0] != fineness and shape.kind not in _STRAIGHT):
+        known = shape.memo["placed"] = (fineness, _placed_curves(shape, fineness))
+    placed: list[tuple[FloatArray, Curve]] = known[1]
+    return placed
+
+
+_STRAIGHT = ("LINE", "SOLID", "3DFACE")
+"""Kinds of entity whose points do not depend on the fineness of curves."""
+
+
+def _placed_curves(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:
     # Numbers too large to calculate with are damage too, and reported as such.
     with np.errstate(over="raise", invalid="raise", divide="raise"):
         placed = [(_flat(curve.points, shape.matrix), curve) for curve in curves_of(shape.entity, fineness)]

@@ -26,6 +26,7 @@ from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.dxf_sheet import DxfSheet, layers_of, sheet_of
 from stopgo.planner.floors.linework import Derived
 from stopgo.planner.floors.reader import FloorOptions
+from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.strokes import Word, sketch
 from stopgo.planner.floors.units.unit_evidence import area_in
 
@@ -48,6 +49,8 @@ _ROUNDED = 0.3
 """… or by less than this many m²."""
 _LIKE_FLOOR = 0.9
 """Floors are the same if the smaller one has this fraction of the larger one."""
+_ROWS = 0.95
+"""Rooms that all have the same area, up to this fraction, are rows of a table."""
 _FLOOR_M2 = (5.0, 50_000.0)
 _WIDEST_GAP = 1.6
 """Outer walls with a wider gap, in metres, may be those of several drawings."""
@@ -81,6 +84,8 @@ class WallLayers:
     area: float = 0.0
     refusal: str = ""
     """Reason why these layers give no floor."""
+    sheet: DxfSheet | None = None
+    """The drawing as read in the trial, if it gives a floor."""
 
     @property
     def is_told(self) -> bool:
@@ -92,7 +97,7 @@ class WallLayers:
         return " ".join(layer_option(name, "walls") for name in self.layers)
 
     @property
-    def given(self) -> Mapping[str, str]:
+    def walls(self) -> Mapping[str, str]:
         return MappingProxyType({name.upper(): "walls" for name in self.layers})
 
     @property
@@ -127,8 +132,8 @@ def wall_layers(
 
 
 def with_layers(options: FloorOptions, found: WallLayers) -> FloorOptions:
-    """Return the options as if the user had given the layers."""
-    return replace(options, layers={**options.layers, **found.given})
+    """Return the options with the layers that were found."""
+    return replace(options, found_layers=found.walls)
 
 
 def labelled(sheet: DxfSheet) -> DxfSheet:
@@ -179,30 +184,33 @@ def _trial(
     area = sum(room.area for room in made.shown.rooms)
     if not _FLOOR_M2[0] <= area <= _FLOOR_M2[1]:
         return replace(found, refusal=f"the walls on {', '.join(names)} enclose {area:.3g} m²", area=area)
-    return replace(_weighed(found, made, sheet.words), area=area)
+    return replace(_weighed(found, made, sheet.words), area=area, sheet=sheet)
 
 
 def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLayers:
     """The layers with the evidence that their lines are walls."""
     shown, told = made.shown, []
-    true, false, named = _labels(shown.rooms, words)
-    if true and true >= false:
-        told.append((2, f"{_number(true, 'written area')} {'are' if true > 1 else 'is'} true of the rooms"))
+    seen = _labels(shown.rooms, words)
+    if seen.true and not seen.contradict:
+        are = "are" if seen.true > 1 else "is"
+        told.append((2, f"{_number(seen.true, 'written area')} {are} true of the rooms"))
     if shown.doors:
         told.append((2 if shown.doors >= _MANY else 1, f"{_number(shown.doors, 'door swing')} in gaps"))
     if shown.double >= _DOUBLE:
         told.append((1, f"{shown.double:.0%} of the lines are walls of two lines"))
-    if named > 1:
-        told.append((1, f"{named} rooms have a name in them"))
+    if seen.known >= _MANY and shown.doors + shown.passages:
+        told.append((2, f"{seen.known} rooms have the name of a room in them"))
+    elif seen.named > 1:
+        told.append((1, f"{seen.named} rooms have a name in them"))
     if shown.passages > 1 and shown.double >= _DOUBLE and shown.component >= _CONNECTED:
         told.append((1, f"{shown.passages} passages lie between facing ends of walls"))
     weight = sum(item for item, _ in told)
-    is_doubted = false > true or _is_no_storey(made, words)
+    is_doubted = seen.contradict or _is_no_storey(made, words)
     return replace(
         found,
         weight=min(weight, ENOUGH - 1) if is_doubted else weight,
         evidence=tuple(text for _, text in told),
-        count=true + named + shown.doors + shown.passages,
+        count=seen.true + seen.named + shown.doors + shown.passages,
     )
 
 
@@ -218,22 +226,42 @@ def _number(count: int, thing: str) -> str:
     return f"{count} {thing}{'s' if count > 1 else ''}"
 
 
-def _labels(rooms: Sequence[shapely.Polygon], words: Sequence[Word]) -> tuple[int, int, int]:
-    """Numbers of written areas that are true and false of their rooms, and of rooms with a name."""
+@dataclass(frozen=True)
+class _Labels:
+    """Numbers of rooms by the texts in them."""
+
+    true: int
+    """Rooms with a written area that is true of them."""
+    named: int
+    """Rooms with a name."""
+    known: int
+    """Rooms whose name is a room's, such as kitchen."""
+    contradict: bool
+    """True if most of the written area is false of its rooms."""
+
+
+def _labels(rooms: Sequence[shapely.Polygon], words: Sequence[Word]) -> _Labels:
+    """Numbers of rooms by what texts in them say."""
     tree = shapely.STRtree(list(rooms))
     areas: dict[int, list[float]] = {}
-    named: set[int] = set()
+    texts: dict[int, list[str]] = {}
     for word in words:
         if word.role == "names" and word.at:
-            inside = tree.query(shapely.Point(word.at[0]), predicate="within").tolist()
-            area = area_in(word.text)
-            for room in inside[:1]:
-                if area is not None:
+            for room in tree.query(shapely.Point(word.at[0]), predicate="within").tolist()[:1]:
+                texts.setdefault(room, []).append(word.text)
+                if (area := area_in(word.text)) is not None:
                     areas.setdefault(room, []).append(area)
-                if _NAME.search(word.text):
-                    named.add(room)
-    true = sum(any(_is_true(area, rooms[room].area) for area in said) for room, said in areas.items())
-    return true, len(areas) - true, len(named)
+    true = [room for room, said in areas.items() if any(_is_true(one, rooms[room].area) for one in said)]
+    false = sum(max(said) for room, said in areas.items() if room not in true)
+    known = [room for room, said in texts.items() if any(map(names_a_room, said))]
+    sizes = [rooms[room].area for room in known]
+    is_table = bool(sizes) and min(sizes) > _ROWS * max(sizes)
+    return _Labels(
+        true=len(true),
+        named=sum(any(map(_NAME.search, said)) for said in texts.values()),
+        known=0 if is_table else len(known),
+        contradict=false > sum(rooms[room].area for room in true),
+    )
 
 
 def _is_true(said: float, area: float) -> bool:

@@ -22,7 +22,6 @@ from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.floor import Element, FloorPlan
-from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Route, Selection, Visibility
@@ -30,7 +29,7 @@ from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.covering_tour import least_time_route
-from stopgo.planner.floors import model_solids, options_of, read_floor
+from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing import route
 from stopgo.planner.routing.assemble import assemble
@@ -53,13 +52,6 @@ class PlannedFloor:
     floor: FloorPlan
     settings: Settings
     mission: Mission
-    path: Path | None = None
-    """Its file, if it was read from one."""
-
-    @cached_property
-    def model_solids(self) -> ModelSolids | None:
-        """All that stops the laser, if the floor is a storey of a building model."""
-        return None if self.path is None else model_solids(self.path, options_of(self.settings))
 
     @cached_property
     def space(self) -> NavigableSpace:
@@ -94,7 +86,7 @@ def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
     """
     must_be_own_floor(path, mission)
     settings = recorded_settings(mission.origin.parameters)
-    return PlannedFloor(read_floor(path, options_of(settings)), settings, mission, path)
+    return PlannedFloor(read_floor(path, options_of(settings)), settings, mission)
 
 
 def as_driven(planned: PlannedFloor, poses: ScanPoses) -> AsDriven:

@@ -77,9 +77,10 @@ def _model(planned: PlannedFloor, floor: Path, simulation: Simulation) -> ModelS
     """The model's solids, if rays are to be cast at these."""
     if simulation.solids != "model":
         return None
-    model = planned.model_solids
+    model = planned.floor.solids
     if model is None:
-        raise InputError(f"{floor}: is no building model and has no solids; leave --solids model out")
+        way_out = "leave --solids model out, or plan a drawing with its --heights"
+        raise InputError(f"{floor}: has no solids; {way_out}")
     return model
 
 

@@ -17,6 +17,7 @@ from stopgo.planner.visibility.bresenham import bresenham
 from stopgo.planner.visibility.exact_sight import exact
 from stopgo.planner.visibility.headings import with_headings
 from stopgo.planner.visibility.limited import within_limits
+from stopgo.planner.visibility.solid_rays import clear_of_solids
 
 VisibilityMethod = Callable[[Candidates], Visibility]
 METHODS: dict[str, VisibilityMethod] = {"exact": exact, "bresenham": bresenham}
@@ -25,12 +26,13 @@ METHODS: dict[str, VisibilityMethod] = {"exact": exact, "bresenham": bresenham}
 def visibility(candidates: Candidates) -> Visibility:
     """The units that the kept candidates see, by the method of the settings.
 
-    Units outside the settings' limits on views count as not seen, with any method. With a field of
-    view below 360° the candidates of the result are positions with headings.
+    Units outside the settings' limits on views count as not seen, with any method. So do units that no ray
+    reaches past the floor's solids, where these are known. With a field of view below 360° the candidates
+    of the result are positions with headings.
     """
     settings = candidates.settings
     method = variant("visibility", settings.visibility, METHODS)
-    found = _checked(method, method.called(candidates), candidates)
+    found = clear_of_solids(_checked(method, method.called(candidates), candidates))
     if not len(found.first):
         raise NegativeResult(
             f"{candidates.floor.name}: no target is visible within {settings.range:g} m of a "

@@ -40,7 +40,8 @@ def with_headings(seen: Visibility) -> Visibility:
     turned = _turned(candidates, [[heading for heading, _ in view] for view in views])
     units = (units for view in views for _, units in view)
     name = f"{seen.method}, field of view {candidates.settings.fov:g}°"
-    return replace(visibility_of(turned, units, method=name), in_sight=seen.in_sight)
+    found = visibility_of(turned, units, method=name)
+    return replace(found, in_sight=seen.in_sight, hidden_m=seen.hidden_m)
 
 
 def headings_of(candidates: Candidates, *, fov: float) -> FloatArray:

@@ -40,6 +40,8 @@ def floor_parts(floor: FloorPlan, bodies: Sequence[object]) -> ContentParts:
     parts[TARGETS] = str(sum(item.target and item.to_scan for item in floor.elements))
     parts["bodies"] = digest(tuple(bodies))
     rest = (floor.name, floor.source.chosen, floor.level, floor.georeference, floor.findings, floor.status)
+    if floor.solids is not None:
+        parts["solids"] = digest((floor.solids.triangles, floor.solids.ceiling, floor.solids.source))
     parts["other content"] = digest((rest, floor.on_robots_map, floor.ceiling_m, floor.ignored))
     return parts
 

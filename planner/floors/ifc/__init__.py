@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import bounds
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.ifc.class_kinds import IGNORED, with_given_kinds
@@ -42,27 +41,17 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
     model = with_given_kinds(load(file), options, file.path)
     levels = with_uses(levels_of(model), model)
     level = chosen_level(levels, model=model, storey=options.storey, z=options.level, path=file.path)
-    return floor_on(level, model, file, options)
+    there, _, _ = as_on_day(model, level, options)
+    return replace(floor_on(level, model, file, options), solids=laser_solids(level, there))
 
 
 def standing(file: FloorFile, options: FloorOptions) -> tuple[StandingBody, ...]:
     """Return the bodies of the model that reach into the robot's height on the storey that `read` reads."""
-    level, there = _chosen(file, options)
-    return tuple(standing_on(level, there, heights_of(options)))
-
-
-def laser(file: FloorFile, options: FloorOptions) -> ModelSolids:
-    """Return all of the model that stops the laser on the storey that `read` reads."""
-    return laser_solids(*_chosen(file, options))
-
-
-def _chosen(file: FloorFile, options: FloorOptions) -> tuple[Level, Model]:
-    """The level that the options choose, and the model as it stands on their day."""
     model = with_given_kinds(load(file), options, file.path)
     levels = with_uses(levels_of(model), model)
     level = chosen_level(levels, model=model, storey=options.storey, z=options.level, path=file.path)
     there, _, _ = as_on_day(model, level, options)
-    return level, there
+    return tuple(standing_on(level, there, heights_of(options)))
 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:

@@ -13,12 +13,16 @@ LEAF = (0.5, 1.6)
 """Width of a door's leaf in metres."""
 _SWEEP = (np.radians(28), np.radians(135))
 """Swing angle of a drawn leaf: usually a quarter turn, less in narrow rooms, sometimes a little more."""
+_AJAR = np.radians(8)
+"""Least swing angle of a door drawn ajar, where a leaf runs from the hinge to the arc's end."""
 _FLAT = np.radians(0.3)
 """A polyline that turns less than this at a point is straight there."""
 _FACET = np.radians(31)
 """A facet of a swing turns by no more than this."""
 _SLACK = 0.12
 """A leaf begins and ends within this fraction of its width from the hinge and from the arc's end."""
+_EXACT = 0.03
+"""For a door that is drawn ajar the leaf begins at the hinge within this fraction of its width."""
 _ONWARD = np.cos(np.radians(8))
 _EVEN = 0.06
 """Facets of one arc differ in length and turn by no more than this share."""
@@ -37,6 +41,12 @@ class Swing:
     def radius(self) -> float:
         """The leaf's width."""
         return float(np.hypot(*(self.ends[0] - self.hinge)))
+
+    @property
+    def is_ajar(self) -> bool:
+        """True if the leaf is drawn nearly shut: the arc is too short to show a door by itself."""
+        chord = float(np.hypot(*(self.ends[1] - self.ends[0])))
+        return chord < 2 * self.radius * np.sin(_SWEEP[0] / 2)
 
 
 def swings_of(
@@ -73,7 +83,8 @@ def swings_with_lines(
     return [
         (line, swing)
         for line, swing in found
-        if round_.has_leaf(swing) or not (drawn_leaf or round_.goes_on(swing) or round_.is_double(swing))
+        if round_.has_leaf(swing)
+        or not (swing.is_ajar or drawn_leaf or round_.goes_on(swing) or round_.is_double(swing))
     ]
 
 
@@ -94,7 +105,8 @@ class _RoundLines:
     def has_leaf(self, swing: Swing) -> bool:
         """True if a straight line runs from the hinge to one of the ends."""
         near = _SLACK * swing.radius
-        from_hinge = self._ends[self._tree.query_ball_point(swing.hinge, near)]
+        at_hinge = _EXACT * swing.radius if swing.is_ajar else near
+        from_hinge = self._ends[self._tree.query_ball_point(swing.hinge, at_hinge)]
         return any(bool((np.hypot(*(from_hinge[:, 1] - end).T) <= near).any()) for end in swing.ends)
 
     def goes_on(self, swing: Swing) -> bool:
@@ -174,7 +186,7 @@ def _fitted(arc: FloatArray) -> Swing | None:
     radius = float(np.hypot(*(a - hinge)))
     sweep = float(np.hypot(*np.diff(arc, axis=0).T).sum()) / radius
     away = np.abs(np.hypot(*(arc - hinge).T) - radius).max()
-    if not _SWEEP[0] <= sweep <= _SWEEP[1] or away > 0.02 * radius:
+    if not _AJAR <= sweep <= _SWEEP[1] or away > 0.02 * radius:
         return None
     return Swing(hinge, np.array([a, c]))
 

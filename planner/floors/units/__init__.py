@@ -126,6 +126,8 @@ def _seen(evidence: UnitEvidence, factor: float) -> str:
         words.append(f"walls {evidence.thickness * factor:.2g} m thick")
     if evidence.text_height:
         words.append(f"texts {evidence.text_height * factor:.2g} m high")
+    if evidence.names_apart:
+        words.append(f"names of rooms {evidence.names_apart * factor:.2g} m apart")
     return ", ".join([*words, "its size"])
 
 

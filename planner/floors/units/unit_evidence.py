@@ -13,20 +13,27 @@ import numpy as np
 import shapely
 from ezdxf.document import Drawing
 from ezdxf.entities import DXFEntity
+from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.drawing import BROKEN_INPUT
 from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.linework.swings import swings_of
+from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.strokes import sketch, stretch_of, strokes_of, word_of
+from stopgo.planner.geometry.instance_cache import instance_cached
 
 _HOUSE = 30.0
 """Curves are cut as if the drawing had this size in metres."""
 _MOST = 3000
 """Walls' lines that are compared with one another: the longest."""
+_BLOCK = 64
+"""Lines that are compared with all others at a time."""
 _SLIM = 25.0
 """Walls' faces are nearer to each other than this fraction of the drawing; lines of rooms are not."""
 _ROOM_ROLES = ("rooms", "walls", "floor", "names", "other")
+_NAMES = 3
+"""Fewer names of rooms tell no usual distance."""
 _LINEAR = (0, 1, 6)
 """Types of dimensions that measure a length: linear, aligned, ordinate."""
 
@@ -68,6 +75,8 @@ class UnitEvidence:
     """Usual distance between the faces of a wall."""
     text_height: float | None = None
     dimensions: tuple[Dimension, ...] = ()
+    names_apart: float | None = None
+    """Usual distance from the name of a dwelling's room to the next such name."""
     areas: tuple[tuple[float, float], ...] = ()
     """Areas written in rooms in m², and the rooms' areas in square drawing units."""
 
@@ -86,11 +95,12 @@ def evidence_in(drawing: Drawing, shapes: Sequence[Shape], *, outlined: bool) ->
     return UnitEvidence(
         size=(float(size[0]), float(size[1])),
         bulk=_bulk(extent),
-        leaves=tuple(_leaves(shapes)),
+        leaves=tuple(_leaves(drawing, shapes)),
         across=tuple(_across(shapes)) if outlined else (),
         thickness=_thickness(shapes, _bulk(extent)),
         text_height=_text_height(written),
         dimensions=tuple(_dimensions(written)),
+        names_apart=_names_apart(written),
         areas=tuple(_areas(shapes, written)),
     )
 
@@ -129,20 +139,34 @@ def _across(shapes: Sequence[Shape]) -> Iterator[float]:
             yield width
 
 
-def _leaves(shapes: Sequence[Shape]) -> list[float]:
+def _leaves(drawing: Drawing, shapes: Sequence[Shape]) -> list[float]:
     """Radii of swings on layers of doors; elsewhere, of those whose leaf is drawn."""
+    known = _leaves_found(drawing)
     for roles, drawn_leaf in ((("doors", "openings"), False), (("walls", "other"), True)):
         own = [shape for shape in shapes if shape.role in roles and not (shape.is_text or shape.is_note)]
-        sketched = sketch(own)
-        size = _bulk(np.vstack(sketched)) if sketched else 0.0
-        if not size:
-            continue
-        scale = _HOUSE / size
-        strokes, _, _ = strokes_of(own, scale=scale, chord=1e9)
-        found = swings_of([stroke.points for stroke in strokes], width=(0.0, np.inf), drawn_leaf=drawn_leaf)
-        if found:
-            return [swing.radius / scale for swing in found]
+        key = (drawn_leaf, *(id(shape.memo) for shape in own))
+        if key not in known:
+            known[key] = _leaf_radii(own, drawn_leaf=drawn_leaf)
+        if known[key]:
+            return known[key]
     return []
+
+
+@instance_cached
+def _leaves_found(drawing: Drawing) -> dict[tuple[int, ...], list[float]]:
+    """Radii by the shapes that were searched: trials of layers search the same ones."""
+    return {}
+
+
+def _leaf_radii(own: Sequence[Shape], *, drawn_leaf: bool) -> list[float]:
+    sketched = sketch(own)
+    size = _bulk(np.vstack(sketched)) if sketched else 0.0
+    if not size:
+        return []
+    scale = _HOUSE / size
+    strokes, _, _ = strokes_of(own, scale=scale, chord=1e9)
+    found = swings_of([stroke.points for stroke in strokes], width=(0.0, np.inf), drawn_leaf=drawn_leaf)
+    return [swing.radius / scale for swing in found]
 
 
 def _thickness(shapes: Sequence[Shape], size: float) -> float | None:
@@ -157,7 +181,8 @@ def _thickness(shapes: Sequence[Shape], size: float) -> float | None:
     lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
     order = np.argsort(-lengths, kind="stable")[:_MOST]
     order = order[lengths[order] > size / 200]
-    apart = np.array([_next_parallel(segments[k], segments[order]) for k in order.tolist()])
+    blocks = np.array_split(segments[order], -(-len(order) // _BLOCK)) if len(order) else []
+    apart = np.concatenate([np.empty(0), *(_next_parallel(block, segments[order]) for block in blocks)])
     slim = apart < size / _SLIM
     if np.count_nonzero(slim) < 4 or lengths[order][slim].sum() < 0.5 * lengths[order].sum():
         return None
@@ -166,18 +191,23 @@ def _thickness(shapes: Sequence[Shape], size: float) -> float | None:
     return float(found[rank][np.searchsorted(np.cumsum(weight[rank]), weight.sum() / 2)])
 
 
-def _next_parallel(segment: FloatArray, others: FloatArray) -> float:
-    """Distance to the next line that runs beside at least half of a segment; infinite without one."""
-    a, along = segment[0], segment[1] - segment[0]
-    length = float(np.hypot(*along))
+def _next_parallel(segments: FloatArray, others: FloatArray) -> FloatArray:
+    """Distance from each segment (n, 2, 2) to the next line that runs beside at least half of it.
+
+    Infinite where there is none.
+    """
+    along = segments[:, 1] - segments[:, 0]
+    length = np.hypot(*along.T)[:, None]
     along = along / length
-    out = np.array([-along[1], along[0]])
-    t, off = (others - a) @ along, (others - a) @ out
-    beside = np.minimum(t.max(axis=1), length) - np.maximum(t.min(axis=1), 0.0) >= length / 2
-    parallel = np.abs(off[:, 0] - off[:, 1]) <= 0.02 * length
-    away = np.abs(off.mean(axis=1))
-    chosen = away[beside & parallel & (away > 1e-4 * length)]
-    return float(chosen.min()) if len(chosen) else np.inf
+    out = np.column_stack([-along[:, 1], along[:, 0]])
+    ends = [others[:, k][None] - segments[:, None, 0] for k in (0, 1)]
+    t, u = (np.einsum("nmd,nd->nm", end, along) for end in ends)
+    off, gap = (np.einsum("nmd,nd->nm", end, out) for end in ends)
+    beside = np.minimum(np.maximum(t, u), length) - np.maximum(np.minimum(t, u), 0.0) >= length / 2
+    parallel = np.abs(off - gap) <= 0.02 * length
+    away = np.abs(off + gap) / 2
+    found: FloatArray = np.where(beside & parallel & (away > 1e-4 * length), away, np.inf).min(axis=1)
+    return found
 
 
 def _text_height(shapes: Sequence[Shape]) -> float | None:
@@ -193,6 +223,24 @@ def _heights(shape: Shape) -> Iterator[float]:
         return
     if np.isfinite(height) and height > 0:
         yield height
+
+
+def _names_apart(shapes: Iterable[Shape]) -> float | None:
+    """The median distance between names of dwellings' rooms; None for fewer than three."""
+    places = []
+    for shape in shapes:
+        if shape.is_text:
+            try:
+                word = word_of(shape, scale=1.0)
+            except BROKEN_INPUT:
+                continue
+            if word.at and names_a_room(word.text, at_home=True):
+                places.append(word.at[0])
+    points = np.unique(np.array(places).reshape(-1, 2), axis=0)
+    if len(points) < _NAMES:
+        return None
+    away, _ = cKDTree(points).query(points, k=2)
+    return float(np.median(away[:, 1]))
 
 
 def _dimensions(shapes: Iterable[Shape]) -> Iterator[Dimension]:

@@ -24,7 +24,17 @@ _ACROSS = (0.95, 0.3)
 _THICKNESS = (0.18, 0.5)
 _TEXT = (0.2, 0.8)
 _DIMENSION = (3.0, 1.3)
-_MISREAD = {"leaves": 0.04, "across": 0.03, "thickness": 0.08, "text": 0.2, "bare": 0.02, "said": 0.001}
+_NAMES = (3.5, 0.5)
+"""Kitchen, bath and bedrooms are this far apart, from name to name."""
+_MISREAD = {
+    "leaves": 0.04,
+    "across": 0.03,
+    "thickness": 0.08,
+    "text": 0.2,
+    "names": 0.05,
+    "bare": 0.02,
+    "said": 0.001,
+}
 """Least likelihoods: one misread measure in that many."""
 _MATCH = 0.03
 """Shown and measured lengths of one unit agree within this fraction."""
@@ -63,6 +73,7 @@ def _likelihood(evidence: UnitEvidence, factor: float) -> float:
             _measures(evidence.across, factor, _ACROSS, "across"),
             _measures(_one(evidence.thickness), factor, _THICKNESS, "thickness"),
             _measures(_one(evidence.text_height), factor, _TEXT, "text"),
+            _measures(_one(evidence.names_apart), factor, _NAMES, "names"),
             _dimensions(evidence.dimensions, factor),
             _areas(evidence.areas, factor),
         ]

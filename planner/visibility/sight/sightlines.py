@@ -22,6 +22,7 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.targets import face_segments
 from stopgo.planner.visibility.sight.well_seen import SeenSegments, well_seen
+from stopgo.planner.visibility.solid_rays import solid_rays
 
 SPLIT = 27
 LOW = (1 << SPLIT) - 1
@@ -62,6 +63,7 @@ class SightLines:
     """A floor's targets and occluders, prepared for the visibility from many positions."""
 
     def __init__(self, space: NavigableSpace) -> None:
+        self._space = space
         self._origin, targets = local_origin(space.floor), space.targets
         a, b = to_grid(targets.a - self._origin), to_grid(targets.b - self._origin)
         self._midpoints = Midpoints.of(a, b, targets.units, targets.occluding)
@@ -84,7 +86,13 @@ class SightLines:
         reach = round(self._reach / GRID)
         units = units[sees(position, self._midpoints.among(units), self._edges[edges], reach=reach)]
         origin = position if scanner is None else to_grid(scanner - self._origin)
-        return units if self._limits.none else units[self._well_seen(origin, self._midpoints.among(units))]
+        if not self._limits.none:
+            units = units[self._well_seen(origin, self._midpoints.among(units))]
+        rays = solid_rays(self._space)
+        if rays is None or not len(units):
+            return units
+        above = xy if scanner is None else scanner
+        return units[rays.clear(np.broadcast_to(above, (len(units), 2)), units)]
 
     def _well_seen(self, position: IntArray, midpoints: Midpoints) -> BoolArray:
         stretches = SeenSegments(midpoints.a - position, midpoints.b - position, midpoints.pieces // 2)

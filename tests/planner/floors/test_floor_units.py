@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ezdxf.layouts import Modelspace
-from floor_drawings import Read, codes, rectangle
+from floor_drawings import Read, codes, new_drawing, rectangle
 from unit_drawings import CODES, EVIDENCE, house, rescaled, verdict
 
 from stopgo.mission.errors import InputError
+from stopgo.planner.floors import read_floor
 from stopgo.planner.floors.linework.swings import swings_of
+from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.units.unit_evidence import area_in, length_in
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
@@ -172,3 +174,21 @@ def test_coordinates_far_away_keep_their_place(read: Read) -> None:
     plan = read(draw, floor=False)
     assert plan.outline[0].exterior[0].tolist() == [x, y]
     assert plan.elements[0].solids[0].area == pytest.approx(0.5, abs=1e-8)
+
+
+@pytest.mark.parametrize("apart", [33.0, 12.5])
+def test_a_header_that_puts_kitchen_and_bath_far_apart_is_not_believed(tmp_path: Path, apart: float) -> None:
+    drawing = new_drawing()
+    model = drawing.modelspace()
+    for k, name in enumerate(("Bedroom", "Kitchen", "Bathroom", "Bedroom 2")):
+        rectangle(model, "WALLS", k * apart, 0, (k + 1) * apart, apart * 1.2)
+        model.add_text(name, height=1.0).set_placement(((k + 0.4) * apart, apart / 2))
+    drawing.saveas(tmp_path / "plan.dxf")
+    with pytest.raises(InputError, match="the unit is not certain"):
+        read_floor(tmp_path / "plan.dxf")
+
+
+def test_names_of_rooms_are_whole_words_in_any_case() -> None:
+    assert names_a_room("KITCHEN 12 m2", at_home=True)
+    assert names_a_room("Büro 1.02") and not names_a_room("Büro 1.02", at_home=True)
+    assert not names_a_room("Badger") and not names_a_room("bedrock") and not names_a_room("")

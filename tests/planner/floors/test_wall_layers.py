@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from pathlib import Path
@@ -12,7 +13,7 @@ from floor_drawings import new_drawing, rectangle
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.planner.floors import FloorOptions, read_floor, survey_floor
+from stopgo.planner.floors import FloorOptions, drawn_shapes, read_floor, survey_floor
 
 
 def text(model: Modelspace, words: str, x: float, y: float, layer: str = "0") -> None:
@@ -175,3 +176,68 @@ def test_areas_in_rings_of_different_numbers_of_points_are_compared(tmp_path: Pa
         text(model, "30 m²", 1, 1)
 
     assert read([rings], tmp_path).area == pytest.approx(54, abs=0.2)
+
+
+def test_rooms_with_rooms_names_and_a_door_are_walls_though_written_as_one_line(tmp_path: Path) -> None:
+    floor = read([three_rooms, three_names], tmp_path)
+    assert "3 rooms have the name of a room in them" in told(floor)[0]
+    assert {room.name for room in floor.rooms} == {"Kitchen", "Bad", "Salon"}
+
+
+def test_names_of_rooms_without_any_door_are_not_enough(tmp_path: Path) -> None:
+    closed = [cells, lambda model: rectangle(model, "0", 9, 0, 13, 6)]
+    labels = [lambda model, at=at, name=name: text(model, name, *at) for at, name in NAMED]
+    with pytest.raises(InputError, match="not enough to show that they are walls"):
+        read([*closed, *labels], tmp_path)
+
+
+NAMED = [((1.0, 1.0), "Kitchen"), ((6.0, 1.0), "Bad"), ((10.5, 1.0), "Salon")]
+
+
+def three_names(model: Modelspace) -> None:
+    for at, name in NAMED:
+        text(model, name, *at)
+
+
+def three_rooms(model: Modelspace) -> None:
+    """Three rooms of 5, 4 and 4.5 m between single lines; each wall has a door of 0.9 m, 15 degrees open."""
+    rectangle(model, "0", 0, 0, 13.5, 6)
+    for x in (5, 9):
+        model.add_line((x, 0), (x, 2))
+        model.add_line((x, 2.9), (x, 6))
+        ajar(model, x, 2)
+
+
+def ajar(model: Modelspace, x: float, y: float, radius: float = 0.9) -> None:
+    """A leaf from the hinge at x, y, 15 degrees off the wall upward, and its short arc."""
+    model.add_line((x, y), (x + radius * math.sin(math.radians(15)), y + radius * math.cos(math.radians(15))))
+    model.add_arc((x, y), radius, 75, 90)
+
+
+def test_a_door_drawn_ajar_is_a_door(tmp_path: Path) -> None:
+    floor = read([double_walls, lambda model: ajar(model, 4.2, 2)], tmp_path)
+    assert [item.kind for item in floor.openings] == ["door"]
+    assert "1 door swing in gaps" in told(floor)[0]
+
+
+def test_a_short_arc_without_a_leaf_is_no_door(tmp_path: Path) -> None:
+    floor = read([double_walls, names, lambda model: model.add_arc((4.2, 2), 0.9, 75, 90)], tmp_path)
+    assert [item.kind for item in floor.openings] == ["passage"]
+
+
+def test_the_survey_says_that_layers_were_found_by_the_line_work(tmp_path: Path) -> None:
+    found = survey_floor(_saved([double_walls, swing], tmp_path))
+    assert [item.why for item in found.layers] == ["by the line work: no name shows it"]
+    given = survey_floor(_saved([double_walls, swing], tmp_path), FloorOptions(layers={"0": "walls"}))
+    assert [item.why for item in given.layers] == ["as given"]
+
+
+def test_a_drawing_is_walked_once_however_many_layers_are_tried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walks = []
+    walk = drawn_shapes._OutlineWalk
+    monkeypatch.setattr(drawn_shapes, "_OutlineWalk", lambda drawing: walks.append(1) or walk(drawing))
+    layers = [lambda model, name=name: rectangle(model, name, 0, 0, 8, 8) for name in ("P", "Q", "R")]
+    survey_floor(_saved([*layers, lambda model: double_walls(model, "K7")], tmp_path))
+    assert walks == [1]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stopgo.command_line import main
-from stopgo.planner.floors import FloorOptions, model_solids, read_floor
+from stopgo.planner.floors import FloorOptions, read_floor
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 
@@ -43,9 +43,9 @@ def test_a_low_board_before_a_wall_hides_its_foot(read: Read, tmp_path: Path) ->
 
 def test_a_hung_ceiling_hides_the_walls_above_it(read: Read, tmp_path: Path) -> None:
     read(two_rooms())
-    bare = planned(tmp_path / "house.ifc")
+    bare = planned(tmp_path / "house.ifc", "--coverage", "1")
     read(with_box(two_rooms(), "ceiling", (0, 0, 2.0, 20, 20, 2.05), "IfcCovering"))
-    hung = planned(tmp_path / "house.ifc")
+    hung = planned(tmp_path / "house.ifc", "--coverage", "1")
     assert hung["kinds"]["walls"]["total_m2"] == pytest.approx(bare["kinds"]["walls"]["total_m2"], rel=0.05)
     assert share(bare) - share(hung) > 0.15
 
@@ -71,7 +71,7 @@ def test_elements_have_the_heights_of_their_bodies(read: Read, tmp_path: Path) -
 
 def test_leaves_and_panes_stop_no_ray_of_a_model(read: Read, tmp_path: Path) -> None:
     read(two_rooms())
-    solids = model_solids(tmp_path / "house.ifc", FloorOptions(storey="EG"))
+    solids = read_floor(tmp_path / "house.ifc", FloorOptions(storey="EG")).solids
     assert solids is not None
     assert np.isfinite(solids.triangles).all()
     assert solids.triangles[..., 2].min() >= -3.0
@@ -83,7 +83,7 @@ def test_a_drawing_has_no_solids(tmp_path: Path) -> None:
     drawing = new_drawing()
     rectangle(drawing.modelspace(), "A-WALL", 0, 0, 6, 5)
     drawing.saveas(tmp_path / "plan.dxf")
-    assert model_solids(tmp_path / "plan.dxf", FloorOptions()) is None
+    assert read_floor(tmp_path / "plan.dxf").solids is None
 
 
 def test_a_proof_at_the_models_solids_agrees_with_the_plan(

@@ -1,0 +1,317 @@
+"""Rays past a floor's solids: which heights of a target a scanner sees, at its own height above the floor.
+
+A level ray at the scanner's height tells what stands in the way at that height alone. What stands below it
+or hangs above it hides a part of a target: furniture, lintels, ceilings, beams. Here the solids' surfaces
+are marked in columns of a grid; each column is a pattern of bits by height. A ray from the scanner to each
+height of a target is followed over the grid. Columns within what the plan knows as solid are left out: there
+the plan's own exact visibility has decided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from stopgo.mission.document.limits import scanner_height
+from stopgo.mission.floor import Element
+from stopgo.mission.floor.model_solids import ModelSolids
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.stages import NavigableSpace, Visibility
+from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.visibility.unit_ranges import ranges, visibility_of
+
+COLUMN_M = 0.05
+"""Side of a column; doubled for floors with more than MOST_COLUMNS."""
+MOST_COLUMNS = 20_000_000
+LEVELS = 64
+"""Heights of a column: the bits of its pattern."""
+SAMPLE_M = 0.03
+"""Distance of the points by which a surface is marked."""
+MOST_SAMPLES = 2_000_000
+"""Points marked at a time."""
+STEP_M = 0.04
+"""Steps along a ray."""
+AT_TARGET_M = 0.08
+"""Columns this near to a target's line are the target's own."""
+GRAZING = 0.05
+"""Sine of the flattest ray on a target that is told from a flatter one."""
+CELL_M = 0.1
+"""Height of the cells in which a target's area is counted."""
+ON_FACE_M = 0.02
+"""A face this near to a unit is the unit's own."""
+SOLID_M = 0.04
+"""Columns within this of the plan's solids are theirs."""
+MOST_PAIRS = 200_000
+"""Rays to one height that are followed at a time."""
+ASIDE_M = 0.005
+"""Distance from a face at which its solid is looked for."""
+PLACES = 3
+"""Decimals in metres of a scanner's position, so that a mission's stop and its candidate are one position."""
+
+
+class SolidRays:
+    """A floor's solids, prepared for rays from many positions."""
+
+    def __init__(self, space: NavigableSpace, solids: ModelSolids) -> None:
+        self._columns = _MarkedColumns(solids, space)
+        self._height = scanner_height(space.settings)
+        self._targets = space.targets
+        self.cells = UnitCells.of(space, solids)
+        along = (space.targets.b - space.targets.a)[space.targets.unit_segment]
+        self._along = along / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+        self._outward = _outward(space, self._along)
+
+    def reached(self, xy: FloatArray, units: IntArray) -> BoolArray:
+        """True for the heights (n, k) of units (n,) that rays from above `xy`, (2,) or (n, 2), reach."""
+        return self._followed(xy, units, self.cells.z[units]) & self.cells.there[units]
+
+    def clear(self, xy: FloatArray, units: IntArray) -> BoolArray:
+        """True for units (n,) of which rays from scanners above `xy` (n, 2) reach any height."""
+        low, high = self.cells.low[units], self.cells.high[units]
+        nearest = np.clip(self._height, low + CELL_M / 2, np.maximum(high - CELL_M / 2, low + CELL_M / 2))
+        found = np.ones(len(units), dtype=bool)
+        for part in _parts(len(units), MOST_PAIRS):
+            found[part] = self._followed(xy[part], units[part], nearest[part, None])[:, 0]
+        rest = np.flatnonzero(~found)
+        for part in _parts(len(rest), MOST_PAIRS // max(1, self.cells.z.shape[1])):
+            found[rest[part]] = self.reached(xy[rest[part]], units[rest[part]]).any(axis=1)
+        return found
+
+    def _followed(self, xy: FloatArray, units: IntArray, z: FloatArray) -> BoolArray:
+        start = np.broadcast_to(np.round(xy, PLACES), (len(units), 2))
+        ends, outward = self._targets.unit_xy[units], self._outward[units]
+        before = np.einsum("nd,nd->n", start - ends, outward) > 0
+        two_sided = ~outward.any(axis=1)
+        clear = self._columns.reached(start, ends, self._along[units], z, self._height)
+        return clear & (before | two_sided)[:, None]
+
+
+def _outward(space: NavigableSpace, along: FloatArray) -> FloatArray:
+    """Directions (n, 2) that the faces of units look to, if they are one side of a solid; else 0, 0.
+
+    The plan itself knows the sides of what occludes; this is for beams and what is lower than the scanner.
+    """
+    targets = space.targets
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    element = targets.element[targets.unit_segment]
+    found = np.zeros_like(left)
+    for index in np.unique(element[~targets.occluding[targets.unit_segment]]).tolist():
+        solids = space.floor.elements[index].solids
+        own = np.flatnonzero(element == index)
+        if solids:
+            shape = shapely.union_all([shapely.Polygon(part.exterior, part.holes) for part in solids])
+            inside = [
+                shapely.contains_xy(shape, *(targets.unit_xy[own] + side * ASIDE_M * left[own]).T)
+                for side in (1.0, -1.0)
+            ]
+            found[own] = (inside[1].astype(float) - inside[0])[:, None] * left[own]
+    return found
+
+
+@instance_cached
+def solid_rays(space: NavigableSpace) -> SolidRays | None:
+    """Return the rays past the solids of a space's floor; None if its solids are not known."""
+    solids = space.floor.solids
+    return None if solids is None else SolidRays(space, solids)
+
+
+def clear_of_solids(visible: Visibility) -> Visibility:
+    """Return the visibility without targets that no ray reaches at any height, and with their length."""
+    rays = solid_rays(visible.space)
+    if rays is None:
+        return visible
+    row, _, first, last = visible.runs_apart
+    counts = last - first + 1
+    units, row = ranges(first, counts), np.repeat(row, counts)
+    candidates = visible.candidates
+    clear = rays.clear(candidates.xy[candidates.kept][row], units)
+    if clear.all():
+        return visible
+    ends = np.searchsorted(row[clear], np.arange(visible.rows + 1))
+    seen = np.split(units[clear], ends[1:-1])
+    found = visibility_of(candidates, seen, method=visible.method)
+    hidden = np.zeros(visible.targets.total, dtype=bool)
+    hidden[units] = True
+    hidden[units[clear]] = False
+    return replace(found, hidden_m=float(visible.targets.unit_length[hidden].sum()))
+
+
+def _parts(count: int, most: int) -> Iterator[IntArray]:
+    for start in range(0, count, max(1, most)):
+        yield np.arange(start, min(count, start + max(1, most)))
+
+
+@dataclass(frozen=True, eq=False)
+class UnitCells:
+    """Cells of the units: middle heights (n, k), which of them exist, and their height (n, k)."""
+
+    z: FloatArray
+    there: BoolArray
+    tall: FloatArray
+    low: FloatArray
+    """Lower height of each unit's element (n,)."""
+    high: FloatArray
+
+    @classmethod
+    def of(cls, space: NavigableSpace, solids: ModelSolids) -> UnitCells:
+        spans = np.array([_span(item, solids.ceiling) for item in space.floor.elements]).reshape(-1, 2)
+        low, high = spans[space.targets.element[space.targets.unit_segment]].T
+        rows = int(np.ceil((high - low).max(initial=CELL_M) / CELL_M - 1e-9))
+        bottom = low[:, None] + np.arange(rows) * CELL_M
+        top = np.minimum(bottom + CELL_M, high[:, None])
+        tall, z = np.maximum(top - bottom, 0.0), (bottom + top) / 2
+        return cls(z, (tall > 1e-9) & _on_faces(space, solids.triangles, z), tall, low, high)
+
+
+def _on_faces(space: NavigableSpace, triangles: FloatArray, z: FloatArray) -> BoolArray:
+    """True for heights (n, k) of the units at which the model has an upright face: no opening is there.
+
+    A unit without any upright face, as on a sloping wall, has all its heights.
+    """
+    upright = triangles[_is_upright(triangles)]
+    plan = shapely.linestrings(upright[:, [0, 1, 2], :2])
+    points = shapely.points(space.targets.unit_xy)
+    unit, face = shapely.STRtree(plan).query(points, predicate="dwithin", distance=ON_FACE_M)
+    found = np.zeros(z.shape, dtype=bool)
+    along = upright[face, :, :2] - space.targets.unit_xy[unit, None]
+    t = np.einsum("nkd,nd->nk", along, _direction(upright[face]))
+    low, high = _heights_at(t, upright[face, :, 2])
+    for k in range(z.shape[1]):
+        here = (z[unit, k] >= low - ON_FACE_M) & (z[unit, k] <= high + ON_FACE_M)
+        found[unit[here], k] = True
+    found[~np.isin(np.arange(len(z)), unit)] = True
+    return found
+
+
+def _is_upright(triangles: FloatArray) -> BoolArray:
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    found: BoolArray = (size > 1e-9) & (np.abs(normal[:, 2]) <= 0.05 * size)
+    return found
+
+
+def _direction(triangles: FloatArray) -> FloatArray:
+    """Direction in plan of upright triangles: along the longest of their sides (n, 2)."""
+    sides = np.roll(triangles, -1, axis=1)[..., :2] - triangles[..., :2]
+    lengths = np.hypot(sides[..., 0], sides[..., 1])
+    longest = np.argmax(lengths, axis=1)
+    rows = np.arange(len(triangles))
+    return sides[rows, longest] / np.maximum(lengths[rows, longest], 1e-9)[:, None]
+
+
+def _heights_at(t: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper height of upright triangles where `t`, given at their corners (n, 3), is 0."""
+    low, high = np.full(len(t), np.inf), np.full(len(t), -np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        span = t[:, b] - t[:, a]
+        level = np.abs(span) < 1e-9
+        fraction = np.clip(-t[:, a] / np.where(level, 1.0, span), 0.0, 1.0)
+        at = z[:, a] + fraction * (z[:, b] - z[:, a])
+        on = (
+            ~level
+            & (np.minimum(t[:, a], t[:, b]) <= ON_FACE_M)
+            & (np.maximum(t[:, a], t[:, b]) >= -ON_FACE_M)
+        )
+        low = np.where(on, np.minimum(low, at), low)
+        high = np.where(on, np.maximum(high, at), high)
+    return low, high
+
+
+def _span(item: Element, ceiling: float) -> tuple[float, float]:
+    """Lower and upper height of an element above the floor, up to the next floor."""
+    low, high = item.heights or (0.0, ceiling)
+    return max(low, 0.0), max(min(high, ceiling), low, 0.0)
+
+
+class _MarkedColumns:
+    """Marked surfaces of the model: a pattern of bits by height for each column of the grid."""
+
+    def __init__(self, solids: ModelSolids, space: NavigableSpace) -> None:
+        rings = np.concatenate([part.exterior for part in space.floor.outline])
+        self._low = rings.min(axis=0) - 1.0
+        size = rings.max(axis=0) + 1.0 - self._low
+        self._side = COLUMN_M
+        while (size / self._side).prod() > MOST_COLUMNS:
+            self._side *= 2
+        self._shape = tuple((np.ceil(size / self._side) + 1).astype(int).tolist())
+        self._tall = solids.ceiling / LEVELS
+        known = shapely.union_all(
+            [shapely.Polygon(part.exterior, part.holes).buffer(SOLID_M) for part in space.occluders]
+        )
+        shapely.prepare(known)
+        bits = np.zeros(self._shape[0] * self._shape[1], dtype=np.uint64)
+        triangles = self._within(solids.triangles)
+        rings = shapely.linestrings(triangles[:, [0, 1, 2, 0], :2])
+        for points in _samples(triangles[~shapely.covers(known, rings)]):
+            self._mark(bits, points)
+        self._bits = self._without_known(bits, known)
+
+    def _within(self, triangles: FloatArray) -> FloatArray:
+        """Triangles over the grid that lie between the floor and the next one."""
+        high = self._low + np.array(self._shape) * self._side
+        low_corner, high_corner = triangles.min(axis=1), triangles.max(axis=1)
+        near = (high_corner[:, :2] >= self._low).all(axis=1) & (low_corner[:, :2] <= high).all(axis=1)
+        top = LEVELS * self._tall
+        there = (high_corner[:, 2] > self._tall) & (low_corner[:, 2] < top - self._tall)
+        return triangles[near & there]
+
+    def _mark(self, bits: np.ndarray, points: FloatArray) -> None:
+        at = np.floor((points[:, :2] - self._low) / self._side).astype(np.int64)
+        level = np.floor(points[:, 2] / self._tall).astype(np.int64)
+        good = (at >= 0).all(axis=1) & (at < self._shape).all(axis=1) & (level >= 0) & (level < LEVELS)
+        cell = at[good, 0] * self._shape[1] + at[good, 1]
+        keys = np.unique(cell * LEVELS + level[good])
+        np.bitwise_or.at(bits, keys // LEVELS, np.uint64(1) << (keys % LEVELS).astype(np.uint64))
+
+    def _without_known(self, bits: np.ndarray, known: BaseGeometry) -> np.ndarray:
+        """The patterns without columns in what the plan knows as solid from floor to ceiling."""
+        marked = np.flatnonzero(bits)
+        xy = np.column_stack(np.divmod(marked, self._shape[1])) + 0.5
+        inside = shapely.contains_xy(known, *(xy * self._side + self._low).T)
+        bits[marked[inside]] = 0
+        return bits
+
+    def reached(
+        self, starts: FloatArray, ends: FloatArray, along: FloatArray, z: FloatArray, height: float
+    ) -> BoolArray:
+        """True for heights `z` (n, k) at `ends` (n, 2) that rays from scanners above `starts` (n, 2) reach.
+
+        `along` are the directions of the targets' lines (n, 2).
+        """
+        rays = ends - starts
+        away = np.hypot(*rays.T)
+        sine = np.abs(rays[:, 0] * along[:, 1] - rays[:, 1] * along[:, 0]) / np.maximum(away, 1e-9)
+        before = away - AT_TARGET_M / np.maximum(sine, GRAZING)
+        clear = np.ones(z.shape, dtype=bool)
+        for step in np.arange(STEP_M, float(before.max(initial=0.0)), STEP_M):
+            on = np.flatnonzero(before > step)
+            fraction = step / away[on]
+            at = np.floor((starts[on] + fraction[:, None] * rays[on] - self._low) / self._side).astype(
+                np.int64
+            )
+            at = np.clip(at, 0, np.array(self._shape) - 1)
+            pattern = self._bits[at[:, 0] * self._shape[1] + at[:, 1]]
+            met = np.flatnonzero(pattern)
+            if len(met):
+                rows = on[met]
+                level = np.floor((height + (z[rows] - height) * fraction[met, None]) / self._tall)
+                level = np.clip(level, 0, LEVELS - 1).astype(np.uint64)
+                clear[rows] &= (pattern[met, None] >> level) & np.uint64(1) == 0
+        return clear
+
+
+def _samples(triangles: FloatArray) -> Iterator[FloatArray]:
+    """Points (n, 3) on triangles, at most SAMPLE_M apart."""
+    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    count = np.maximum(1, np.ceil(longest / SAMPLE_M)).astype(np.int64)
+    for many in np.unique(count).tolist():
+        own = triangles[count == many]
+        i, j = np.triu_indices(many + 1)
+        weights = np.column_stack([i, j - i, many - j]) / many
+        for part in np.array_split(own, max(1, -(-len(own) * len(weights) // MOST_SAMPLES))):
+            if len(part):
+                yield np.einsum("wk,nkd->nwd", weights, part).reshape(-1, 3)
