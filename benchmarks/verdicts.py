@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks.table import put, table, versions
+from tests.recordings.truth.auto_logs import auto_answers
 from tests.recordings.truth.bench import answered, cases
 from tests.recordings.truth.own_runs import own_answers
 
@@ -18,7 +19,7 @@ OWN_SEEDS = range(1, 4)
 
 def main() -> None:
     """Judge every case and put the tables into the README."""
-    found = [*_logs(), *_own()]
+    found = [*_logs(), *_auto(), *_own()]
     text = "\n\n".join(
         (
             versions("numpy", "rosbags", "pymavlink", "pyulog"),
@@ -41,6 +42,15 @@ def _logs() -> Iterator[tuple[str, str, str]]:
         if answer.kind not in ("right", "open"):
             print(f"{answer.kind}: {case.name}: {answer.text[:200]}", file=sys.stderr, flush=True)
         yield case.writer.__name__, case.sense.__name__, answer.kind
+
+
+def _auto() -> Iterator[tuple[str, str, str]]:
+    """Yield the same of logs of an autopilot that drove our mission by itself."""
+    with TemporaryDirectory() as folder:
+        for answer in auto_answers(Path(folder)):
+            if answer.kind not in ("right", "open"):
+                print(f"{answer.kind}: {answer.name}: {answer.text[:200]}", file=sys.stderr, flush=True)
+            yield "AUTO telemetry", answer.name.split(" / ")[1].split(" #")[0], answer.kind
 
 
 def _own() -> Iterator[tuple[str, str, str]]:

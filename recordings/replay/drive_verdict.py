@@ -79,7 +79,7 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
     for outcome, words in WORDS.items():
         stops = [item.stop for item in against if item.outcome == outcome]
         if stops:
-            yield f"{words} {named(stops)}."
+            yield f"{words if replay.inferred else WORDS_OF_EVENTS.get(outcome, words)} {named(stops)}."
     for item in against:
         if item.outside_text:
             far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
@@ -90,6 +90,9 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
         yield f"{len(replay.extra)} standstills were not at a stop."
     if replay.inferred:
         yield f"Visits are inferred from standstills; {_scans_text(replay)}."
+    unseen = [item.stop for item in replay.comparison.asked if item.outcome == "unconfirmed"]
+    if unseen and not replay.inferred:
+        yield f"At {named(unseen)} the log does not show whether a scan was made."
     if replay.log.lost:
         yield f"The log is damaged; this is the result of the readable part: {replay.log.lost}."
 
@@ -144,6 +147,8 @@ WORDS = {
     "arrived": "No scan at",
     "not reached": "Not reached:",
 }
+WORDS_OF_EVENTS = {"skipped": "Skipped:", "failed": "Scan failed at"}
+"""Words where the events are the log's own."""
 HEADLINES: dict[Certainty, str] = {
     "yes": "Driven as planned",
     "no": "Not driven as planned",

@@ -155,15 +155,22 @@ def _passing_ns(stop: Stop, track: Track, after_ns: int, before_ns: int) -> int:
     return int(poses.ns[int(np.hypot(*(poses.xy - (stop.x, stop.y)).T).argmin())])
 
 
+FAILED = ", failed"
+"""End of the text of a picture that the camera reports as failed."""
+
+
 def _visit(stop: Stop, standstill: Standstill, remarks: Sequence[Remark]) -> Iterator[InferredEvent]:
     pose = Pose(x=standstill.x, y=standstill.y, heading=standstill.heading)
     deviation_m = math.dist(standstill.xy, (stop.x, stop.y))
     yield InferredEvent(
         standstill.begin_ns, Arrived, {"stop": stop.id, "pose": pose, "deviation_m": deviation_m}
     )
-    trigger = next(
-        (remark for remark in remarks if remark.kind == "trigger" and _during(standstill, remark)), None
-    )
+    triggers = [remark for remark in remarks if remark.kind == "trigger" and _during(standstill, remark)]
+    trigger = next((remark for remark in triggers if not remark.text.endswith(FAILED)), None)
+    if triggers and trigger is None:
+        reason = f"stationary {standstill.seconds:.1f} s; {triggers[-1].text}, in the log"
+        yield InferredEvent(standstill.end_ns, Failed, {"stop": stop.id, "reason": reason})
+        return
     if trigger is not None:
         yield InferredEvent(max(trigger.ns, standstill.begin_ns), Settled, {"stop": stop.id, "pose": pose})
     evidence = f"; {_scan_evidence(trigger, standstill, remarks)}"

@@ -16,9 +16,12 @@ import numpy as np
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.document import Point
+from stopgo.mission.run.events import JUMPED_OVER, Aborted, Finished
 from stopgo.mission.run.tolerance import is_outside
+from stopgo.recordings.logs.telemetry_log import FORMAT
 from stopgo.recordings.replay.fit_error import fit_error_m
 from stopgo.recordings.replay.fitting import STRETCH
+from stopgo.recordings.replay.matching import long_enough
 from stopgo.recordings.replay.position_errors import PositionErrors, lasting_jump, position_errors, visits_of
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.unseen_visits import DRIFTS, why_unseen
@@ -68,7 +71,10 @@ FIT = (
 def _evidence(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
     unsure_m = float(errors.unsure_m[number])
     if item.outcome not in DONE:
-        why = why_unseen(replay, number, unsure_m, drifts=errors.drifts) if replay.inferred else ""
+        if replay.inferred:
+            why = why_unseen(replay, number, unsure_m, drifts=errors.drifts)
+        else:
+            why = _why_not_the_end(replay, number, item)
         return StopEvidence(item, "unknown" if why else "no", why)
     if item.deviation_m is None:
         return StopEvidence(item, "unknown", "no pose in the log; the robot's own log may have it")
@@ -82,6 +88,29 @@ def _evidence(replay: Replay, number: int, item: StopComparison, errors: Positio
         why = why_unseen(replay, number, unsure_m, halted=True, drifts=errors.drifts)
         return StopEvidence(item, "unknown" if why else "no", why)
     return StopEvidence(item, within)
+
+
+RUN_GOES_ON = "the log ends before the run; give a log that continues"
+
+
+STOOD = "the robot stood there long enough, though a later item of its list was current"
+
+
+def _why_not_the_end(replay: Replay, number: int, item: StopComparison) -> str:
+    """Return why the log's events do not tell that a stop was missed; empty if they do.
+
+    A vehicle that is followed by its messages may come back to a stop that was jumped over.
+    """
+    followed = replay.log.format == FORMAT
+    over = any(isinstance(event, Finished | Aborted) for event in replay.run.events)
+    if not over and (followed or item.outcome in ("not reached", "arrived")):
+        return RUN_GOES_ON
+    stop = replay.mission.stops[number]
+    stood = any(
+        long_enough(match.standstill, stop) and not is_outside(match.away_m, stop.tolerance_m)
+        for match in replay.at(number)
+    )
+    return STOOD if followed and (item.reason or "").startswith(JUMPED_OVER) and stood else ""
 
 
 def _within(item: StopComparison, number: int, errors: PositionErrors) -> Certainty:

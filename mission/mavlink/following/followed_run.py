@@ -63,6 +63,10 @@ class FollowedRun:
         self._boot_ms = 0
         self._left_ns: int | None = None
         """Time since when the vehicle is beyond the current stop, without a confirmed scan."""
+        self._place = 0
+        """Current item at the last observation."""
+        self._behind: set[str] = set()
+        """Skipped stops that the vehicle has left."""
         self._runs = 0
         self.events: list[AnyEvent] = []
 
@@ -133,9 +137,15 @@ class FollowedRun:
         return (runs.started(self._run, run_id=name, now_ns=now_ns, by=SOMEBODY),)
 
     def _go_back(self, observed: Observation) -> None:
-        """Give a skipped stop another try, if the vehicle is at it again."""
+        """Give a skipped stop another try, if the vehicle has left it, or its items, and is at it again."""
+        before, self._place = self._place, observed.place
         for at, items in enumerate(self._listed.stops[: self._run.at]):
-            if items.stop in self._run.skipped and items.first <= observed.place < items.after:
+            if items.stop not in self._run.skipped:
+                continue
+            if not items.first <= observed.place < items.after:
+                self._behind.add(items.stop)
+            elif items.stop in self._behind or observed.place < before:
+                self._behind.discard(items.stop)
                 left_out = tuple(stop for stop in self._run.skipped if stop != items.stop)
                 self._run = changed(self._run, at=at, leg=at, stop_state="WAITING", skipped=left_out)
                 self._left_ns = None

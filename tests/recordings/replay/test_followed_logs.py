@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
+from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.transform import SiteOrigin
@@ -47,6 +47,14 @@ class FromVehicle:
     message: Any
 
 
+@dataclass(frozen=True)
+class FromStation:
+    """A message of another station than the one that logs."""
+
+    system: int
+    message: Any
+
+
 def mission(**details: Any) -> Mission:
     """For a vehicle that drives as a real one, and so takes its time to stand still."""
     return msgspec.structs.replace(tour(**{"settle_s": 3.0, **details}), georeference=ORIGIN)
@@ -65,11 +73,12 @@ def logged(
     faults: tuple[str, ...] = (),
     orders: dict[float, Any] | None = None,
     kept: Callable[[int, str], bool] = lambda ns, name: True,
+    witness: Callable[[Vehicle], None] = lambda vehicle: None,
 ) -> Path:
     """A log of an ArduPilot Rover that is given a mission and drives it; `orders` by seconds from AUTO.
 
     `kept` decides which of its messages the station that logs receives, by time and name; an order may be
-    several messages.
+    several messages. `witness` is given the vehicle before it drives.
     """
     clock, rows = SimulatedClock(), list[tuple[int, int, Any]]()
     sent = translate(plan, "ardupilot", trigger="auto")
@@ -80,12 +89,17 @@ def logged(
         send=lambda message: rows.append((clock.now_ns(), ROVER, message)),
     )
 
+    witness(vehicle)
+
     def say(message: Any) -> None:
         if isinstance(message, FromVehicle):
             rows.append((clock.now_ns(), ROVER, message.message))
             return
-        rows.append((clock.now_ns(), STATION, message))
-        packed = dialect.MAVLink(None, srcSystem=STATION, srcComponent=190)
+        station = STATION
+        if isinstance(message, FromStation):
+            station, message = message.system, message.message
+        rows.append((clock.now_ns(), station, message))
+        packed = dialect.MAVLink(None, srcSystem=station, srcComponent=190)
         vehicle.receive(packed.decode(bytearray(message.pack(packed))))
 
     def drive(seconds: float) -> None:
@@ -108,7 +122,7 @@ def logged(
             say(message)
         past = at
     drive(AFTER_S - past)
-    heard = [row for row in rows if row[1] == STATION or kept(row[0], row[2].get_type())]
+    heard = [row for row in rows if row[1] != ROVER or kept(row[0], row[2].get_type())]
     return write_telemetry_log(path, heard)
 
 
@@ -155,6 +169,22 @@ def test_a_scan_that_failed_is_told_and_the_way_goes_on(tmp_path: Path) -> None:
     laid = replayed(logged(tmp_path / "auto.tlog", plan, faults=("scanner@2",)), plan)
     assert "Failed S2" in told(laid.run.events)
     assert "Scanned S3" in told(laid.run.events)
+
+
+def test_a_stop_whose_scan_failed_is_not_visited_though_the_vehicle_waits_on_there(tmp_path: Path) -> None:
+    """It stays at the stop's last items for a while, within tolerance: that is no second try."""
+    plan = mission(tolerance_m=0.4)
+    laid = replayed(logged(tmp_path / "auto.tlog", plan, faults=("scanner@2",)), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned", "skipped", "scanned"]
+    assert drive_verdict(laid).answer == "no"
+
+
+def test_a_stop_whose_scan_failed_is_visited_if_the_vehicle_is_sent_back_to_it(tmp_path: Path) -> None:
+    plan = mission(tolerance_m=0.4)
+    orders = {27.0: dialect.MAVLink_mission_set_current_message(1, 1, item_of(plan, "S2"))}
+    laid = replayed(logged(tmp_path / "auto.tlog", plan, faults=("scanner@2",), orders=orders), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
+    assert drive_verdict(laid).answer == "yes"
 
 
 def test_a_vehicle_that_was_stopped_and_sent_on_is_followed_through_it(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.faults.sizes import size
+from tests.recordings.truth.auto_logs import auto_answers
 from tests.recordings.truth.bench import answered, cases
 from tests.recordings.truth.own_runs import own_answers
 
@@ -28,6 +29,16 @@ def test_no_verdict_on_a_log_is_false(part: int, tmp_path: Path) -> None:
     assert [(item.case.name, item.kind, item.text) for item in found if item.kind.startswith("false")] == []
     counts = Counter(item.kind for item in found)
     assert counts["untold"] <= MOST_UNTOLD * (counts["untold"] + counts["right"])
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_no_verdict_on_a_log_of_an_autopilots_own_run_is_false(part: int, tmp_path: Path) -> None:
+    every = size(short=6, full=1)
+    found = list(auto_answers(tmp_path, every=PARTS * every, first=part * every))
+    assert [(item.name, item.text) for item in found if item.kind.startswith("false")] == []
+    if every == 1:
+        counts = Counter(item.kind for item in found)
+        assert counts["untold"] <= MOST_UNTOLD * (counts["untold"] + counts["right"])
 
 
 def test_no_verdict_on_a_run_of_our_own_robot_is_false() -> None:
