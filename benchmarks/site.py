@@ -2,7 +2,7 @@
 
 Run: python -m benchmarks.site [load|links|run]; without a name all three. In `load` 20 robots only report and
 answer. In `links` a simulated robot drives at real time behind a line of some rate and delay. In `run` one
-drives for four hours of its own time in a minute, while its page sleeps and its server is killed.
+drives for four hours of its own time in two minutes, while its page sleeps and its server is killed.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ import('/pages/store.js').then((store) => { window.store = store; const note = (
 NUMBERS = "store.all('event', 'r1').map((one) => one.value.number).sort((a, b) => a - b)"
 LINKS = (("this machine", None, 0.0), ("1 Mbit/s, 300 ms round trip", 1e6, 0.15))
 PRESSES = 10
-LONG_SPEED_UP = 240.0
-LONG_STOPS = 480
-ASLEEP_S = 15.0
+LONG_SPEED_UP = 120.0
+LONG_STOPS = 320
+ASLEEP_S = 30.0
 """An hour of the long run."""
 
 
@@ -189,7 +189,7 @@ def run_table() -> str:
             ["events of the run, in both tabs", f"{len(numbers[0])}, {len(numbers[1])}; missing {gaps[0]}, {gaps[1]}"],
             ["one tab frozen for an hour of the run: events missed, then shown after", sleep],
             ["server killed, started again after 3 s: page caught up after its start", f"{caught_up_s:.1f} s"],
-            ["load of the server at 240 times real time", f"{load:.0f} % of one core"],
+            ["load of the server at 120 times real time", f"{load:.0f} % of one core"],
             ["memory of the largest page after it, and after 144 000 poses more", f"{page_mb:.0f} MB"],
             ["robot switched off: shown as old after, STOP shown as unknown after", off],
         ]  # fmt: skip
