@@ -146,8 +146,12 @@ def _with_noise(errors: PositionErrors, replay: Replay) -> PositionErrors:
     spread, moved, few = np.zeros(len(replay.mission.stops)), np.zeros(len(replay.mission.stops)), {}
     squares = freedom = 0.0
     for k, match in visits_of(replay):
-        poses = replay.run.poses.between(match.standstill.begin_ns, match.standstill.end_ns)
-        moved[k] = match.standstill.moved_m
+        standstill = match.standstill
+        moved[k] = standstill.moved_m if replay.inferred else 0.0
+        poses = replay.run.poses.between(standstill.begin_ns, standstill.end_ns)
+        if not replay.inferred:  # a reported visit contains some of the driving
+            near = np.hypot(*(poses.xy - standstill.xy).T) <= STILL_M
+            poses = Track.of(poses.ns[near], poses.xy[near], poses.heading[near])
         if len(poses) < 2:
             few[k] = 1
             continue

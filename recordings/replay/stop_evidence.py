@@ -142,7 +142,7 @@ RESTARTED = "the robot restarted during its scan; the scanner's files would show
 NOISE = "the poses are too noisy, or too few, for the tolerance; give another source of poses"
 NO_POSE = "no pose in the log; the robot's own log may have it"
 NO_TRIGGER = (
-    "the log shows no trigger of the scanner there, and one at another stop; the scanner's files would show it"
+    "the log shows no trigger of the scanner there, and one elsewhere; the scanner's files would show it"
 )
 NO_REPORT = "the log contains no report of its scan, and those of others; the scanner's files would show it"
 RUN_GOES_ON = "the log ends before the run; give a log that continues"
