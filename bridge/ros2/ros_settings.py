@@ -18,18 +18,18 @@ NeededName = Annotated[str, msgspec.Meta(pattern=r"^[~/]?[A-Za-z_][A-Za-z0-9_/]*
 TypeName = Annotated[str, msgspec.Meta(pattern=r"^[a-z][a-z0-9_]*/(srv|action)/[A-Z][A-Za-z0-9]*$")]
 
 
-class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RosSection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A table of the file."""
 
 
-class FrameNames(Section, frozen=True):
+class FrameNames(RosSection, frozen=True):
     """Frames of tf."""
 
     map: str = "map"
     base: str = "base_link"
 
 
-class TopicNames(Section, frozen=True):
+class TopicNames(RosSection, frozen=True):
     """Topics that the robot publishes, and the one that takes velocities."""
 
     odometry: NeededName = "odom"
@@ -44,7 +44,7 @@ class TopicNames(Section, frozen=True):
     """True if `cmd_vel` takes TwistStamped."""
 
 
-class DriveActions(Section, frozen=True):
+class DriveActions(RosSection, frozen=True):
     """Nav2's actions, and what their goals name."""
 
     follow_path: NeededName = "follow_path"
@@ -59,8 +59,8 @@ class DriveActions(Section, frozen=True):
     """Distance between the poses of a path."""
 
 
-class Limits(Section, frozen=True):
-    """Limits beyond which the robot stops, and is held."""
+class RosLimits(RosSection, frozen=True):
+    """RosLimits beyond which the robot stops, and is held."""
 
     off_path_m: Metres = 0.5
     jump_m: Metres = 1.0
@@ -77,7 +77,7 @@ class Limits(Section, frozen=True):
     rest_rad: Metres = 0.02
 
 
-class ScanCall(Section, frozen=True):
+class ScanCall(RosSection, frozen=True):
     """The service or action that takes a scan.
 
     Values of `request` are written into its fields; {label}, {stop}, {profile}, {duration_s} and {timeout_s}
@@ -103,14 +103,14 @@ class ScanCall(Section, frozen=True):
         return "action" if "/action/" in self.type else "srv"
 
 
-class RosSettings(Section, frozen=True):
+class RosSettings(RosSection, frozen=True):
     """All of ros2.toml."""
 
     node: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] = "stopgo"
     frames: FrameNames = FrameNames()
     topics: TopicNames = TopicNames()
     drive: DriveActions = DriveActions()
-    limits: Limits = Limits()
+    limits: RosLimits = RosLimits()
     scan: ScanCall = ScanCall()
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import BaseHealth
-from stopgo.bridge.ros2.ros_settings import FrameNames, Limits
+from stopgo.bridge.ros2.ros_settings import FrameNames, RosLimits
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import Pose
 
@@ -35,7 +35,7 @@ DEPTH = 16
 
 
 @dataclass(frozen=True)
-class Jump:
+class PoseJump:
     """A shift of the robot's pose that no drive explains."""
 
     metres: float
@@ -57,7 +57,7 @@ class _Link:
 class RosTelemetry:
     """The newest samples; the node's thread brings them, any thread reads them."""
 
-    def __init__(self, clock: Clock, frames: FrameNames, limits: Limits) -> None:
+    def __init__(self, clock: Clock, frames: FrameNames, limits: RosLimits) -> None:
         self._clock = clock
         self._frames = frames
         self._limits = limits
@@ -69,7 +69,7 @@ class RosTelemetry:
         self._commanded_ns: int | None = None
         self._jumps: deque[tuple[str, int]] = deque(maxlen=32)
         self._last = Pose(x=0.0, y=0.0, heading=0.0)
-        self.jump: Jump | None = None
+        self.jump: PoseJump | None = None
         """The newest jump; whoever has reacted to it sets it to `None`."""
         self.clock_offset_s: float | None = None
         """Seconds by which the odometry's stamps are behind this computer's time."""
@@ -118,7 +118,7 @@ class RosTelemetry:
         now_ns = self._clock.now_ns()
         what = "localisation" if localised else "odometry"
         if self.jump is None or self.jump.metres < moved:
-            self.jump = Jump(moved, f"the {what} jumped by {moved:.2f} m ({link})", now_ns)
+            self.jump = PoseJump(moved, f"the {what} jumped by {moved:.2f} m ({link})", now_ns)
         self._jumps.append((f"{link} jumps to and fro", now_ns))
 
     # To any thread

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import msgspec
 import pytest
 
-from stopgo.bridge.ros2.ros_settings import Limits, RosSettings, ScanCall
+from stopgo.bridge.ros2.ros_settings import RosLimits, RosSettings, ScanCall
 from stopgo.mission.frames.transform import SAME
 from stopgo.mission.run.events import Event, Finished, Scanned, Started
 from tests.bridge.ros2.world import Killed, RosField, World
@@ -21,7 +21,7 @@ from tests.faults.sizes import size
 
 MISSION = corridor(stops=3)
 SETTINGS = RosSettings(
-    limits=Limits(rest_m=0.01, rest_rad=0.02, gap_s=4.0, stalled_s=6.0), scan=ScanCall(late_s=10.0)
+    limits=RosLimits(rest_m=0.01, rest_rad=0.02, gap_s=4.0, stalled_s=6.0), scan=ScanCall(late_s=10.0)
 )
 LONGEST_S = 60.0
 """Faults come within this time of a run that takes about as long."""
