@@ -39,7 +39,7 @@ class RosBody:
         settings = self.settings
         telemetry = RosTelemetry(clock, settings.frames, settings.limits)
         with self.open_port(settings, telemetry, clock) as port:
-            self._await_pose(telemetry, clock)
+            self._await_pose(port, telemetry, clock)
             scanner = RosScanner(port, telemetry, clock=clock, settings=settings.scan)
             base = RosBase(port, telemetry, clock=clock, settings=settings, scanner=scanner)
             on_map = OnMap(base, self.to_map)
@@ -50,9 +50,10 @@ class RosBody:
 
             yield Body(on_map, scanner, take)
 
-    def _await_pose(self, telemetry: RosTelemetry, clock: Clock) -> None:
+    def _await_pose(self, port: RosPort, telemetry: RosTelemetry, clock: Clock) -> None:
         end_ns = clock.now_ns() + round(self.patience_s * 1e9)
         while why := telemetry.silence():
             if clock.now_ns() > end_ns:
-                raise RobotUnreachable(f"ROS 2: {why}, after {self.patience_s:g} s")
+                found = f"; {port.found_instead()}" if "odometry" in why else ""
+                raise RobotUnreachable(f"ROS 2: {why} after {self.patience_s:g} s{found}")
             clock.wait(LOOK_S)

@@ -51,5 +51,8 @@ class RosPort(Protocol):
     def stand(self) -> None:
         """Cancel every goal that drives the robot, whoever sent it, and command zero velocity."""
 
+    def found_instead(self) -> str:
+        """Return what there is in place of topics that are missing, in words."""
+
     def trigger(self, request: Mapping[str, Any]) -> RosCall:
         """Call the scanner."""

@@ -22,7 +22,7 @@ STILL_S = 10.0
 """Longest wait before a scan for a standstill that odometry shows."""
 SILENT_S = 2.0
 """Longest time during a scan in which the robot's motion may be unknown."""
-LATE = "its last scan may still be under way"
+LATE = "its last scan may still be in progress"
 
 
 class RosScanner:

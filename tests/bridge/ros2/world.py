@@ -236,6 +236,9 @@ class World:
         self.brake()
         self.later(gone_s, lambda: setattr(self, "servers", True))
 
+    def found_instead(self) -> str:
+        return "topics of type nav_msgs/msg/Odometry: none"
+
     # The scanner
 
     def trigger(self, request: Mapping[str, Any]) -> FakeCall:
