@@ -89,9 +89,7 @@ def robot(
 ) -> None:
     """Run the robot agent with a simulated base and scanner, an autopilot's, or ROS 2's, until SIGTERM.
 
-    Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
-
-    Example: stopgo robot --name r1 --state r1.state --controller ros2:ros2.toml --ros-args -r __ns:=/r1
+    Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --controller ros2
     """
     from stopgo.bridge.robot.program import RobotOptions
 
