@@ -18,7 +18,8 @@ export function makeOrders(name, me) {
   const question = h("div", { class: "question" });
   const buttons = VERBS.map((verb) => h("button", { type: "button", "data-verb": verb, onclick: (event) => pressed(name, verb, event.currentTarget, question) }, t(`verb_${verb}`)));
   const push = h("button", { type: "button", onclick: () => offerMissions(name, question) }, t("push"));
-  const element = h("div", { class: "orders" }, h("div", { class: "buttons" }, buttons, push), question, result);
+  const cannot = h("p", { class: "cannot" });
+  const element = h("div", { class: "orders" }, h("div", { class: "buttons" }, buttons, push), cannot, question, result);
   return element;
 }
 
@@ -26,7 +27,10 @@ export function showOrders(element, name, state, holder) {
   const fitting = FITTING[state.state] ?? [];
   for (const button of element.querySelectorAll("[data-verb]")) {
     button.classList.toggle("primary", fitting.includes(button.dataset.verb));
+    button.hidden = Boolean(state.vehicle?.cannot.includes(button.dataset.verb));
   }
+  const cannot = (state.vehicle?.cannot ?? []).map((verb) => t("cannot", { verb: t(`verb_${verb}`), reason: t(`cannot_${verb}`) }));
+  say(element.querySelector(".cannot"), cannot.join(" "));
   const record = get("order", name);
   if (record) say(element.querySelector(".result"), resultText(record));
 }

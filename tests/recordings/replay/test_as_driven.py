@@ -17,7 +17,18 @@ from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, as_driven, p
 from tests.planner.test_command import drawn
 from tests.recordings.replay.driving import Odd, driven, logged
 
-PLAN = ["--range", "3", "--coverage", "0.9", "--settle", "1", "--scan-time", "8", "--no-refine"]
+PLAN = [
+    "--range",
+    "3",
+    "--coverage",
+    "0.9",
+    "--settle",
+    "1",
+    "--scan-time",
+    "8",
+    "--no-refine",
+    "--no-register",
+]
 
 
 @pytest.fixture(scope="module")
