@@ -82,7 +82,7 @@ def _may_part(part: shapely.Polygon, cut: FloatArray, labels: Sequence[shapely.P
         return False
     held = np.asarray(labels)[shapely.intersects(part, labels)]
     within = np.count_nonzero(shapely.dwithin(shapely.Polygon(ring), held, _KERF))
-    return 0 < within < len(held)
+    return bool(0 < within < len(held))
 
 
 def _halves(part: shapely.Polygon, cut: FloatArray) -> list[shapely.Polygon]:
