@@ -433,6 +433,10 @@ class UdpIn:
             if peer is not None:
                 peer.take(data)
 
+    def ends(self, to: Any = None) -> list[Any]:
+        """No other process can write here."""
+        return []
+
     def close(self) -> None:
         self._world.ports.pop(self.address, None)
 
@@ -469,6 +473,9 @@ class UdpOut:
             self.disconnected = "nothing listens there"
         else:
             there.take(self, data)
+
+    def ends(self, to: Any = None) -> list[Any]:
+        return []
 
     def close(self) -> None:
         self._open = False

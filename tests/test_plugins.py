@@ -27,6 +27,7 @@ from stopgo.mission.run.scans import ScanResult
 from stopgo.mission.settings import Settings
 from stopgo.planner import plan
 from stopgo.planner.floors import read_floor
+from stopgo.planner.selection.refine import MOST
 from tests.bridge.world import WALKING, corridor
 from tests.planner.worlds import two_rooms
 
@@ -196,8 +197,18 @@ def test_what_a_plug_in_sees_may_be_lists(module: Write) -> None:
 
 def test_a_bound_of_a_plug_in_is_told_as_its_own(module: Write) -> None:
     module("honest", NUMPY + "def f(cover, settings): return np.arange(cover.rows), cover.rows")
-    made = plan(FLOOR, Settings(selector="honest:f", refine=False))
+    made = plan(FLOOR, Settings(selector="honest:f", refine=False, register=False))
     assert made.selection.method == "honest:f, fewest as reported"
+
+
+def test_a_selector_that_chooses_many_stops_is_offered_no_more_positions(module: Write) -> None:
+    code = (
+        "rows = []\ndef f(cover, settings):\n    rows.append(cover.rows)\n    return np.arange(cover.rows), 0"
+    )
+    module("many", NUMPY + code)
+    plan(FLOOR, Settings(selector="many:f", grid=0.5))
+    offered = set(sys.modules["many"].rows)
+    assert len(offered) == 1 and min(offered) > MOST
 
 
 def entry(monkeypatch: pytest.MonkeyPatch, group: str, name: str, value: str) -> None:

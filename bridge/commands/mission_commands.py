@@ -63,7 +63,8 @@ def push(
 
     Example: stopgo push out/mission.json --mavlink udpout:127.0.0.1:14550 --set-origin
     """
-    from stopgo.bridge.commands.vehicle_missions import PushConsent, VehicleLink, push_mission
+    from stopgo.bridge.commands.vehicle_missions import VehicleLink, push_mission
+    from stopgo.bridge.mavlink.auto.mission_push import PushConsent
     from stopgo.mission.files.exports.format import written_as
     from stopgo.mission.files.mission_json import read
 

@@ -45,7 +45,7 @@ from stopgo.bridge.commands.connection import (
     with_connection,
     with_presets,
 )
-from stopgo.bridge.console import print_json, print_line, refusals_printed, reporting_done
+from stopgo.bridge.console import print_json, print_line, refusals_printed, reporting_done, say
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.fleet import FleetMember
@@ -217,13 +217,13 @@ def fleet_status(
     """Print the state of all robots of a site, also of the expected ones; exit code 1 if one is silent."""
     from stopgo.bridge.link.keys import now_utc
     from stopgo.bridge.station.fleet import fleet
-    from stopgo.bridge.station.roster import LastSeen, forget, read_roster, read_sightings, remember
+    from stopgo.bridge.station.roster import LastSeen, forget, read_sightings, remember
 
     path = sightings_file(named)
     if forgotten:
         forget(path, forgotten)
     before = read_sightings(path)
-    known = tuple(before) if roster is None else read_roster(roster)
+    known = tuple(before) if roster is None else _expected_robots(roster)
     members = fleet(
         named["connect"], site=named["site"], known=known, timeout_s=timeout_s, insecure=insecure,
         keys=named["keys"],
@@ -240,6 +240,15 @@ def fleet_status(
             print_line(member_line(member, before.get(member.robot)))
     if len(seen) < len(members):
         raise typer.Exit(1)
+
+
+def _expected_robots(roster: Path) -> tuple[str, ...]:
+    """Return the robots of a roster; its vehicles, which a status of robots does not query, are named."""
+    from stopgo.bridge.station.roster import read_roster, read_roster_vehicles
+
+    for name in read_roster_vehicles(roster):
+        say(f"{roster}: vehicle {name} is not queried; use stopgo status --mavlink URL, or stopgo site")
+    return read_roster(roster)
 
 
 def sightings_file(named: dict[str, Any]) -> Path:

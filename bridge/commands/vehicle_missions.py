@@ -12,19 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 from stopgo.bridge.commands.vehicle_abilities import camera_note
 from stopgo.bridge.console import Bar, print_json, print_line, print_text, say
-from stopgo.bridge.mavlink.auto.logbook import forget, logbook, remember
+from stopgo.bridge.mavlink.auto.logbook import forget, logbook
+from stopgo.bridge.mavlink.auto.mission_push import PushConsent, check_pushable, send_and_remember
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import (
     NOTHING_SENT,
     Uploaded,
-    check_mission_idle,
     clear,
     if_stopped,
-    upload,
 )
 from stopgo.bridge.mavlink.transfer.upload_recovery import own_items
-from stopgo.bridge.mavlink.vehicle_link.origin import check_origin
 from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
 from stopgo.bridge.mavlink.vehicle_link.url import Url
@@ -74,15 +72,6 @@ class VehicleLink:
         )
 
 
-@dataclass(frozen=True)
-class PushConsent:
-    """Actions that a push takes only if the user asks for them."""
-
-    set_origin: bool = False
-    any_origin: bool = False
-    while_running: bool = False
-
-
 def push_mission(
     mission: Mission,
     link: VehicleLink,
@@ -98,19 +87,15 @@ def push_mission(
         with if_stopped(say, lambda: NOTHING_SENT):
             url, peer = opened.enter_context(_peer(link))
         sent = made or qgc_plan.items_of(mission, replace(items, autopilot=peer.autopilot.name))
-        if not consent.while_running:
-            with logbook(url, peer.who.system, state) as book:
-                check_run_over(peer, url, book, "a push")
-        check_mission_idle(peer, consent.while_running)
-        site = sent.origin
-        with if_stopped(say, lambda: NOTHING_SENT):
-            origin = None if consent.any_origin else check_origin(peer, site, set_it=consent.set_origin)
+        origin = check_pushable(url, peer, sent, consent, state=state, report=say)
         deviation = _path_deviation_note(peer, mission)
         if deviation:
             say(deviation)
         with Bar("pushing", ITEMS) as bar:
-            done = upload(peer, sent, while_running=consent.while_running, progress=bar.show, report=say)
-        _store_sent(url, peer, mission, sent, state, done)
+            done = send_and_remember(
+                url, peer, mission, sent, state=state, while_running=consent.while_running,
+                progress=bar.show, report=say,
+            )  # fmt: skip
         found = (*sent.notes, camera_note(peer, sent))
         for note in filter(None, found):
             say(f"note: {note}")
@@ -166,15 +151,6 @@ def _path_deviation_note(peer: Peer, mission: Mission) -> str:
     return accuracy_warning(
         mission, kind, read_parameters(peer, [kind.radius_parameter, *kind.steering.parameters])
     )
-
-
-def _store_sent(
-    url: Url, peer: Peer, mission: Mission, sent: ItemList, state: Path | None, done: Uploaded
-) -> None:
-    """Store the items that were sent, for following the run; a repeated push leaves the run as it is."""
-    with logbook(url, peer.who.system, state) as book:
-        if not (done.already and book.listed is not None and book.listed.sent == sent):
-            remember(book, mission, sent)
 
 
 def _report_push(

@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
@@ -30,6 +31,20 @@ class LastSeen(msgspec.Struct, frozen=True, kw_only=True):
 
 Sightings = Mapping[str, LastSeen]
 """Last answers, by robot."""
+
+
+class RosterVehicle(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A vehicle of a roster, which is reached by MAVLink, and what may be done to it."""
+
+    mavlink: str
+    """URL, such as `udpout:127.0.0.1:14550`."""
+    vehicle: Annotated[int, msgspec.Meta(ge=1, le=255)] | None = None
+    """Its system id, if several are at this URL."""
+    signing_key: str | None = None
+    """File with the key, relative to the roster."""
+    arm: bool = False
+    set_origin: bool = False
+    skip_origin_check: bool = False
 
 
 def default_sightings_file(endpoint: str, site: str | None) -> Path:
@@ -85,11 +100,39 @@ def read_roster(path: Path) -> tuple[str, ...]:
         Names the file, and its error.
     """
     document = read_toml(path)
-    names = document.get("robots")
-    if set(document) != {"robots"} or not isinstance(names, list) or not names:
+    names = document.get("robots", [] if document.get("vehicles") else None)
+    if set(document) - {"robots", "vehicles"} or not isinstance(names, list):
+        raise InputError(f'{path}: must be one list, as in: robots = ["r1", "r2"]')
+    if not names and not document.get("vehicles"):
         raise InputError(f'{path}: must be one list, as in: robots = ["r1", "r2"]')
     for name in names:
         if not isinstance(name, str):
             raise InputError(f"{path}: {name!r} is not a robot's name; write it in quotes")
         KeyExpressions(name)
     return tuple(dict.fromkeys(names))
+
+
+def read_roster_vehicles(path: Path) -> dict[str, RosterVehicle]:
+    """Read the vehicles of a roster file, by name: `[vehicles.rover]` with `mavlink = "udpout:…"`.
+
+    Raises
+    ------
+    InputError
+        Names the file, the vehicle, and its error.
+    """
+    robots, given = read_roster(path), read_toml(path).get("vehicles", {})
+    if not isinstance(given, dict):
+        raise InputError(f"{path}: vehicles must be tables, as in [vehicles.rover]")
+    vehicles = {}
+    for name, entry in given.items():
+        KeyExpressions(name)
+        if name in robots:
+            raise InputError(f"{path}: {name} is a robot and a vehicle; give one another name")
+        try:
+            with one_decode_error():
+                found = msgspec.convert(entry, RosterVehicle)
+        except msgspec.DecodeError as error:
+            raise InputError(f"{path}: vehicle {name}: {error}") from None
+        key = None if found.signing_key is None else str(path.parent / found.signing_key)
+        vehicles[name] = msgspec.structs.replace(found, signing_key=key)
+    return vehicles

@@ -370,6 +370,11 @@ class Station:
             order = msgspec.structs.replace(order, valid_for_s=min(within_s, LONGEST_VALID_S))
         return self.give(order, within_s=within_s)
 
+    @contextmanager
+    def hearing(self, heard: Callable[[], None]) -> Iterator[None]:
+        """Call `heard` when the robot shows that it got a stop; here its answer alone shows that."""
+        yield
+
     def _check_role(self, what: str) -> None:
         """Refuse a viewer's command here; the robot would not answer it."""
         if self.held is not None and self.held.holder.role != "station":

@@ -48,7 +48,8 @@ def _select_joined(seen: Visibility) -> Selection:
     """The selection whose scans register, also from positions near the stops of one that need not."""
     if not _refines(seen.settings, greedy_count(seen)):
         return select(seen)
-    nearby = _nearby_candidates(select(seen, joined=False))
+    first = select(seen, joined=False)
+    nearby = _nearby_candidates(first) if _refines(seen.settings, len(first.chosen)) else None
     return select(seen if nearby is None else merged(seen, visibility(nearby)))
 
 

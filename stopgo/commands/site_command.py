@@ -19,7 +19,13 @@ from stopgo.bridge.commands.bridge_options import (
     Timeout,
 )
 from stopgo.bridge.commands.connection import given_options, with_presets
-from stopgo.bridge.station.roster import default_sightings_file, read_roster, read_sightings
+from stopgo.bridge.station.roster import (
+    RosterVehicle,
+    default_sightings_file,
+    read_roster,
+    read_roster_vehicles,
+    read_sightings,
+)
 from stopgo.mission.console.table import printable
 
 PAGES = "Pages"
@@ -35,6 +41,14 @@ ListenAddress = Annotated[
         metavar="ADDRESS",
         rich_help_panel=PAGES,
         help="Address of this machine for other devices, over TLS; else this machine alone.",
+    ),
+]
+PageVehicles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--mavlink",
+        metavar="URL",
+        help="A vehicle that drives its own list, too; repeatable. --roster gives them names.",
     ),
 ]
 PagePort = Annotated[
@@ -68,6 +82,7 @@ def site(
     insecure: Insecure = False,
     timeout: Timeout = 5.0,
     roster: Roster = None,
+    mavlink: PageVehicles = None,
     listen: ListenAddress = "127.0.0.1",
     port: PagePort = None,
     certificate: Certificate = None,
@@ -80,12 +95,11 @@ def site(
     """
     from stopgo.site.web_server import SiteOptions, serving_site
 
-    named = with_presets(
-        given_options(context), {"connect": connect, "site": prefix, "who": who, "keys": keys}
-    )
+    given = {"connect": connect, "site": prefix, "who": who, "keys": keys}
+    named = with_presets(given_options(context), given)
     options = SiteOptions(
         folder, named["connect"], named["site"], named["who"], named["keys"], insecure, timeout,
-        _expected(named, roster), listen, port, certificate, certificate_key,
+        _expected(named, roster), _vehicles(mavlink, roster), listen, port, certificate, certificate_key,
     )  # fmt: skip
 
     def say(line: str) -> None:
@@ -104,3 +118,11 @@ def _expected(named: dict[str, Any], roster: Path | None) -> tuple[str, ...]:
     if roster is not None:
         return read_roster(roster)
     return tuple(read_sightings(default_sightings_file(named["connect"], named["site"])))
+
+
+def _vehicles(urls: list[str] | None, roster: Path | None) -> dict[str, RosterVehicle]:
+    """Return the vehicles of the roster, and those of URLs, which have numbers for names."""
+    named = {} if roster is None else read_roster_vehicles(roster)
+    known = {vehicle.mavlink for vehicle in named.values()}
+    more = [url for url in urls or [] if url not in known]
+    return {**named, **{f"vehicle-{k}": RosterVehicle(mavlink=url) for k, url in enumerate(more, 1)}}

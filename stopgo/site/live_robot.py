@@ -25,6 +25,7 @@ import msgspec
 
 from stopgo.bridge.link.capabilities import RECORD
 from stopgo.bridge.link.protocol import decode
+from stopgo.bridge.mavlink.auto.open_vehicle import NOT_IN_AUTO, OpenVehicle
 from stopgo.bridge.station.follow import (
     AGAIN_S,
     SILENCE_S,
@@ -244,11 +245,17 @@ class LiveRobot:
         value["robot"] = self.name
         value["charge"] = charge_text(None if state is None else state.battery)
         value["trouble"] = self._trouble
+        value["vehicle"] = _vehicle_json(self.station)
         value["lease"] = None
         if lease is not None:
             value["lease"] = {"holder": lease.commander, "left_s": self.station.lease_left_s}
         self._feed.tell(("robot", self.name), value, at_s=at_s)
         self._true_at = at_s
+
+    def show_trouble(self, trouble: str) -> None:
+        """Show why nothing is received; from another thread."""
+        if trouble:
+            self._set_trouble((trouble,))
 
     def _set_trouble(self, trouble: tuple[str, ...]) -> None:
         if trouble != self._trouble:
@@ -359,6 +366,13 @@ class LiveRobot:
                 self._feed.tell(("recording", self.name), {"run": self._run_id, "trouble": str(error)})
             else:
                 self._feed.tell(("recording", self.name), {"run": self._run_id, "trouble": "", "over": True})
+
+
+def _vehicle_json(station: Station) -> dict[str, Any] | None:
+    """Return the address of a vehicle that drives its own list, and what is not possible there."""
+    if not isinstance(station, OpenVehicle):
+        return None
+    return {"url": str(station.url), "cannot": sorted(NOT_IN_AUTO)}
 
 
 def _is_of_next_run(follower: RunFollower, item: LiveReport | None) -> bool:

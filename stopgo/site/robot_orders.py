@@ -153,7 +153,17 @@ class RobotOrders:
         with self._lock:
             self._watched[robot.name] = (sent, sent_s)
         robot.on_change = partial(self.look_if_standing, robot)
-        done = self._run(order_id, robot, verb, partial(station.command, verb), sent=sent)
+        heard_at: list[float] = []
+
+        def heard() -> None:
+            heard_at.append(time.time())
+            self._tell(replace(sent, heard_at=heard_at[0]))
+
+        with station.hearing(heard):
+            done = self._run(order_id, robot, verb, partial(station.command, verb), sent=sent)
+        if heard_at:
+            done = replace(done, heard_at=heard_at[0])
+            self._tell(done)
         with self._lock:
             watched = self._watched.get(robot.name)
             if watched is not None and watched[0].id == order_id:

@@ -10,9 +10,10 @@ import ipaddress
 import os
 import socket
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,6 +23,11 @@ import uvicorn
 from stopgo.bridge.link.keys import HeldKeys, now_utc, read_keys
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.mavlink.auto.open_vehicle import OpenVehicle
+from stopgo.bridge.mavlink.auto.vehicle_commands import Consent
+from stopgo.bridge.mavlink.auto.vehicle_station import Options as VehicleOptions
+from stopgo.bridge.mavlink.vehicle_link.wire import read_link
+from stopgo.bridge.station.roster import RosterVehicle
 from stopgo.bridge.station.station import Station, whoami
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.console.ports import free_port
@@ -62,6 +68,8 @@ class SiteOptions:
     timeout_s: float = 5.0
     robots: tuple[str, ...] = ()
     """Robots that are expected, from a roster."""
+    vehicles: Mapping[str, RosterVehicle] = field(default_factory=dict)
+    """Vehicles that drive their own lists, by name."""
     listen: str = HERE
     port: int | None = None
     certificate: Path | None = None
@@ -76,8 +84,12 @@ def state_file(options: SiteOptions) -> Path:
 
 
 @contextmanager
-def serving_site(options: SiteOptions, *, say: Callable[[str], None]) -> Iterator[str]:
+def serving_site(
+    options: SiteOptions, *, say: Callable[[str], None], link: Link | None = None
+) -> Iterator[str]:
     """Yield the address by which the first browser signs in; the site runs until the block ends.
+
+    `link` is to the robots, in place of one to the endpoint.
 
     Raises
     ------
@@ -94,7 +106,7 @@ def serving_site(options: SiteOptions, *, say: Callable[[str], None]) -> Iterato
         stopped = threading.Event()
         feed = EventFeed()
         held = None if options.keys is None else read_keys(options.keys, now=now_utc())
-        fleet = opened.enter_context(_fleet(options, held, feed, folder, stopped))
+        fleet = opened.enter_context(_fleet(options, held, feed, folder, stopped, link))
         parts = SiteParts(
             address=address, access=access, feed=feed, folder=folder, missions=fleet.missions,
             robots=fleet.robots, orders=fleet.orders, commander=fleet.commander,
@@ -163,6 +175,28 @@ class SiteFleet:
         self.threads.append(thread)
         thread.start()
 
+    def add_vehicle(self, name: str, entry: RosterVehicle) -> None:
+        """Follow a vehicle that drives its own list; raises `InputError` if its URL or key is of no use."""
+        options, path = self.options, entry.signing_key
+        key = None if path is None else Path(path)
+        url, signing_key = read_link(entry.mavlink, key, insecure=options.insecure)
+        station = OpenVehicle(
+            name, url,
+            VehicleOptions(
+                vehicle=entry.vehicle, signing_key=signing_key, timeout_s=options.timeout_s,
+                commander=self.commander, consent=Consent(entry.arm, False, entry.skip_origin_check),
+            ),
+            set_origin=entry.set_origin, number=len(self.threads),
+        )  # fmt: skip
+        robot = self.robots[name] = LiveRobot(station, self.feed, self.missions, self.recorder)
+        for work in (
+            partial(station.serve, self.stopped, robot.show_trouble),
+            partial(robot.work, self.stopped),
+        ):
+            thread = threading.Thread(target=work, daemon=True)
+            self.threads.append(thread)
+            thread.start()
+
     def recorder(
         self, robot: str, run_id: str, known: KnownMission | None
     ) -> AbstractContextManager[RunCollector]:
@@ -193,7 +227,12 @@ def _recording(path: Path, known: KnownMission | None) -> Iterator[RunCollector]
 
 @contextmanager
 def _fleet(
-    options: SiteOptions, held: HeldKeys | None, feed: EventFeed, folder: SiteFiles, stopped: threading.Event
+    options: SiteOptions,
+    held: HeldKeys | None,
+    feed: EventFeed,
+    folder: SiteFiles,
+    stopped: threading.Event,
+    given: Link | None,
 ) -> Iterator[SiteFleet]:
     """Open the link to the robots and follow all that are expected, and all that show themselves."""
     from stopgo.bridge.link.zenoh_link import Guard, connecting
@@ -201,8 +240,11 @@ def _fleet(
     if held is not None and options.commander not in (None, held.holder.name):
         raise InputError(f"--as {options.commander}: the keys belong to {held.holder.name}; leave --as out")
     guard = Guard(held, options.insecure)
-    with connecting(options.endpoint, guard, open_s=options.timeout_s) as link:
+    opened = connecting(options.endpoint, guard, open_s=options.timeout_s)
+    with opened if given is None else nullcontext(given) as link:
         fleet = SiteFleet(link, options, held, feed, folder, stopped)
+        for name, entry in options.vehicles.items():
+            fleet.add_vehicle(name, entry)
         for name in options.robots:
             fleet.add(name)
         every = KeyExpressions.of_every_robot(options.site)

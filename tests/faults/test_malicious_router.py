@@ -110,7 +110,7 @@ class Malice:
         ).encode()
 
     def flipped(self, message: SignedMessage) -> dict[str, bytes]:
-        which = self.chance.choice(["payload", "seal"])
+        which = self.chance.choice(["payload", "attachment"])
         data = bytearray(getattr(message, which))
         if data:
             data[self.chance.randrange(len(data))] ^= 1 << self.chance.randrange(8)

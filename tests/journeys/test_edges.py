@@ -16,6 +16,8 @@ from stopgo.mission.files.mission_json import write
 from tests.mission.worlds import square_tour
 
 NOWHERE = "udpout:127.0.0.1:19"
+NEED_NOTHING = ("demo", "status", "doctor", "site")
+"""Commands that work without an argument; `site` serves its page until it is ended."""
 READERS = {
     "show": ("show", "FILE"),
     "check": ("check", "FILE"),
@@ -105,7 +107,7 @@ def test_the_front_door_of_one_command_offers_what_the_whole_one_does() -> None:
         assert sorted(front_door(word).commands) == names()
 
 
-@pytest.mark.parametrize("command", [name for name in names() if name not in ("demo", "status", "doctor")])
+@pytest.mark.parametrize("command", [name for name in names() if name not in NEED_NOTHING])
 def test_a_command_that_is_told_nothing_says_what_it_needs(
     command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -112,11 +113,11 @@ class MovableDrawing:
         self._insert = model.add_blockref("DRAWN", (0, 0))
 
     def floor(self, place: Place) -> FloorPlan:
-        """Floor that the reader gives at this placement."""
+        """Floor that the reader gives at this placement; a drawing itself is read once."""
         self._insert.dxf.insert = (*place.shift, 0.0)
         self._insert.dxf.rotation = place.degrees
         self._insert.dxf.xscale = -1.0 if place.mirrored else 1.0
-        return floor_in(self._drawing, source=self._path, digest="0" * 64, d_dis=Settings().d_dis)
+        return floor_in(copy(self._drawing), source=self._path, digest="0" * 64, d_dis=Settings().d_dis)
 
     def space(self, place: Place) -> NavigableSpace:
         return navigable(self.floor(place), Settings())

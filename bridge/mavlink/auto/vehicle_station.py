@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from stopgo.bridge.mavlink.auto.auto_runner import AutoRunner
 from stopgo.bridge.mavlink.auto.commanded_standstill import stand
 from stopgo.bridge.mavlink.auto.confirmed_commands import Denied
 from stopgo.bridge.mavlink.auto.first_hold import held_first, note_order
-from stopgo.bridge.mavlink.auto.logbook import logbook
+from stopgo.bridge.mavlink.auto.logbook import logbook, name_of
 from stopgo.bridge.mavlink.auto.vehicle_commands import Consent
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
 from stopgo.bridge.mavlink.vehicle_link.url import Url
@@ -105,18 +105,34 @@ def _stopped(opened: Wire, url: Url, options: Options, verb: Verb) -> Iterator[P
 @contextmanager
 def _served(url: Url, peer: Peer, options: Options) -> Iterator[Station]:
     """A station on a link in memory to the agent that serves the vehicle."""
-    board, wall, stops = Switchboard(), WallClock(), options.stop is not None
-    with logbook(url, peer.who.system, options.state) as book:
-        keys = KeyExpressions(book.robot)
+    board, keys = Switchboard(), KeyExpressions(name_of(peer.who.system))
+    with served_on(board, keys, url, peer, options):
+        yield Station(
+            board.link(), keys, commander=options.commander or whoami(), timeout_s=options.timeout_s
+        )
+
+
+@contextmanager
+def served_on(
+    board: Switchboard, keys: KeyExpressions, url: Url, peer: Peer, options: Options
+) -> Iterator[None]:
+    """An agent that serves the vehicle on the board until the block ends.
+
+    Raises
+    ------
+    RobotUnreachable
+        If the vehicle does not report its state.
+    """
+    wall, stops = WallClock(), options.stop is not None
+    with logbook(url, peer.who.system, options.state) as book, closing(board.link()) as link:
         runner = AutoRunner(
             peer, book, wall, options.consent, board, looks_only=options.looks_only, stands=stops
         )
         agent = Agent(
-            keys=keys, link=board.link(), journal=book.journal, runner=runner, clock=book.clock,
+            keys=keys, link=link, journal=book.journal, runner=runner, clock=book.clock,
             command_clock=wall, failed=board.fail,
         )  # fmt: skip
         with on_link(agent):
             if not stops:
                 runner.await_news(options.timeout_s, compares=options.compares)
-            who = options.commander or whoami()
-            yield Station(board.link(), keys, commander=who, timeout_s=options.timeout_s)
+            yield

@@ -161,6 +161,7 @@ function makeCard(view, name) {
   const parts = {
     word: h("strong", { class: "state" }), age: h("span", { class: "age" }), where: h("p"), battery: h("p"),
     lease: h("p", { class: "lease" }), trouble: h("p", { class: "trouble", role: "status" }), reason: h("p", { class: "reason", role: "alert" }),
+    vehicle: h("p", { class: "lease" }),
   };
   const choose = h("button", { type: "button", class: "name", onclick: () => {
     focus = name;
@@ -169,7 +170,7 @@ function makeCard(view, name) {
   } }, name);
   const orders = view.me.role === "operator" ? makeOrders(name, view.me) : null;
   const element = h("section", { class: "card", "aria-label": t("robot_named", { robot: name }) },
-    h("div", { class: "line" }, choose, parts.word, parts.age), parts.reason, parts.where, parts.battery, parts.lease, parts.trouble, orders);
+    h("div", { class: "line" }, choose, parts.word, parts.age), parts.reason, parts.where, parts.battery, parts.lease, parts.vehicle, parts.trouble, orders);
   return { element, choose, orders, ...parts };
 }
 
@@ -185,6 +186,7 @@ function showCard(view, name, card) {
   const next = state.next_revision ? t("next_revision", { revision: state.next_revision }) : "";
   say(card.where, [done, at, next].filter(Boolean).join(" · "));
   say(card.battery, healthText(state));
+  say(card.vehicle, state.vehicle ? t("drives_own_list", { url: state.vehicle.url }) : "");
   const holder = state.lease && state.lease.left_s > 0 ? state.lease.holder : null;
   say(card.lease, !holder ? t("lease_free") : holder === view.me.commander ? t("lease_mine") : t("lease_other", { who: holder }));
   const held = all("event", name).filter((one) => ["Held", "Paused", "Homing", "Aborted"].includes(one.value.event))

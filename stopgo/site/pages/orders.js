@@ -18,7 +18,8 @@ export function makeOrders(name, me) {
   const question = h("div", { class: "question" });
   const buttons = VERBS.map((verb) => h("button", { type: "button", "data-verb": verb, onclick: (event) => pressed(name, verb, event.currentTarget, question) }, t(`verb_${verb}`)));
   const push = h("button", { type: "button", onclick: () => offerMissions(name, question) }, t("push"));
-  const element = h("div", { class: "orders" }, h("div", { class: "buttons" }, buttons, push), question, result);
+  const cannot = h("p", { class: "cannot" });
+  const element = h("div", { class: "orders" }, h("div", { class: "buttons" }, buttons, push), cannot, question, result);
   return element;
 }
 
@@ -26,7 +27,10 @@ export function showOrders(element, name, state, holder) {
   const fitting = FITTING[state.state] ?? [];
   for (const button of element.querySelectorAll("[data-verb]")) {
     button.classList.toggle("primary", fitting.includes(button.dataset.verb));
+    button.hidden = Boolean(state.vehicle?.cannot.includes(button.dataset.verb));
   }
+  const cannot = (state.vehicle?.cannot ?? []).map((verb) => t("cannot", { verb: t(`verb_${verb}`), reason: t(`cannot_${verb}`) }));
+  say(element.querySelector(".cannot"), cannot.join(" "));
   const record = get("order", name);
   if (record) say(element.querySelector(".result"), resultText(record));
 }
@@ -60,15 +64,21 @@ async function give(name, order, question) {
   await sent(name, question, (more) => send(path, { id: orderId(), ...order, ...more }));
 }
 
-// Another operator's lease is not taken without a question.
-async function sent(name, question, work) {
+// Refusals that another word of the operator lifts: question, answer, and what is sent then.
+const TAKE_OVER = ["take_over_question", "take_over", { take_over: true }];
+const REMEDIES = {
+  not_the_commander: TAKE_OVER, fenced: TAKE_OVER, finished_before: ["confirm_start", "verb_start", { again: true }],
+  not_at_start: ["from_here_question", "from_here", { from_here: true }],
+};
+
+async function sent(name, question, work, more = {}) {
   try {
-    const { orders } = await work({});
-    const [record] = orders;
-    if (record.outcome === "refused" && ["not_the_commander", "fenced"].includes(record.reason)) {
-      const who = get("robot", name)?.lease?.holder ?? "?";
-      ask(question, t("take_over_question", { who, robot: name }), t("take_over"), () => work({ take_over: true }).catch((error) => fault(question, error)));
-    }
+    const { orders: [record] } = await work(more);
+    const remedy = record.outcome === "refused" && REMEDIES[record.reason];
+    if (!remedy) return;
+    const [text, yes, fields] = remedy;
+    const who = get("robot", name)?.lease?.holder ?? "?";
+    ask(question, t(text, { who, robot: name }), t(yes), () => sent(name, question, work, { ...more, ...fields }));
   } catch (error) {
     fault(question, error);
   }

@@ -64,14 +64,16 @@ function show(list) {
 export function lineOf(record) {
   const parts = [t("sent_at", { time: clock(record.sent_at * 1000) })];
   let kind = "wait";
-  if (record.outcome === "unknown" || record.outcome === "not_sent") {
-    kind = "bad";
-    parts.push(t(`heard_${record.outcome}`));
-  } else if (record.heard_at) {
+  const bad = record.outcome === "unknown" || record.outcome === "not_sent";
+  if (record.heard_at) {
     const took = seconds((record.heard_at - record.sent_at) * 1000, 2);
     parts.push(t("heard_at", { time: clock(record.heard_at * 1000), took }));
     if (record.outcome === "refused") parts.push(t("refused_because", { reason: record.message }));
-  } else parts.push(t("heard_waiting"));
+  } else parts.push(t(bad ? `heard_${record.outcome}` : "heard_waiting"));
+  if (bad) {
+    kind = "bad";
+    if (record.message) parts.push(record.message);
+  }
   if (record.standing_at) {
     kind = "good";
     parts.push(t("standing_at", { time: clock(record.standing_at * 1000) }));

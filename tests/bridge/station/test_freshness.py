@@ -42,7 +42,7 @@ class Watched:
         self.ticks, self.published = 0, 0
         self.began_ns = self.field.clock.now_ns()
         self.acts: dict[float, Callable[[], object]] = {}
-        monkeypatch.setattr(follow, "_next", self.next)
+        monkeypatch.setattr(follow, "next_report", self.next)
         monkeypatch.setattr(follow, "time", self)
 
     def monotonic(self) -> float:

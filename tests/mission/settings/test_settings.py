@@ -22,6 +22,7 @@ from stopgo.mission.settings.scanners import SCANNERS, ScannerName
 
 OTHER: dict[str, Any] = {
     "register": False,
+    "heights": ("doors=2.1",),
     "accuracy": 5.0,
     "control": ((1.0, 2.0), (3.0, 4.0)),
     "overlap": 0.25,

@@ -111,6 +111,11 @@ def network() -> tuple[Mission, NavigableSpace]:
     return mission, nouns[NavigableSpace]
 
 
+def without_errors(mission: Mission) -> Mission:
+    """The mission as versions wrote it that predicted no error of a scan."""
+    return change(mission, stops=tuple(change(stop, error=UNSET) for stop in mission.stops))
+
+
 def test_the_network_of_a_plan_is_as_claimed(network: tuple[Mission, NavigableSpace]) -> None:
     assert list(network_overclaims(*network)) == []
 
@@ -118,7 +123,14 @@ def test_the_network_of_a_plan_is_as_claimed(network: tuple[Mission, NavigableSp
 @pytest.mark.parametrize("pairs", [UNSET, ()])
 def test_a_network_that_was_removed_is_reported(pairs: Any, network: tuple[Mission, NavigableSpace]) -> None:
     mission, space = network
-    assert paths(network_overclaims(change(mission, network=pairs), space)) == ["$.network"]
+    edited = change(without_errors(mission), network=pairs)
+    assert paths(network_overclaims(edited, space)) == ["$.network"]
+
+
+def test_errors_that_no_network_holds_are_reported(network: tuple[Mission, NavigableSpace]) -> None:
+    mission, space = network
+    found = paths(network_overclaims(change(mission, network=()), space))
+    assert [path for path in found if path.endswith("major_m")] and found[-1] == "$.network"
 
 
 def test_a_network_that_a_dropped_stop_tears_is_reported(network: tuple[Mission, NavigableSpace]) -> None:
@@ -126,7 +138,7 @@ def test_a_network_that_a_dropped_stop_tears_is_reported(network: tuple[Mission,
     last = mission.stops[-1].id
     assert isinstance(mission.network, tuple)
     kept = tuple(pair for pair in mission.network if last not in (pair.a, pair.b))
-    (problem,) = network_overclaims(change(mission, network=kept), space)
+    (problem,) = network_overclaims(change(without_errors(mission), network=kept), space)
     assert problem.message.startswith(f"leaves {last} apart")
 
 
@@ -140,4 +152,5 @@ def test_scans_that_no_candidate_connects_may_stay_apart() -> None:
 
 def test_a_follow_up_mission_may_leave_its_scans_apart(network: tuple[Mission, NavigableSpace]) -> None:
     mission, space = network
-    assert list(network_overclaims(change(mission, network=(), id="0" * 32), space)) == []
+    followed = change(without_errors(mission), network=(), id="0" * 32)
+    assert list(network_overclaims(followed, space)) == []

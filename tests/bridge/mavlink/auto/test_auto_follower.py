@@ -5,7 +5,9 @@ from __future__ import annotations
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.logbook import Logbook, remember
+from stopgo.bridge.mavlink.vehicle_link.foreign_commands import ForeignCommands
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
+from stopgo.bridge.mavlink.vehicle_link.wire import GROUND_STATION, Who
 from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.following.observer import Observer
@@ -26,6 +28,17 @@ class NoHands:
     def ask_for_telemetry(self) -> None: ...
 
 
+class NobodyElse:
+    """A line on which no other station commands."""
+
+    autopilot = ARDUPILOT
+    foreign = ForeignCommands(Who(1, 1), GROUND_STATION, ARDUPILOT)
+
+    @property
+    def heartbeat(self) -> Message:
+        return found_in_manual(0)[0]
+
+
 def told_at_first_look(boot_ms: int) -> list[str]:
     """Reasons of the pauses told of a run that is found in MANUAL, a minute after it was started."""
     clock, mission = SimulatedClock(), tour()
@@ -35,7 +48,7 @@ def told_at_first_look(boot_ms: int) -> list[str]:
     book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="me"),))
     clock.wait(60.0)
     observer = Observer(ARDUPILOT)
-    follower = AutoFollower(book, None, observer, NoHands())  # type: ignore[arg-type]
+    follower = AutoFollower(book, NobodyElse(), observer, NoHands())  # type: ignore[arg-type]
     for message in found_in_manual(boot_ms):
         clock.wait(0.1)
         follower.look(observer.take(message, book.listed, clock.now_ns()))

@@ -15,7 +15,7 @@ from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.messages import position_setpoint, set_current
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
-from stopgo.mission.document import Scan, sealed
+from stopgo.mission.document import Scan, with_digest
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.mavlink.telemetry import local_speed
 from stopgo.mission.run.events import Scanned, Skipped
@@ -102,7 +102,7 @@ def test_jumped_stops_are_offered_at_the_end_and_one_order_drives_to_them(
 ) -> None:
     """On the planned route, past the stops that are done."""
     back = ((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
-    site = Site(tmp_path, profile, mission=sealed(msgspec.structs.replace(real_tour(), return_=back)))
+    site = Site(tmp_path, profile, mission=with_digest(msgspec.structs.replace(real_tour(), return_=back)))
     with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
         site.order("start")
         until(site, lambda events, run: "Scanned S1" in told(events))
@@ -130,7 +130,7 @@ def test_a_stop_that_was_jumped_over_may_be_left_out(tmp_path: Path) -> None:
 
 def test_a_vehicle_that_is_set_back_on_its_way_home_is_held_and_goes_on_home(tmp_path: Path) -> None:
     back = ((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
-    mission = sealed(msgspec.structs.replace(real_tour(), return_=back))
+    mission = with_digest(msgspec.structs.replace(real_tour(), return_=back))
     site = Site(tmp_path, "ardupilot", mission=mission, speed_up=1.0)
     with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
         site.order("start")

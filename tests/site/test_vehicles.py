@@ -1,0 +1,115 @@
+"""Vehicles that drive their own lists on the page: live state, orders, STOP, and what is not possible."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.station.roster import RosterVehicle, read_roster, read_roster_vehicles
+from stopgo.mission.errors import InputError
+from stopgo.site.event_feed import EventFeed
+from stopgo.site.robot_orders import OrderRequest, PushRequest, StopRequest
+from stopgo.site.site_folder import SiteFiles
+from stopgo.site.web_server import SiteFleet, SiteOptions
+from tests.bridge.mavlink.auto.site import Site
+
+SPEED_UP = 20.0
+LAST_RESORT_S = 60.0
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Site:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    return Site(tmp_path, speed_up=SPEED_UP)
+
+
+@pytest.fixture
+def fleet(site: Site, tmp_path: Path) -> Iterator[SiteFleet]:
+    """The site's vehicle on a page that may arm it."""
+    options, stopped = SiteOptions(tmp_path, "", commander="anna", timeout_s=1.0), threading.Event()
+    made = SiteFleet(Switchboard().link(), options, None, EventFeed(), SiteFiles.at(tmp_path), stopped)
+    made.add_vehicle("rover", RosterVehicle(mavlink=str(site.url), vehicle=1, arm=True, set_origin=True))
+    yield made
+    stopped.set()
+    for thread in made.threads:
+        thread.join()
+
+
+def wait_until(seen: Callable[[], Any]) -> Any:
+    deadline = time.monotonic() + LAST_RESORT_S
+    while not (found := seen()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return found
+
+
+def events(feed: EventFeed) -> set[str]:
+    return {told.value["event"] for key, told in feed.since(-1) if key[0] == "event"}
+
+
+def shown(fleet: SiteFleet) -> dict[str, Any]:
+    return fleet.feed.value("robot", "rover") or {}
+
+
+def test_a_vehicle_is_pushed_to_started_stopped_and_resumed(site: Site, fleet: SiteFleet) -> None:
+    orders, feed = fleet.orders, fleet.feed
+    with site.up():
+        wait_until(lambda: shown(fleet).get("state") == "IDLE")
+        pushed = orders.push("rover", PushRequest(id="1", file="m"), site.mission).result()
+        assert pushed.outcome == "ok", pushed.message
+        wait_until(lambda: feed.value("mission", "rover"))
+        assert orders.order("rover", OrderRequest(id="2", verb="start")).result().state == "RUNNING"
+        wait_until(lambda: (feed.value("pose", "rover") or {"speed": 0})["speed"] > 0.1)
+        (stopped,) = [one.result() for one in orders.stop(StopRequest(id="3"))]
+        record = wait_until(lambda: (told := feed.value("stop", "rover")) and told["standing_at"] and told)
+        assert record["sent_at"] <= record["heard_at"] <= record["standing_at"]
+        assert (stopped.outcome, shown(fleet)["state"]) == ("ok", "PAUSED")
+        assert feed.value("pose", "rover")["speed"] < 0.03  # type: ignore[index]
+        assert shown(fleet)["vehicle"] == {"url": str(site.url), "cannot": ["home"]}
+        home = orders.order("rover", OrderRequest(id="4", verb="home")).result()
+        assert (home.outcome, home.reason) == ("refused", "unsupported")
+        assert orders.order("rover", OrderRequest(id="5", verb="resume")).result().state == "RUNNING"
+        wait_until(lambda: {"Started", "Paused", "Resumed"} <= events(feed))
+
+
+def test_a_vehicle_that_is_away_is_shown_with_the_reason(fleet: SiteFleet, site: Site) -> None:
+    wait_until(lambda: shown(fleet).get("trouble") not in (None, ("not_found",)))
+    assert "no vehicle" in shown(fleet)["trouble"][0]
+    assert "state" not in shown(fleet)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (
+            '[vehicles.r1]\nmavlink = "udpout:h:1"\nspeed = 1',
+            "vehicle r1: Object contains unknown field `speed`",
+        ),
+        ("[vehicles.r1]\nvehicle = 1", "vehicle r1: Object missing required field `mavlink`"),
+        ('[vehicles.r1]\nmavlink = "x"\nvehicle = 900', "vehicle r1: Expected `int` <= 255"),
+        ('robots = ["r1"]\n[vehicles.r1]\nmavlink = "x"', "r1 is a robot and a vehicle"),
+        ('vehicles = "x"', "vehicles must be tables"),
+        ('[vehicles."a b"]\nmavlink = "x"', "use letters, digits"),
+        ("", "must be one list"),
+    ],
+)
+def test_a_wrong_roster_is_refused_with_one_line(tmp_path: Path, text: str, line: str) -> None:
+    path = tmp_path / "robots.toml"
+    path.write_text(text)
+    with pytest.raises(InputError) as error:
+        read_roster_vehicles(path)
+    assert line in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_roster_names_robots_and_vehicles(tmp_path: Path) -> None:
+    path = tmp_path / "robots.toml"
+    path.write_text('robots = ["r1"]\n[vehicles.rover]\nmavlink = "udpout:h:1"\nsigning_key = "rover.key"\n')
+    assert read_roster(path) == ("r1",)
+    assert read_roster_vehicles(path)["rover"].signing_key == str(tmp_path / "rover.key")
