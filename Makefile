@@ -31,12 +31,11 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 
-# Most tests of links wait for something, so six files at a time are run even on two processors; in the order that
-# tests/conftest.py deals them out, for the longest have the fewest tests and would come last. mypy, which uses one
-# processor, runs beside them and speaks last.
+# Most tests of links wait for something, so six files at a time are run even on two processors (tests/workers.py), in
+# the order that tests/conftest.py deals them out. mypy, which uses one processor, runs beside them and speaks last.
 test: lint
 	@$(BIN)/mypy >$(VENV)/types.txt 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -n 6 --dist loadfile --no-loadscope-reorder; tests=$$?; \
+	$(BIN)/python -m pytest -p tests.workers --workers 6; tests=$$?; \
 	wait $$types; typed=$$?; cat $(VENV)/types.txt; \
 	[ $$tests -eq 0 ] && [ $$typed -eq 0 ]
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import shapely
 from ezdxf.document import Drawing
 
 from stopgo.mission.document.floor_source import FloorSource
@@ -19,10 +20,10 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import bounds
 from stopgo.mission.settings.layer_kinds import layer_option
-from stopgo.planner.floors.drawing import open_drawing
+from stopgo.planner.floors.drawing import legible, open_drawing
 from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
-from stopgo.planner.floors.linework import PATTERN, Derived, as_room_name, completed, derived
+from stopgo.planner.floors.linework import Derived, as_room_name, completed, derived
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.raised_floor import with_heights
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
@@ -183,8 +184,14 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
             f"{path}: the walls are {size:.4g} m across, read in {_unit_name(sheet)}; "
             "say the drawing's unit with --units, or the part that is meant with --region"
         )
-    made = _line_work(sheet)
-    if made.cells >= PATTERN:
+    try:
+        made = _line_work(sheet)
+    except shapely.errors.GEOSException as error:
+        raise InputError(
+            f"{path}: the lines of the walls cannot be intersected ({legible(str(error))}); delete "
+            "overlapping lines, or put the walls on a layer of their own"
+        ) from None
+    if made.cells:
         raise InputError(
             f"{path}: what was taken for walls encloses {made.cells} cells smaller than a room: that is a "
             "pattern, no walls; put the walls on a layer of their own, or ask for such an export"
@@ -227,6 +234,9 @@ def _no_walls(sheet: DxfSheet, tried: WallLayers | None = None) -> str:
     )
     if tried is None or not tried.layers:
         return f"{why}; say which one holds the walls, such as {layer_option('NAME', 'walls')}"
+    if tried.units:
+        choices = " or ".join(f"{tried.option} {unit} {makes}" for unit, makes in tried.units)
+        return f"{why}, and the unit is not certain; give {choices}"
     if tried.refusal:
         return f"{why}; say which one holds the walls (with {tried.option}: {tried.refusal})"
     seen = f" ({'; '.join(tried.evidence)})" if tried.evidence else ""

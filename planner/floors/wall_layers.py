@@ -28,7 +28,8 @@ from stopgo.planner.floors.linework import Derived
 from stopgo.planner.floors.reader import FloorOptions
 from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.strokes import Word, sketch
-from stopgo.planner.floors.units.unit_evidence import area_in
+from stopgo.planner.floors.units import UnitAsked
+from stopgo.planner.floors.written_measures import area_in
 
 ENOUGH = 2
 """Evidence of this weight shows walls; one kind of it alone does not."""
@@ -84,6 +85,8 @@ class WallLayers:
     area: float = 0.0
     refusal: str = ""
     """Reason why these layers give no floor."""
+    units: tuple[tuple[str, str], ...] = ()
+    """Options for the unit, each with what it makes, where only the unit is missing."""
     sheet: DxfSheet | None = None
     """The drawing as read in the trial, if it gives a floor."""
 
@@ -156,11 +159,18 @@ def _candidates(shapes: Sequence[Shape]) -> list[tuple[str, ...]]:
         lengths[layer] = lengths.get(layer, 0.0) + length
     whole = sum(lengths.values())
     is_large = len(shapes) > _LARGE
-    names = sorted(lengths, key=lambda name: (-lengths[name], name))
+    rooms = _layers_of_rooms(shapes)
+    names = sorted(lengths.keys() - set(rooms), key=lambda name: (-lengths[name], name))
     names = names[: _MOST_OF_LARGE if is_large else _MOST_LAYERS]
     names = [name for name in names if lengths[name] >= _LEAST_SHARE * whole]
     together = [tuple(sorted(names))] if len(names) > 1 and not is_large else []
-    return [*((name,) for name in names), *together]
+    return [*((name,) for name in names), *together, *([rooms] if rooms else [])]
+
+
+def _layers_of_rooms(shapes: Sequence[Shape]) -> tuple[str, ...]:
+    """All layers of rooms, where each room has one of its own: they are tried together."""
+    names = {shape.layer for shape in shapes if shape.role == "rooms"}
+    return tuple(sorted(names)) if len(names) > 1 else ()
 
 
 def _lengths(shapes: Sequence[Shape]) -> Iterator[tuple[str, float]]:
@@ -179,6 +189,8 @@ def _trial(
     try:
         sheet = labelled(sheet_of(drawing, with_layers(options, found), source=source))
         made = derive(sheet)
+    except UnitAsked as error:
+        return replace(found, refusal=str(error).partition(": ")[2], units=error.choices)
     except InputError as error:
         return replace(found, refusal=str(error).partition(": ")[2])
     area = sum(room.area for room in made.shown.rooms)
@@ -280,9 +292,9 @@ def _best(trials: Sequence[WallLayers]) -> WallLayers | None:
     return replace(first, weight=ENOUGH - 1)
 
 
-def _rank(trial: WallLayers) -> tuple[int, int, bool, int, float, tuple[str, ...]]:
-    """Sort key: the most probable walls first."""
+def _rank(trial: WallLayers) -> tuple[int, int, int, int, float]:
+    """Sort key: the most probable walls first; of equal ones, those with most lines."""
     return (
-        *(-trial.weight, -trial.count, bool(trial.refusal)),
-        *(len(trial.layers), -trial.area, trial.layers),
+        *(-trial.weight, -trial.count, bool(trial.refusal) + (bool(trial.refusal) and not trial.units)),
+        *(len(trial.layers), -trial.area),
     )

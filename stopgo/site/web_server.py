@@ -84,8 +84,12 @@ def state_file(options: SiteOptions) -> Path:
 
 
 @contextmanager
-def serving_site(options: SiteOptions, *, say: Callable[[str], None]) -> Iterator[str]:
+def serving_site(
+    options: SiteOptions, *, say: Callable[[str], None], link: Link | None = None
+) -> Iterator[str]:
     """Yield the address by which the first browser signs in; the site runs until the block ends.
+
+    `link` is to the robots, in place of one to the endpoint.
 
     Raises
     ------
@@ -102,7 +106,7 @@ def serving_site(options: SiteOptions, *, say: Callable[[str], None]) -> Iterato
         stopped = threading.Event()
         feed = EventFeed()
         held = None if options.keys is None else read_keys(options.keys, now=now_utc())
-        fleet = opened.enter_context(_fleet(options, held, feed, folder, stopped))
+        fleet = opened.enter_context(_fleet(options, held, feed, folder, stopped, link))
         parts = SiteParts(
             address=address, access=access, feed=feed, folder=folder, missions=fleet.missions,
             robots=fleet.robots, orders=fleet.orders, commander=fleet.commander,
@@ -223,7 +227,12 @@ def _recording(path: Path, known: KnownMission | None) -> Iterator[RunCollector]
 
 @contextmanager
 def _fleet(
-    options: SiteOptions, held: HeldKeys | None, feed: EventFeed, folder: SiteFiles, stopped: threading.Event
+    options: SiteOptions,
+    held: HeldKeys | None,
+    feed: EventFeed,
+    folder: SiteFiles,
+    stopped: threading.Event,
+    given: Link | None,
 ) -> Iterator[SiteFleet]:
     """Open the link to the robots and follow all that are expected, and all that show themselves."""
     from stopgo.bridge.link.zenoh_link import Guard, connecting
@@ -231,7 +240,8 @@ def _fleet(
     if held is not None and options.commander not in (None, held.holder.name):
         raise InputError(f"--as {options.commander}: the keys belong to {held.holder.name}; leave --as out")
     guard = Guard(held, options.insecure)
-    with connecting(options.endpoint, guard, open_s=options.timeout_s) as link:
+    opened = connecting(options.endpoint, guard, open_s=options.timeout_s)
+    with opened if given is None else nullcontext(given) as link:
         fleet = SiteFleet(link, options, held, feed, folder, stopped)
         for name, entry in options.vehicles.items():
             fleet.add_vehicle(name, entry)

@@ -27,6 +27,19 @@ needs_chromium = pytest.mark.skipif(
 )
 
 
+UNTIL = """new Promise((resolve) => {
+  const found = () => { try { return CONDITION; } catch { return null; } };
+  const done = (value) => { observer.disconnect(); clearInterval(now_and_then); resolve(value); };
+  const look = () => { const value = found(); if (value) done(value); };
+  const observer = new MutationObserver(look);
+  observer.observe(document, { subtree: true, childList: true, attributes: true, characterData: true });
+  const now_and_then = setInterval(look, 250);
+  setTimeout(() => done(null), 5000);
+  look();
+})"""
+"""Waits in the page: it looks again when the page changes, and now and then for what changes elsewhere."""
+
+
 class Tab:
     """One tab of a browser."""
 
@@ -77,12 +90,12 @@ class Tab:
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             try:
-                value = self.run(script)
-            except AssertionError:  # while the page is loaded
+                value = self.run(UNTIL.replace("CONDITION", script))
+            except AssertionError:  # while another page is loaded
                 value = None
+                time.sleep(0.02)
             if value or value == {}:  # an element has no value of its own
                 return value
-            time.sleep(0.03)
         text = self.run("document.body.innerText")
         raise AssertionError(f"never true: {script}\n{self.problems}\n{text}")
 

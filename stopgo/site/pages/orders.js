@@ -64,15 +64,21 @@ async function give(name, order, question) {
   await sent(name, question, (more) => send(path, { id: orderId(), ...order, ...more }));
 }
 
-// Another operator's lease is not taken without a question.
-async function sent(name, question, work) {
+// Refusals that another word of the operator lifts: question, answer, and what is sent then.
+const TAKE_OVER = ["take_over_question", "take_over", { take_over: true }];
+const REMEDIES = {
+  not_the_commander: TAKE_OVER, fenced: TAKE_OVER, finished_before: ["confirm_start", "verb_start", { again: true }],
+  not_at_start: ["from_here_question", "from_here", { from_here: true }],
+};
+
+async function sent(name, question, work, more = {}) {
   try {
-    const { orders } = await work({});
-    const [record] = orders;
-    if (record.outcome === "refused" && ["not_the_commander", "fenced"].includes(record.reason)) {
-      const who = get("robot", name)?.lease?.holder ?? "?";
-      ask(question, t("take_over_question", { who, robot: name }), t("take_over"), () => work({ take_over: true }).catch((error) => fault(question, error)));
-    }
+    const { orders: [record] } = await work(more);
+    const remedy = record.outcome === "refused" && REMEDIES[record.reason];
+    if (!remedy) return;
+    const [text, yes, fields] = remedy;
+    const who = get("robot", name)?.lease?.holder ?? "?";
+    ask(question, t(text, { who, robot: name }), t(yes), () => sent(name, question, work, { ...more, ...fields }));
   } catch (error) {
     fault(question, error);
   }

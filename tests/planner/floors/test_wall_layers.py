@@ -134,6 +134,23 @@ def test_the_option_of_a_layer_with_spaces_can_be_pasted(tmp_path: Path) -> None
         read([lambda model: cells(model, "My lines")], tmp_path)
 
 
+def test_one_option_gives_layers_and_unit_where_both_are_missing(tmp_path: Path) -> None:
+    def far(model: Modelspace) -> None:
+        model.doc.header["$INSUNITS"] = 0
+        for k, x in enumerate((0, 25, 50, 75)):
+            rectangle(model, f"Room_{k}", x, 0, x + 25, 30)
+
+    with pytest.raises(InputError, match="and the unit is not certain; give ") as refused:
+        read([far], tmp_path)
+    first = str(refused.value).partition("; give ")[2].partition(" (")[0]
+    pasted = shlex.split(first)
+    assert pasted[:8:2] == ["--layer"] * 4
+    assert pasted[1:8:2] == [f"Room_{k}=walls" for k in range(4)]
+    assert pasted[8] == "--units"
+    layers = {f"ROOM_{k}": "walls" for k in range(4)}
+    assert read([far], tmp_path, layers=layers, units=pasted[9]).area > 5
+
+
 def test_walls_are_found_among_layers_of_other_lines(tmp_path: Path) -> None:
     def frame(model: Modelspace) -> None:
         rectangle(model, "SHEET", -3, -3, 13, 9)
