@@ -1,4 +1,4 @@
-"""What an autopilot that drives our mission by itself writes into its own log, a file for each boot."""
+"""The own log of an autopilot that drives our mission by itself, a file for each boot."""
 
 from __future__ import annotations
 
