@@ -57,19 +57,19 @@ class Replay:
         own = [
             event.pose
             for event in self.run.events
-            if isinstance(event, Scanned | Unconfirmed) and event.stop not in self.untold
+            if isinstance(event, Scanned | Unconfirmed) and event.stop not in self.unlogged
         ]
         return np.array([(pose.x, pose.y, pose.heading) for pose in own if pose is not None]).reshape(-1, 3)
 
     @cached_property
-    def untold(self) -> frozenset[str]:
-        """Stops of whose scan the log tells nothing, where it tells of one at another stop.
+    def unlogged(self) -> frozenset[str]:
+        """Stops without a scan in the log, where it contains one at another stop.
 
-        Inferred events tell of triggers; a vehicle's own events, of finished scans.
+        Inferred events contain triggers; a vehicle's own events, finished scans.
         """
         kind = Settled if self.inferred else Scanned
-        told = {event.stop for event in self.run.events if isinstance(event, kind)}
-        return frozenset(stop.id for stop in self.mission.stops if told and stop.id not in told)
+        logged = {event.stop for event in self.run.events if isinstance(event, kind)}
+        return frozenset(stop.id for stop in self.mission.stops if logged and stop.id not in logged)
 
     @cached_property
     def extra(self) -> tuple[Match, ...]:

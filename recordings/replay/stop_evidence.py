@@ -112,16 +112,16 @@ def _of_visit(replay: Replay, number: int, item: StopComparison, errors: Positio
     elif within == "unknown":
         why = DRIFTS if errors.drifts else NOISE
     elif within == "yes":
-        why = other_storey(replay, number) or _scan_untold(replay, item.stop)
+        why = other_storey(replay, number) or _why_unlogged(replay, item.stop)
     elif replay.inferred:
         why = _why_unseen(replay, number, errors, halted=True)
     return StopEvidence(item, "unknown" if why else within, why)
 
 
-def _scan_untold(replay: Replay, stop: str) -> str:
+def _why_unlogged(replay: Replay, stop: str) -> str:
     if replay.inferred and _restarted_in_scan(replay, stop):
         return RESTARTED
-    if stop not in replay.untold:
+    if stop not in replay.unlogged:
         return ""
     return NO_TRIGGER if replay.inferred else NO_REPORT
 
