@@ -41,7 +41,7 @@ def seen_surface(route: Route) -> SeenSurface | None:
 
 
 def _between_rays(route: Route, stop: FloatArray, units: IntArray) -> FloatArray:
-    """Share of each unit that rays hit (units,): less than 1 where it is seen so flat that some miss it."""
+    """Fraction of each unit that rays hit (units,): less than 1 where it is seen so flat that some miss."""
     targets = route.space.targets
     along = (targets.b - targets.a)[targets.unit_segment[units]]
     sight = targets.unit_xy[units] - stop
