@@ -82,7 +82,11 @@ def _fits(value: Any, kind: str) -> bool:
     wanted = {"boolean": bool, "string": str, "float": float, "double": float}.get(kind)
     if wanted is not None:
         return isinstance(value, wanted)
-    return isinstance(value, int) and not isinstance(value, bool) if "int" in kind.split("<")[0] else True
+    return (
+        isinstance(value, int) and not isinstance(value, bool)
+        if "int" in kind.split("<", maxsplit=1)[0]
+        else True
+    )
 
 
 def _as_type(value: Any, kind: str) -> Any:

@@ -1,4 +1,4 @@
-"""What RViz and a behaviour tree would see of a run, and call: prints one JSON object."""
+"""The topics of a run as RViz shows them, and two commands: prints one JSON object."""
 
 from __future__ import annotations
 
