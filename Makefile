@@ -13,7 +13,7 @@ TYPES := $(wildcard planner/*/*_compiled.pxd planner/*/*/*_compiled.pxd)
 # Every test that starts a process would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo docs test lint types faults benchmarks wheels clean
+.PHONY: demo docs test lint types faults ros2 benchmarks wheels clean
 
 # pip would compile all packages one after another; what is imported is compiled then, by as many as import it.
 $(STAMP): pyproject.toml setup.py constraints.txt $(TYPES) $(TYPES:_compiled.pxd=.py)
@@ -31,18 +31,22 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 
-# Most tests of links wait for something, so six files at a time are run even on two processors; in the order that
-# tests/conftest.py deals them out, for the longest have the fewest tests and would come last. mypy, which uses one
-# processor, runs beside them and speaks last.
+# Most tests of links wait for something, so six files at a time are run even on two processors (tests/workers.py), in
+# the order that tests/conftest.py deals them out. mypy, which uses one processor, runs beside them and speaks last.
 test: lint
 	@$(BIN)/mypy >$(VENV)/types.txt 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -n 6 --dist loadfile --no-loadscope-reorder; tests=$$?; \
+	$(BIN)/python -m pytest -p tests.workers --workers 6; tests=$$?; \
 	wait $$types; typed=$$?; cat $(VENV)/types.txt; \
 	[ $$tests -eq 0 ] && [ $$typed -eq 0 ]
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
 	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/recordings/truth tests/bridge/mavlink/driving/test_driving_processes.py
+
+# A real ROS 2 of wheels in .venv-ros2 (330 MB), and the tests that drive a mission with it.
+ros2: $(STAMP)
+	$(BIN)/python -m tests.ros2.environment
+	$(BIN)/python -m pytest tests/ros2
 
 benchmarks: $(STAMP)
 	$(BIN)/python -m benchmarks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import sys
 from functools import cache
@@ -44,6 +45,7 @@ COMMANDS = {
 `add_commands(app)` and imports slow libraries where used. A word loads its own module only."""
 
 INTERRUPTED = 130
+ROS_ARGUMENTS = "--ros-args"
 HELP = (["--help"], ["-h"], ["--help-all"])
 COMPLETING = "_STOPGO_COMPLETE"
 """Set by the shell's completion that `--install-completion` sets up."""
@@ -155,7 +157,7 @@ def _name_of(made: CommandInfo, get_command_name: Callable[[str], str]) -> str:
 def _run(arguments: list[str]) -> int:
     """Run one command and return its exit code, if it does not raise."""
     _must_be_text(arguments)
-    arguments, renamed = with_new_names(arguments)
+    arguments, renamed = with_new_names(with_ros_arguments(arguments))
     for line in renamed:
         notice(line)
     if COMPLETING in os.environ:  # a shell asks what the words typed so far may become
@@ -168,6 +170,15 @@ def _run(arguments: list[str]) -> int:
     with command.make_context("stopgo", list(arguments)) as context:
         result = command.invoke(context)
     return result if isinstance(result, int) else 0
+
+
+def with_ros_arguments(arguments: list[str]) -> list[str]:
+    """Return the arguments with those after --ros-args as its one value, up to a -- as of every ROS node."""
+    if ROS_ARGUMENTS not in arguments:
+        return arguments
+    at = arguments.index(ROS_ARGUMENTS) + 1
+    end = arguments.index("--", at) if "--" in arguments[at:] else len(arguments)
+    return [*arguments[:at], shlex.join(arguments[at:end]), *arguments[end + 1 :]]
 
 
 def _must_be_text(arguments: list[str]) -> None:

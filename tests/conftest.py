@@ -1,4 +1,4 @@
-"""What holds for every test."""
+"""Rules for every test."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -16,7 +15,6 @@ import pytest
 from hypothesis import settings
 
 from stopgo.mission.console import running_step
-from tests.alone import first_alone
 from tests.faults.sizes import FULL, size
 from tests.shell import forget_the_shell
 
@@ -47,8 +45,7 @@ def pytest_configure() -> None:
     """
     os.environ["MAVLINK20"] = "1"
     running_step.PATIENCE_S = math.inf
-    if "PYTEST_XDIST_WORKER" not in os.environ:  # workers have their parent's
-        os.environ["XDG_STATE_HOME"] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
+    os.environ["XDG_STATE_HOME"] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
     forget_the_shell()
     if not HAS_ROBOTS:
         _skip_what_opens_a_journal()
@@ -66,10 +63,9 @@ def _skip_what_opens_a_journal() -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[None]:
-    """Let one worker compile what all import; and look for no garbage among modules, which all stay."""
+    """Look for no garbage among modules, which all stay."""
     gc.disable()
-    with first_alone("collection") if "PYTEST_XDIST_WORKER" in os.environ else nullcontext():
-        yield
+    yield
     gc.enable()
 
 

@@ -283,8 +283,16 @@ ControllerKind = Annotated[
     str,
     typer.Option(
         "--controller",
-        metavar="sim|mavlink:URL|MODULE:FUNCTION",
-        help="Base and scanner: simulated, an autopilot's, or your own.",
+        metavar="sim|mavlink:URL|ros2[:FILE]|MODULE:FUNCTION",
+        help="Base and scanner: simulated, an autopilot's, of ROS 2, or your own.",
+    ),
+]
+RosArguments = Annotated[
+    str,
+    typer.Option(
+        "--ros-args",
+        metavar="...",
+        help="ros2: the rest of the line is for the ROS node, as -r __ns:=/r1.",
     ),
 ]
 SimulatedPose = Annotated[

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import shlex
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +25,7 @@ from stopgo.bridge.commands.bridge_options import (
     LogSize,
     OnRevision,
     OwnName,
+    RosArguments,
     RouterEndpoint,
     ScannerTrigger,
     SetOriginOfAutopilot,
@@ -49,8 +52,11 @@ if TYPE_CHECKING:
 
 MAVLINK = "mavlink:"
 """Before the URL of an autopilot that is the controller."""
+ROS2 = "ros2"
+"""The controller that speaks ROS 2; after a colon the file of its names."""
 LONGEST_BATTERY_LIFE_S = 1e6
 ONLY_SIMULATED = ("--at", "--map", "--fault", "--speed-up", "--battery-life")
+ONLY_ROS = ("--ros-args",)
 ONLY_DRIVEN = ("--arm", "--set-origin", "--set-timeout", "--trigger", "--vehicle", "--signing-key")
 """Options of `--controller sim`, and of `--controller mavlink:URL`; with the other one they are refused."""
 
@@ -79,18 +85,17 @@ def robot(
     set_timeout: SetTimeout = False,
     trigger: ScannerTrigger = "camera",
     signing_key: SigningKey = None,
+    ros_args: RosArguments = "",
 ) -> None:
-    """Run the robot agent with a simulated base and scanner, or those of an autopilot, until SIGTERM.
+    """Run the robot agent with a simulated base and scanner, an autopilot's, or ROS 2's, until SIGTERM.
 
-    Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
-
-    Example: stopgo robot --name r1 --state r1.state --controller mavlink:serial:/dev/ttyAMA0:921600
+    Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --controller ros2
     """
     from stopgo.bridge.robot.program import RobotOptions
 
     simulated = SimulatedOptions(at, read_map(map_), read_battery_life(battery_life), read_faults(fault))
     driven = AutopilotOptions(arm, set_origin, set_timeout, trigger, signing_key, vehicle, insecure)
-    body = body_of(controller, state, given_options(context), simulated, driven)
+    body = body_of(controller, state, given_options(context), simulated, driven, ros_args)
     run(RobotOptions(
         name, listen, state, body, connect=connect, site=site, speed_up=speed_up, to_map=simulated.to_map,
         insecure=insecure, keys=keys, revisions=read_revisions(revision), faults=simulated.faults, say=say,
@@ -132,9 +137,17 @@ class AutopilotOptions:
 
 
 def body_of(
-    controller: str, state: Path, given: GivenOptions, simulated: SimulatedOptions, driven: AutopilotOptions
+    controller: str,
+    state: Path,
+    given: GivenOptions,
+    simulated: SimulatedOptions,
+    driven: AutopilotOptions,
+    ros_args: str,
 ) -> OpenBody:
     """Return the base and scanner of a kind of controller; raise `InputError` for options of another kind."""
+    if controller.partition(":")[0] == ROS2:
+        return ros_body_of(controller, given, simulated, ros_args)
+    refuse_options(given, "a controller that is not ros2", *ONLY_ROS)
     if controller == "sim":
         from stopgo.bridge.robot.robot_hardware import SimulatedBody
 
@@ -155,6 +168,21 @@ def body_of(
     others = tuple(option for option in ONLY_SIMULATED if option != "--map")
     refuse_options(given, "a controller of your own", *others, *ONLY_DRIVEN)
     return plugin_body(controller, state, simulated.to_map)
+
+
+def ros_body_of(controller: str, given: GivenOptions, simulated: SimulatedOptions, ros_args: str) -> OpenBody:
+    """Return the base and scanner of a robot that speaks ROS 2."""
+    from stopgo.bridge.ros2.rclpy_port import open_rclpy
+    from stopgo.bridge.ros2.ros_body import RosBody
+    from stopgo.bridge.ros2.ros_settings import read_ros_settings
+    from stopgo.bridge.ros2.run_topics import RunTopics
+
+    others = tuple(option for option in ONLY_SIMULATED if option != "--map")
+    refuse_options(given, "ROS 2", *others, *ONLY_DRIVEN)
+    file = controller.partition(":")[2]
+    settings = read_ros_settings(Path(file) if file else None)
+    arguments = ("--ros-args", *shlex.split(ros_args)) if ros_args else ()
+    return RosBody(settings, partial(open_rclpy, ros_args=arguments), RunTopics, simulated.to_map)
 
 
 def read_faults(texts: list[str] | None) -> Faults:

@@ -95,8 +95,8 @@ def _quiet() -> Iterator[None]:
 def _load(data: bytes) -> Drawing:
     if data.startswith(_BINARY):
         return Drawing.load(binary_tags_loader(data, errors="surrogateescape"))
-    info = dxf_stream_info(io.StringIO(data.decode("utf-8", errors="ignore")))
-    # Universal newlines, as when the file itself is opened: \r\n must not reach the tags.
+    # Universal newlines, as when the file itself is opened: no tag may end in \r, neither the header's.
+    info = dxf_stream_info(io.StringIO(data.decode("utf-8", errors="ignore"), newline=None))
     stream = io.TextIOWrapper(io.BytesIO(data), encoding=info.encoding, errors="surrogateescape")
     return ezdxf.read(stream)
 

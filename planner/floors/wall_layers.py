@@ -28,7 +28,8 @@ from stopgo.planner.floors.linework import Derived
 from stopgo.planner.floors.reader import FloorOptions
 from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.strokes import Word, sketch
-from stopgo.planner.floors.units.unit_evidence import area_in
+from stopgo.planner.floors.units import UnitAsked
+from stopgo.planner.floors.written_measures import area_in
 
 ENOUGH = 2
 """Evidence of this weight shows walls; one kind of it alone does not."""
@@ -52,9 +53,9 @@ _LIKE_FLOOR = 0.9
 _ROWS = 0.95
 """Rooms that all have the same area, up to this fraction, are rows of a table."""
 _FLOOR_M2 = (5.0, 50_000.0)
-_WIDEST_GAP = 1.6
+WIDEST_GAP = 1.6
 """Outer walls with a wider gap, in metres, may be those of several drawings."""
-_MOST_STRAY = 0.3
+MOST_STRAY = 0.3
 """Walls of which more than this fraction lies off the floor are other lines too."""
 UNTOLD = ("other", "rooms")
 """Roles whose lines may be walls in a drawing without a layer of walls …"""
@@ -81,9 +82,13 @@ class WallLayers:
     evidence: tuple[str, ...] = ()
     count: int = 0
     """Doors, passages, names and areas that are evidence."""
+    is_doubted: bool = False
+    """True if the floor is no storey, or written areas are false."""
     area: float = 0.0
     refusal: str = ""
     """Reason why these layers give no floor."""
+    units: tuple[tuple[str, str], ...] = ()
+    """Options for the unit, each with what it makes, where only the unit is missing."""
     sheet: DxfSheet | None = None
     """The drawing as read in the trial, if it gives a floor."""
 
@@ -124,11 +129,28 @@ def wall_layers(
     *,
     source: Path,
     roles: tuple[str, ...] = UNTOLD,
+    more_than: tuple[str, ...] = (),
 ) -> WallLayers | None:
-    """Return the layers of these roles that most probably hold the walls; None if none has lines."""
+    """Return the layers of these roles that most probably hold the walls.
+
+    None if none has lines, or none of them has a role that is not in `more_than`.
+    """
     seen = layers_of(drawing, options, source=source)
+    if not any(shape.role in roles and shape.role not in more_than for shape in seen.shapes):
+        return None
     candidates = _candidates([shape for shape in seen.shapes if shape.role in roles])
-    return _best([_trial(drawing, options, names, derive, source) for names in candidates])
+    named = frozenset(shape.layer for shape in seen.shapes if shape.role == "walls")
+    trials = [_trial(drawing, options, names, derive, source) for names in candidates]
+    return _best([_with_names(trial, named) for trial in trials])
+
+
+def _with_names(trial: WallLayers, named: frozenset[str]) -> WallLayers:
+    """The trial, with the names of its layers as evidence if all layers of walls are among them."""
+    if not named or trial.refusal or not named <= set(trial.layers):
+        return trial
+    says = f"{', '.join(sorted(named))} {'are' if len(named) > 1 else 'is'} named as walls"
+    weight = trial.weight + (not trial.is_doubted)
+    return replace(trial, weight=weight, evidence=(*trial.evidence, says))
 
 
 def with_layers(options: FloorOptions, found: WallLayers) -> FloorOptions:
@@ -156,11 +178,18 @@ def _candidates(shapes: Sequence[Shape]) -> list[tuple[str, ...]]:
         lengths[layer] = lengths.get(layer, 0.0) + length
     whole = sum(lengths.values())
     is_large = len(shapes) > _LARGE
-    names = sorted(lengths, key=lambda name: (-lengths[name], name))
+    rooms = _layers_of_rooms(shapes)
+    names = sorted(lengths.keys() - set(rooms), key=lambda name: (-lengths[name], name))
     names = names[: _MOST_OF_LARGE if is_large else _MOST_LAYERS]
     names = [name for name in names if lengths[name] >= _LEAST_SHARE * whole]
     together = [tuple(sorted(names))] if len(names) > 1 and not is_large else []
-    return [*((name,) for name in names), *together]
+    return [*((name,) for name in names), *together, *([rooms] if rooms else [])]
+
+
+def _layers_of_rooms(shapes: Sequence[Shape]) -> tuple[str, ...]:
+    """All layers of rooms, where each room has one of its own: they are tried together."""
+    names = {shape.layer for shape in shapes if shape.role == "rooms"}
+    return tuple(sorted(names)) if len(names) > 1 else ()
 
 
 def _lengths(shapes: Sequence[Shape]) -> Iterator[tuple[str, float]]:
@@ -179,6 +208,8 @@ def _trial(
     try:
         sheet = labelled(sheet_of(drawing, with_layers(options, found), source=source))
         made = derive(sheet)
+    except UnitAsked as error:
+        return replace(found, refusal=str(error).partition(": ")[2], units=error.choices)
     except InputError as error:
         return replace(found, refusal=str(error).partition(": ")[2])
     area = sum(room.area for room in made.shown.rooms)
@@ -209,6 +240,7 @@ def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLay
     return replace(
         found,
         weight=min(weight, ENOUGH - 1) if is_doubted else weight,
+        is_doubted=is_doubted,
         evidence=tuple(text for _, text in told),
         count=seen.true + seen.named + shown.doors + shown.passages,
     )
@@ -217,7 +249,7 @@ def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLay
 def _is_no_storey(made: Derived, words: Sequence[Word]) -> bool:
     """Return True if a title names a view that is no storey, or other lines lie among the walls."""
     shown = made.shown
-    if shown.closed_over > _WIDEST_GAP or shown.stray > _MOST_STRAY:
+    if shown.closed_over > WIDEST_GAP or shown.stray > MOST_STRAY:
         return True
     return any(_NO_PLAN.search(word.text) for word in words)
 
@@ -280,9 +312,9 @@ def _best(trials: Sequence[WallLayers]) -> WallLayers | None:
     return replace(first, weight=ENOUGH - 1)
 
 
-def _rank(trial: WallLayers) -> tuple[int, int, bool, int, float, tuple[str, ...]]:
-    """Sort key: the most probable walls first."""
+def _rank(trial: WallLayers) -> tuple[int, int, int, int, float]:
+    """Sort key: the most probable walls first; of equal ones, those with most lines."""
     return (
-        *(-trial.weight, -trial.count, bool(trial.refusal)),
-        *(len(trial.layers), -trial.area, trial.layers),
+        *(-trial.weight, -trial.count, bool(trial.refusal) + (bool(trial.refusal) and not trial.units)),
+        *(len(trial.layers), -trial.area),
     )

@@ -17,6 +17,7 @@ from collections import Counter
 from pathlib import Path
 
 from tests.faults.test_kill import HARSH, OPEN, Outcome, guarded, trial, trial_of_a_revision
+from tests.workers import NUMBER
 
 KINDS = ("without keys",) * 5 + ("with keys",) * 4 + ("revision",)
 TOLD_EVERY = 20
@@ -49,7 +50,7 @@ def main() -> int:
 def counted(seed: int) -> tuple[str, Outcome, str]:
     """Carry out the trial of a seed: its kind, its counts, and the violation that it found; empty if none."""
     # Each process has ports of its own (`tests.ports`).
-    os.environ["PYTEST_XDIST_WORKER"] = f"gw{multiprocessing.current_process()._identity[0]}"
+    os.environ[NUMBER] = str(multiprocessing.current_process()._identity[0])
     kind = KINDS[seed % len(KINDS)]
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)

@@ -135,6 +135,16 @@ def with_gateway(guide: Place) -> None:
     guide.words["mavlink:serial:/dev/ttyAMA0:921600"] = "mavlink:udpout:127.0.0.1:14550"
 
 
+def with_vehicles(guide: Place) -> None:
+    """A robot, and the guide's roster of vehicles."""
+    with_robot(guide)
+    with_vehicle(guide)
+    (roster,) = blocks_of("how-to/site.md", "toml")
+    (guide.folder / "robots.toml").write_text(roster, encoding="utf-8")
+    (guide.folder / "rover.key").write_text("0123456789abcdef" * 4)
+    (guide.folder / "rover.key").chmod(0o600)
+
+
 def with_radio(guide: Place) -> None:
     guide.words["serial:/dev/ttyAMA1:57600"] = "udpin:127.0.0.1:14551"
 
@@ -156,7 +166,7 @@ def with_campus(guide: Place) -> None:
     """The guide's two files in one, with the floors and paths that they name."""
     batch, day = blocks_of("how-to/campus.md", "toml")
     (guide.folder / "plans.toml").write_text(f"{batch}\n{day}", encoding="utf-8")
-    (guide.folder / "ways.csv").write_text("from,to,minutes\ntower/EG,hall,5\n")
+    (guide.folder / "transfers.csv").write_text("from,to,minutes\ntower/EG,hall,5\n")
     for name in ("models", "drawings"):
         (guide.folder / name).mkdir()
     house_of_two_rooms_on_time().write(guide.folder / "models" / "tower.ifc")
@@ -188,7 +198,7 @@ PREPARED: dict[str, Callable[[Place], None]] = {
     "floors": with_models, "conform": with_robot, "deployment": with_keys, "gateway": with_gateway,
     "replay": with_log, "push-to-autopilot": lambda guide: with_vehicle(guide, has_origin=False),
     "run-on-autopilot": with_vehicle, "tunnel": with_radio, "plugins": with_plugins, "campus": with_campus,
-    "review": with_runs, "exports": with_parameters, "README": with_robot, "site": with_robot,
+    "review": with_runs, "exports": with_parameters, "README": with_robot, "site": with_vehicles,
 }  # fmt: skip
 
 

@@ -34,6 +34,7 @@ def example() -> ModuleType:
     return module
 
 
+@pytest.mark.rerun_threads
 @pytest.mark.filterwarnings("ignore")
 def test_the_example_tells_every_run_and_stop(
     folder: Path, mission: Mission, capsys: pytest.CaptureFixture[str]
@@ -47,6 +48,7 @@ def test_the_example_tells_every_run_and_stop(
     assert {int(row[0]) for row in rows.values()} == {len(RUNS)}
 
 
+@pytest.mark.rerun_threads
 @pytest.mark.filterwarnings("ignore")
 def test_the_documented_columns_are_those_of_the_recordings(folder: Path) -> None:
     """The tables of docs/reference/recordings.md name an entity, and its columns, one a row."""

@@ -25,9 +25,12 @@ from tests.recordings.conftest import write_field, write_plan
 from tests.recordings.pictures import LIMIT, WRONG, difference, fields, kept
 from tests.recordings.viewer import PATIENCE_S, has_vulkan, look, viewer
 
-pytestmark = pytest.mark.skipif(
-    not has_vulkan(), reason="no Vulkan driver: install mesa-vulkan-drivers to look at recordings"
-)
+pytestmark = [
+    pytest.mark.rerun_threads,
+    pytest.mark.skipif(
+        not has_vulkan(), reason="no Vulkan driver: install mesa-vulkan-drivers to look at recordings"
+    ),
+]
 
 WINDOW = "1200x750"
 SMALL = "800x500"

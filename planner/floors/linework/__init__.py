@@ -30,6 +30,7 @@ from stopgo.planner.floors.linework.walls import SolidWalls, walls_of
 from stopgo.planner.floors.parts import outline_of
 from stopgo.planner.floors.rings import GAP, Region, canonical_region, polygons_of
 from stopgo.planner.floors.strokes import Stroke, Word
+from stopgo.planner.floors.written_measures import is_only_area
 
 _COVERS = 0.6
 """A drawn floor is used if it covers this fraction of the area that the walls enclose."""
@@ -43,8 +44,10 @@ _STRAY = 0.1
 """Lines farther than this from the floor, in metres, lie off it."""
 _LABEL_CUT = 0.05
 """Depth in metres of the lines that part rooms by their names."""
-PATTERN = 150
-"""This many small cells among the lines of walls are a pattern of tiles or a hatch."""
+_PATTERN = 150
+"""This many small cells among the lines of walls are a pattern of tiles or a hatch, …"""
+_PATTERN_DENSITY = 0.15
+"""… if there are that many on a square metre; large buildings have as many niches and shafts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +78,7 @@ class Derived:
     words: list[Word]
     findings: list[Finding]
     cells: int = 0
-    """Small spaces among the lines of walls."""
+    """Small spaces among the lines of walls, if they are a pattern."""
     shown: Shown = Shown()
     """Traits of a building in the line work."""
 
@@ -155,7 +158,7 @@ def derived(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
     """The strokes of a layered floor that the line work shows; none of a pattern."""
     site = _Site(_origin(strokes), strokes, words)
     whole, leaves = _whole_walls(site)
-    if whole.cells >= PATTERN:
+    if _is_pattern(whole):
         return Derived([], [], site.findings, whole.cells)
     walls, gaps = _walls_and_gaps(site, whole, leaves)
     spaces = _spaces(site, walls, gaps)
@@ -168,7 +171,15 @@ def derived(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
         *_things(site),
     ]
     named = [as_room_name(word) for word in words]
-    return Derived(made, named, site.findings, walls.cells, _shown(site, whole, gaps, rooms, spaces))
+    return Derived(made, named, site.findings, shown=_shown(site, whole, gaps, rooms, spaces))
+
+
+def _is_pattern(walls: SolidWalls) -> bool:
+    """True if walls enclose as many cells smaller than a room as only tiles and hatches do."""
+    if walls.cells < _PATTERN:
+        return False
+    x0, y0, x1, y1 = shapely.total_bounds([*walls.solids, *walls.lines])
+    return bool(walls.cells >= _PATTERN_DENSITY * (x1 - x0) * (y1 - y0))
 
 
 def _shown(
@@ -274,7 +285,7 @@ def _rooms(
         return _parting(gaps, shapely.transform(shown, lambda xy: xy - site.origin)), []
     kept = _parting(gaps, rooms_within(spaces.floor, _barriers(site, walls, gaps)))
     rooms = rooms_within(spaces.floor, _barriers(site, walls, kept))
-    parted, cuts = parted_by_labels(rooms, [at for _, at in site.names()])
+    parted, cuts = parted_by_labels(rooms, [at for text, at in site.names() if not is_only_area(text)])
     return [*kept, *(WallGap("passage", cut, _LABEL_CUT, held=True) for cut in cuts)], parted
 
 

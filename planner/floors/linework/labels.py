@@ -19,6 +19,10 @@ _MOST_CORNERS = 500
 _DETAIL = 0.03
 """Corners of this size, in metres, are not corners of a room."""
 _KERF = 0.01
+_ENDS = 0.12
+"""Cuts end this near to the outline that they part, in metres."""
+_GRID = 1e-6
+"""Cuts are made on a grid of this width in metres: on free coordinates, nearly equal edges have no result."""
 
 
 def parted_by_labels(
@@ -51,7 +55,7 @@ def _cut(
     """The parts with one of them cut in two, if both halves have a label."""
     middle = shapely.Point(cut.mean(axis=0))
     for k, part in enumerate(parts):
-        if not part.intersects(middle) or _labelled(part, labels) < 2:
+        if not part.intersects(middle) or not _may_part(part, cut, labels):
             continue
         halves = _halves(part, cut)
         if len(halves) == 2 and all(_labelled(half, labels) for half in halves):
@@ -59,18 +63,41 @@ def _cut(
     return list(parts), False
 
 
+def _may_part(part: shapely.Polygon, cut: FloatArray, labels: Sequence[shapely.Point]) -> bool:
+    """False if a cut has no label on one of its sides: most cuts are known so without being made.
+
+    A line from one ring of the outline to another parts nothing.
+    """
+    ends = shapely.points(cut)
+    rings = (part.exterior, *part.interiors)
+    own = next((ring for ring in rings if shapely.distance(ring, ends).max() <= _ENDS), None)
+    if own is None:
+        return False
+    corners = shapely.get_coordinates(own)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    begin, end = sorted(shapely.line_locate_point(own, ends).tolist())
+    between = corners[(along > begin) & (along < end)]
+    ring = np.vstack([own.interpolate(begin).coords, between, own.interpolate(end).coords])
+    if len(ring) < 3:
+        return False
+    held = np.asarray(labels)[shapely.intersects(part, labels)]
+    within = np.count_nonzero(shapely.dwithin(shapely.Polygon(ring), held, _KERF))
+    return bool(0 < within < len(held))
+
+
 def _halves(part: shapely.Polygon, cut: FloatArray) -> list[shapely.Polygon]:
     """Parts on both sides of a cut; a cut may run along walls' faces, so it has a width."""
     direction = (cut[1] - cut[0]) / np.hypot(*(cut[1] - cut[0]))
     line = shapely.LineString([cut[0] - 3 * _DETAIL * direction, cut[1] + 3 * _DETAIL * direction])
-    pieces = polygons_of(part.difference(line.buffer(_KERF / 2, cap_style="flat")))
+    pieces = polygons_of(part.difference(line.buffer(_KERF / 2, cap_style="flat"), grid_size=_GRID))
     halves = [piece for piece in pieces if piece.area >= _LEAST]
     if len(halves) != 2:
         return halves
-    first = part.intersection(halves[0].buffer(_KERF, join_style="mitre"))
+    within = part.intersection(halves[0].buffer(_KERF, join_style="mitre"), grid_size=_GRID)
+    first = shapely.union_all(polygons_of(within))
     return [
         piece
-        for half in (first, part.difference(first))
+        for half in (first, part.difference(first, grid_size=_GRID))
         for piece in polygons_of(half)
         if piece.area >= _LEAST
     ]

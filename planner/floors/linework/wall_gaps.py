@@ -94,15 +94,16 @@ def without_doors(lines: Sequence[FloatArray]) -> tuple[list[FloatArray], list[F
     if not swings:
         return list(lines), []
     drawn = {id(line) for line, _ in swings}
-    ends = [(swing.hinge, end) for _, swing in swings for end in swing.ends]
-    leaves = [line for line in lines if len(line) == 2 and any(_runs(line, *leaf) for leaf in ends)]
+    ends = np.array([(swing.hinge, end) for _, swing in swings for end in swing.ends])
+    leaves = [line for line in lines if len(line) == 2 and _is_leaf(line, ends)]
     apart = drawn | set(map(id, leaves))
     return [line for line in lines if id(line) not in apart], [line for line in lines if id(line) in apart]
 
 
-def _runs(line: FloatArray, a: FloatArray, b: FloatArray) -> bool:
-    """True if a line goes from `a` to `b` or back, within 2 cm."""
-    return any(np.abs(line - np.array(ends)).max() <= _TOUCH for ends in ((a, b), (b, a)))
+def _is_leaf(line: FloatArray, leaves: FloatArray) -> bool:
+    """True if a line goes along one of the leaves (n, 2, 2), or back, within 2 cm."""
+    off = [np.abs(leaves - ends).max(axis=(1, 2)).min() for ends in (line, line[::-1])]
+    return bool(min(off) <= _TOUCH)
 
 
 class _Near:
@@ -161,7 +162,7 @@ class _Strokes:
 
 
 def _leaf(swing: Swing, leaves: _Strokes, walls: _Near) -> Leaf:
-    """Which end of a swing is shut: where walls go on beyond hinge and edge, and no leaf is drawn."""
+    """End of a swing at which the door is shut: walls go on beyond hinge and edge, and no leaf is drawn."""
     near = walls.around(shapely.MultiPoint([swing.hinge, *swing.ends]), 0.5)
     drawn = [leaves.along(swing.hinge, end) for end in swing.ends]
     away = [_to_walls(swing.hinge, end, near) for end in swing.ends]
@@ -220,7 +221,7 @@ def _depth(
 
 
 def _common(depths: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Where walls of both jambs reach; if they do not overlap, the one nearest the line."""
+    """Extent of the walls of both jambs; if they do not overlap, of the one nearest the line."""
     if not depths:
         return -0.05, 0.05
     low, high = max(d[0] for d in depths), min(d[1] for d in depths)

@@ -27,6 +27,14 @@ _USUAL = (3.0, 400.0)
 _DOOR = (0.4, 4.0)
 
 
+class UnitAsked(InputError):
+    """No unit of a drawing is probable enough; `choices` are the options to give, each with what it makes."""
+
+    def __init__(self, message: str, choices: Sequence[tuple[str, str]]) -> None:
+        super().__init__(message)
+        self.choices = tuple(choices)
+
+
 def unit_of(
     drawing: Drawing, shapes: Sequence[Shape], given: str | None, *, outlined: bool, source: Path
 ) -> tuple[float, list[Finding]]:
@@ -44,7 +52,8 @@ def unit_of(
     header = _header_code(drawing)
     ranked = sorted(probabilities(evidence, header=header).items(), key=lambda item: (-item[1], item[0]))
     if ranked[0][1] < BELIEVED and max(evidence.size) > 0:
-        raise InputError(f"{source}: {_question(ranked, evidence, header)}")
+        choices = _choices(ranked, evidence)
+        raise UnitAsked(f"{source}: {_question(choices, header)}", choices)
     code = header if header in METRES and not max(evidence.size) else ranked[0][0]
     return METRES[code][1], _findings(code, header, ranked[0][1], evidence)
 
@@ -75,14 +84,20 @@ def _header_code(drawing: Drawing) -> int:
     return int(value) if isinstance(value, int | float) and math.isfinite(value) else 0
 
 
-def _question(ranked: Sequence[tuple[int, float]], evidence: UnitEvidence, header: int) -> str:
-    """Message that names the two most probable units, each with the size it makes."""
-    says = f"the header says {METRES[header][0]}" if header in METRES else "the header names no unit"
-    choices = " or ".join(
-        f"--units {SHORT.get(code, METRES[code][0])} ({_size_text(evidence, code)}, {share:.0%} probable)"
+def _choices(ranked: Sequence[tuple[int, float]], evidence: UnitEvidence) -> list[tuple[str, str]]:
+    """The options for the two most probable units, each with the size it makes."""
+    return [
+        (
+            f"--units {SHORT.get(code, METRES[code][0])}",
+            f"({_size_text(evidence, code)}, {share:.0%} probable)",
+        )
         for code, share in ranked[:2]
-    )
-    return f"the unit is not certain ({says}); give {choices}"
+    ]
+
+
+def _question(choices: Sequence[tuple[str, str]], header: int) -> str:
+    says = f"the header says {METRES[header][0]}" if header in METRES else "the header names no unit"
+    return f"the unit is not certain ({says}); give {' or '.join(map(' '.join, choices))}"
 
 
 def _size_text(evidence: UnitEvidence, code: int) -> str:
@@ -131,4 +146,4 @@ def _seen(evidence: UnitEvidence, factor: float) -> str:
     return ", ".join([*words, "its size"])
 
 
-__all__ = ["BELIEVED", "given_unit", "unit_of"]
+__all__ = ["BELIEVED", "UnitAsked", "given_unit", "unit_of"]

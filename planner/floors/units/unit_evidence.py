@@ -5,7 +5,6 @@ Door leaves, thickness of walls, heights of texts, texts of dimensions, and area
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -21,6 +20,7 @@ from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.linework.swings import swings_of
 from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.strokes import sketch, stretch_of, strokes_of, word_of
+from stopgo.planner.floors.written_measures import area_in, length_in
 from stopgo.planner.geometry.instance_cache import instance_cached
 
 _HOUSE = 30.0
@@ -32,20 +32,12 @@ _BLOCK = 64
 _SLIM = 25.0
 """Walls' faces are nearer to each other than this fraction of the drawing; lines of rooms are not."""
 _ROOM_ROLES = ("rooms", "walls", "floor", "names", "other")
+_LABELS = 3
+"""So many written areas must lie in different faces of lines to say something."""
 _NAMES = 3
 """Fewer names of rooms tell no usual distance."""
 _LINEAR = (0, 1, 6)
 """Types of dimensions that measure a length: linear, aligned, ordinate."""
-
-FOOT = 0.3048
-LENGTHS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": FOOT}
-_SUFFIX = {"MM": "mm", "CM": "cm", "M": "m", "IN": "in", '"': "in", "FT": "ft", "'": "ft"}
-_NUMBER = r"(\d+(?:[.,]\d+)?)"
-_PLAIN = re.compile(rf"^\s*{_NUMBER}\s*(MM|CM|M|IN|FT|\"|')?\s*$", re.IGNORECASE)
-_FEET = re.compile(rf"^\s*(\d+)'\s*-?\s*(?:{_NUMBER}(?:\s+(\d+)/(\d+))?\s*\")?\s*$")
-_AREA = re.compile(
-    rf"{_NUMBER}\s*(m2|m²|m\^2|qm|sqm|sq\.?\s?m|sq\.?\s?ft|sf|ft2|ft²)(?![a-z0-9])", re.IGNORECASE
-)
 
 
 @dataclass(frozen=True)
@@ -192,7 +184,7 @@ def _thickness(shapes: Sequence[Shape], size: float) -> float | None:
 
 
 def _next_parallel(segments: FloatArray, others: FloatArray) -> FloatArray:
-    """Distance from each segment (n, 2, 2) to the next line that runs beside at least half of it.
+    """Distance from each segment (n, 2, 2) to the next line that runs along at least half of it.
 
     Infinite where there is none.
     """
@@ -278,42 +270,48 @@ def _rendered(entity: DXFEntity) -> str:
     return str(item.plain_text() if hasattr(item, "plain_text") else item.dxf.text)
 
 
-def length_in(text: str) -> tuple[float, str | None, int] | None:
-    """The number in a dimension's text, its unit if the text names one, and its decimals."""
-    feet = _FEET.match(text)
-    if feet and feet.group(2):
-        whole, inches, over, under = feet.groups()
-        part = int(over) / int(under) if over and int(under) else 0.0
-        return int(whole) * 12 + float(inches.replace(",", ".")) + part, "in", 0
-    plain = _PLAIN.match(text)
-    if plain is None:
-        return None
-    number, suffix = plain.groups()
-    decimals = len(re.split("[.,]", number)[1]) if re.search("[.,]", number) else 0
-    return float(number.replace(",", ".")), _SUFFIX.get((suffix or "").upper()), decimals
+def _areas(shapes: Sequence[Shape], written: Sequence[Shape]) -> list[tuple[float, float]]:
+    """Areas that texts name, each with the area of the smallest closed shape around the text.
 
-
-def area_in(text: str) -> float | None:
-    """The area in m² that a text names, such as `30 m²`; None if it names none."""
-    found = _AREA.search(text)
-    if found is None:
-        return None
-    value = float(found.group(1).replace(",", "."))
-    return value * FOOT**2 if "f" in found.group(2).lower() else value
-
-
-def _areas(shapes: Sequence[Shape], written: Sequence[Shape]) -> Iterator[tuple[float, float]]:
-    """Areas that texts name, each with the area of the smallest closed shape around the text."""
+    If few lie in closed shapes of their own, the faces that lines enclose count, if several texts do.
+    """
     labels = [(area, at) for shape in written if shape.is_text for area, at in _labels(shape)]
     if not labels:
-        return
-    rings = [line for line in _closed(shapes) if len(line) > 3]
-    faces = [face for face in map(shapely.Polygon, rings) if face.is_valid and face.area > 0]
+        return []
+    found = _around(labels, _faces(_closed(shapes)))
+    if len({face for face, _, _ in found}) < _LABELS <= len(labels):
+        between = _around(labels, _enclosed(shapes))
+        found = between if len({face for face, _, _ in between}) >= _LABELS else found
+    return [(said, drawn) for _, said, drawn in found]
+
+
+def _around(
+    labels: Sequence[tuple[float, tuple[float, float]]], faces: Sequence[shapely.Polygon]
+) -> list[tuple[int, float, float]]:
+    """For each label in a face: the smallest face, the area in the text, and the face's."""
     tree = shapely.STRtree(faces)
+    found = []
     for area, at in labels:
-        around = tree.query(shapely.Point(at), predicate="within")
-        if len(around):
-            yield area, min(faces[k].area for k in around.tolist())
+        around = tree.query(shapely.Point(at), predicate="within").tolist()
+        if around:
+            face = min(around, key=lambda k: faces[k].area)
+            found.append((face, area, faces[face].area))
+    return found
+
+
+def _faces(rings: Iterable[FloatArray]) -> list[shapely.Polygon]:
+    faces = [shapely.Polygon(ring) for ring in rings if len(ring) > 3]
+    return [face for face in faces if face.is_valid and face.area > 0]
+
+
+def _enclosed(shapes: Sequence[Shape]) -> list[shapely.Polygon]:
+    """Faces between the lines that may be walls; none of a drawing with very many lines."""
+    own = [shape for shape in shapes if shape.role in _ROOM_ROLES and not (shape.is_text or shape.is_note)]
+    lines = [shapely.LineString(line) for line in sketch(own) if 1 < len(line) < _BLOCK]
+    if not 0 < len(lines) <= _MOST:
+        return []
+    noded = shapely.union_all(lines)
+    return [face for face in shapely.get_parts(shapely.polygonize([noded])) if face.area > 0]
 
 
 def _labels(shape: Shape) -> Iterator[tuple[float, tuple[float, float]]]:

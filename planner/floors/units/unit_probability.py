@@ -11,8 +11,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from stopgo.planner.floors.units.unit_evidence import LENGTHS, Dimension, UnitEvidence
+from stopgo.planner.floors.units.unit_evidence import Dimension, UnitEvidence
 from stopgo.planner.floors.units.unit_lengths import METRES, USUAL
+from stopgo.planner.floors.written_measures import LENGTHS
 
 _HEADER_IS_RIGHT = 0.93
 _SIZE = (20.0, 1.0)

@@ -21,7 +21,7 @@ DRIVEN = [*ROBOT, "--controller", "mavlink:udpin:127.0.0.1:14550"]
         ([*ROBOT, "--origin", "47,8,400"], "--origin"),
         (
             [*ROBOT, "--controller", "vehicle"],
-            "--controller vehicle: no such controller; known: sim, mavlink:URL",
+            "--controller vehicle: no such controller; known: sim, mavlink:URL, ros2[:FILE]",
         ),
         # Given is given, whatever the value: the default too.
         ([*ROBOT, "--trigger", "camera"], "--trigger has no meaning with a simulated robot"),

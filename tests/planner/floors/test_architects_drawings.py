@@ -90,6 +90,8 @@ def test_walls_as_open_double_lines_with_a_swing_become_rooms_with_a_door(tmp_pa
         ("PAREDES", "PORTAS"),
         ("СТЕНЫ", "ДВЕРИ"),
         ("壁", "ドア"),
+        ("墙体", "门"),
+        ("A-内墙线", "门窗"),
     ],
 )
 def test_layers_are_known_by_standards_and_in_many_languages(tmp_path: Path, walls: str, doors: str) -> None:
@@ -98,11 +100,25 @@ def test_layers_are_known_by_standards_and_in_many_languages(tmp_path: Path, wal
     is_the_flat(read(drawing, tmp_path))
 
 
+@pytest.mark.parametrize("version", ["R2000", "R2010"])
+def test_names_of_layers_are_read_with_either_end_of_line(tmp_path: Path, version: str) -> None:
+    drawing = ezdxf.new(version)
+    drawing.header["$INSUNITS"] = 6
+    drawing.encoding = "cp936"
+    flat(drawing.modelspace(), walls="墙体", doors="门")
+    path = saved(drawing, tmp_path)
+    lines = path.read_bytes().replace(b"\r\n", b"\n")
+    for end in (b"\n", b"\r\n"):
+        path.write_bytes(lines.replace(b"\n", end))
+        is_the_flat(read_floor(path))
+
+
 @pytest.mark.parametrize(
     ("name", "role"),
     [
         ("Room - Kitchen", "rooms"),
         ("Room - WC", "rooms"),
+        ("room_border", "rooms"),
         ("KITCHEN", "furniture"),
         ("Kitchen Wall", "walls"),
         ("Wall - Kitchen", "walls"),
@@ -400,6 +416,26 @@ def test_a_pattern_of_tiles_is_no_wall(tmp_path: Path) -> None:
         drawing.modelspace().add_line((0, k), (15, k), dxfattribs={"layer": "A-WALL"})
     with pytest.raises(InputError, match="225 cells smaller than a room"):
         read(drawing, tmp_path)
+
+
+def test_a_large_building_has_as_many_niches_as_a_pattern_has_cells(tmp_path: Path) -> None:
+    drawing = new_drawing()
+    model = drawing.modelspace()
+    rectangle(model, "A-WALL", 0, 0, 80, 40)
+    for k in range(160):
+        x, y = 1 + 2 * (k % 39), 5 + 8 * (k // 39)
+        rectangle(model, "A-WALL", x, y, x + 1, y + 1)
+    assert read(drawing, tmp_path, units="m").area == pytest.approx(3200, rel=1e-3)
+
+
+def test_an_area_beside_a_rooms_name_is_no_second_name(tmp_path: Path) -> None:
+    drawing = new_drawing()
+    model = drawing.modelspace()
+    flat(model)
+    model.add_line((0, 3), (2.5, 3), dxfattribs={"layer": "A-WALL"})
+    for text, at in (("Office", (1, 1)), ("20 m²", (1, 4)), ("Store", (6, 1)), ("25 m²", (6, 4))):
+        model.add_text(text, height=0.2, dxfattribs={"layer": "A-AREA-IDEN"}).set_placement(at)
+    assert len(read(drawing, tmp_path).rooms) == 2
 
 
 def test_an_endless_line_is_left_out(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 from ezdxf.layouts import Modelspace
@@ -11,10 +12,10 @@ from floor_drawings import Read, codes, new_drawing, rectangle
 from unit_drawings import CODES, EVIDENCE, house, rescaled, verdict
 
 from stopgo.mission.errors import InputError
-from stopgo.planner.floors import read_floor
+from stopgo.planner.floors import read_floor, survey_floor
 from stopgo.planner.floors.linework.swings import swings_of
 from stopgo.planner.floors.room_words import names_a_room
-from stopgo.planner.floors.units.unit_evidence import area_in, length_in
+from stopgo.planner.floors.written_measures import area_in, is_only_area, length_in
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 real = pytest.mark.skipif(not DATA.is_dir(), reason=f"the real inputs are not in {DATA}")
@@ -117,6 +118,28 @@ def test_areas_written_in_rooms_are_read_in_square_metres_and_feet() -> None:
     assert area_in("100 sq ft") == pytest.approx(9.29, abs=0.01)
     assert area_in("Room 12") is None
     assert area_in("12 mm") is None
+
+
+def test_the_sides_of_a_room_are_an_area_if_both_have_a_unit() -> None:
+    assert area_in("Bed 3.2m x 4.0 m") == pytest.approx(12.8)
+    assert area_in("14'2'' x 12'4''") == pytest.approx(16.23, abs=0.01)
+    assert area_in("3.2 x 4.0") is None
+    assert area_in("door 0.9m x 2.1m") is None
+    assert is_only_area("30 m²")
+    assert not is_only_area("30 m² Lager")
+
+
+def test_written_areas_between_lines_tell_the_unit(tmp_path: Path) -> None:
+    drawing = ezdxf.new()
+    model = drawing.modelspace()
+    for x in (0, 400, 900, 1300):
+        model.add_line((x, 0), (x, 500), dxfattribs={"layer": "WALLS"})
+    for y in (0, 500):
+        model.add_line((0, y), (1300, y), dxfattribs={"layer": "WALLS"})
+    for x, said in ((100, "4m x 5m"), (500, "5 m x 5 m"), (1000, "20 m2")):
+        model.add_text(said, height=20).set_placement((x, 100))
+    drawing.saveas(tmp_path / "plan.dxf")
+    assert survey_floor(tmp_path / "plan.dxf").units.startswith("centimetre")
 
 
 def test_a_door_swing_has_a_leaf_or_ends_at_jambs_and_a_round_corner_has_neither() -> None:

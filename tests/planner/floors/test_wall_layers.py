@@ -129,9 +129,43 @@ def test_one_kind_of_evidence_is_not_enough_and_one_option_accepts(draw: list, t
     assert read(draw, tmp_path, layers={name.upper(): kind}).area > 50
 
 
+def test_walls_that_were_drawn_on_the_columns_layer_are_found(tmp_path: Path) -> None:
+    floor = read([lambda model: double_walls(model, "COLUMNS"), swing], tmp_path)
+    assert sorted(round(room.area, 1) for room in floor.rooms) == [20.0, 25.0]
+
+
+def test_a_corner_between_walls_is_not_the_floor(tmp_path: Path) -> None:
+    def few(model: Modelspace) -> None:
+        rectangle(model, "WALLS", 1, 4, 2.5, 5)
+        rectangle(model, "WALLS", 4, 0, 4.2, 2)
+        model.add_line((-0.2, -0.2), (9.4, -0.2), dxfattribs={"layer": "WALLS"})
+
+    floor = read([few, lambda model: double_walls(model, "CONCRETE-COLUMN"), swing, names], tmp_path)
+    assert floor.area > 40
+    with pytest.raises(InputError, match="the walls on WALLS enclose no floor"):
+        read([few], tmp_path)
+
+
 def test_the_option_of_a_layer_with_spaces_can_be_pasted(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--layer 'My lines=walls' accepts them"):
         read([lambda model: cells(model, "My lines")], tmp_path)
+
+
+def test_one_option_gives_layers_and_unit_where_both_are_missing(tmp_path: Path) -> None:
+    def far(model: Modelspace) -> None:
+        model.doc.header["$INSUNITS"] = 0
+        for k, x in enumerate((0, 25, 50, 75)):
+            rectangle(model, f"Room_{k}", x, 0, x + 25, 30)
+
+    with pytest.raises(InputError, match="and the unit is not certain; give ") as refused:
+        read([far], tmp_path)
+    first = str(refused.value).partition("; give ")[2].partition(" (")[0]
+    pasted = shlex.split(first)
+    assert pasted[:8:2] == ["--layer"] * 4
+    assert pasted[1:8:2] == [f"Room_{k}=walls" for k in range(4)]
+    assert pasted[8] == "--units"
+    layers = {f"ROOM_{k}": "walls" for k in range(4)}
+    assert read([far], tmp_path, layers=layers, units=pasted[9]).area > 5
 
 
 def test_walls_are_found_among_layers_of_other_lines(tmp_path: Path) -> None:

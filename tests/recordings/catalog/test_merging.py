@@ -53,6 +53,7 @@ def test_a_recording_is_not_written_over_itself(merged: Path, capsys: pytest.Cap
     assert "is one of the recordings" in capsys.readouterr().err
 
 
+@pytest.mark.rerun_threads
 @pytest.mark.skipif(not has_vulkan(), reason="no Vulkan driver")
 def test_each_run_has_a_report_and_no_view_complains(merged: Path, tmp_path: Path) -> None:
     with viewer([merged], size=SMALL) as client:

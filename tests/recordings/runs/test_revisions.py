@@ -180,6 +180,7 @@ def test_stops_that_were_withdrawn_or_are_not_of_the_plan_come_last(mission: Mis
     assert comparison_table(compared).splitlines()[-1].split()[:5] == ["S3", "scanned", "-", "-", "-"]
 
 
+@pytest.mark.rerun_threads
 @pytest.mark.skipif(not has_vulkan(), reason="no Vulkan driver")
 def test_the_views_show_what_was_withdrawn(revised: Path, tmp_path: Path) -> None:
     with viewer([revised]) as client:

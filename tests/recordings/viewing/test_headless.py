@@ -16,6 +16,7 @@ from tests.recordings import world
 from tests.recordings.conftest import write_plan
 
 
+@pytest.mark.rerun_threads
 @pytest.mark.skipif(not has_vulkan(), reason="no Vulkan driver: install mesa-vulkan-drivers")
 def test_every_view_is_drawn_to_a_file_of_its_own(plan: Path, field: Path, tmp_path: Path) -> None:
     told = stopgo("review", str(plan), str(field), "--png", str(tmp_path / "views"))

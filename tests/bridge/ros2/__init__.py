@@ -1,0 +1,1 @@
+"""Tests of bridge/ros2; real ROS only in test_real_nav2."""

@@ -1,0 +1,128 @@
+"""A robot that speaks ROS 2 drives a mission to its end, and stops for whatever goes wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from stopgo.bridge.ros2.ros_settings import FrameNames, RosSettings
+from stopgo.mission.document import Mission
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.events import Arrived, Scanned
+from tests.bridge.ros2.world import TICK_S, Killed, RosField, World
+from tests.bridge.world import corridor
+
+MISSION = corridor(stops=3)
+
+
+def started(field: RosField, mission: Mission = MISSION) -> RosField:
+    field.station().push(mission)
+    assert field.order("start").outcome == "ok"
+    return field
+
+
+def scanned(field: RosField) -> list[str]:
+    return [event.stop for event in field.journal.events() if isinstance(event, Scanned)]
+
+
+def test_a_mission_runs_to_its_end() -> None:
+    field = started(RosField())
+    field.work()
+    assert field.controller.run.state == "FINISHED", field.controller.run
+    assert scanned(field) == ["s1", "s2", "s3"]
+    assert len(field.world.scans) == 3
+
+
+def test_a_success_before_the_goal_is_not_believed() -> None:
+    field = started(RosField())
+    field.world.later(2.0, lambda: field.world.end("succeeded"))
+    field.work_until(lambda run: run.stop_state == "SETTLING")
+    arrived = next(event for event in field.journal.events() if isinstance(event, Arrived))
+    assert arrived.deviation_m <= MISSION.robot.radius
+    assert len(field.world.goals) == 2
+
+
+def test_a_pause_cancels_the_goal_and_the_robot_stands() -> None:
+    field = started(RosField())
+    field.world.later(3.0, lambda: field.order("pause"))
+    field.work()
+    assert field.controller.run.state == "PAUSED"
+    assert field.world.goals[-1].status == "canceled"
+    assert field.world.speed == 0.0
+    assert 0.5 < field.world.at.x < 1.9
+
+
+def test_a_goal_that_is_accepted_after_the_stop_is_cancelled() -> None:
+    field = started(RosField())
+    field.world.later(TICK_S, lambda: field.order("pause"))  # the goal is sent, and not accepted yet
+    field.work()
+    field.clock.wait(5.0)
+    assert [goal.status for goal in field.world.goals] == ["canceled"]
+    assert field.world.at.x < 0.05
+
+
+def test_a_goal_that_a_killed_program_has_left_is_cancelled_at_the_next_start() -> None:
+    field = started(RosField())
+    field.world.later(2.0, lambda: setattr(field.world, "killed", True))
+    with pytest.raises(Killed):
+        field.work()
+    assert field.world.goals[-1].status == "active"
+    field.boot()
+    assert field.world.goals[-1].status == "canceled"
+    assert field.controller.run.state == "PAUSED"
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (lambda world: world.silent.add("tf"), "tf has no"),
+        (lambda world: world.silent.add("odometry"), "no odometry for"),
+        (lambda world: setattr(world, "odometry_offset_s", 3600.0), "3600.0 s behind this computer's"),
+        (lambda world: world.foreign(3.0, 3.0), "another client drives the robot"),
+        (lambda world: world.end("canceled"), "another client has cancelled the goal"),
+        (lambda world: world.restart_servers(30.0), "action server is gone"),
+        (
+            lambda world: setattr(world, "correction", Transform(x=0.0, y=5.0, heading=0.0)),
+            "jumped by 5.00 m",
+        ),
+        (lambda world: setattr(world.telemetry, "emergency_stop", True), "the emergency stop is pressed"),
+    ],
+)
+def test_what_goes_wrong_in_a_drive_stops_the_robot_and_is_told(
+    harm: Callable[[World], object], words: str
+) -> None:
+    field = started(RosField())
+    field.world.later(2.0, lambda: harm(field.world))
+    field.work()
+    run = field.controller.run
+    assert run.state == "HELD"
+    assert words in run.reason
+    assert field.world.speed == 0.0
+
+
+def test_a_localisation_that_moves_a_little_is_followed() -> None:
+    field = started(RosField())
+    field.world.later(2.0, lambda: setattr(field.world, "correction", Transform(x=0.0, y=0.2, heading=0.0)))
+    field.work()
+    assert scanned(field) == ["s1", "s2", "s3"]
+    assert abs(field.world.at.y + 0.2) < 0.06
+
+
+def test_a_scan_during_which_the_map_moves_does_not_count() -> None:
+    field = started(RosField())
+    field.work_until(lambda run: run.stop_state == "SCANNING")
+    field.world.later(1.0, lambda: setattr(field.world, "correction", Transform(x=0.0, y=0.3, heading=0.0)))
+    field.work()
+    assert scanned(field) == ["s1", "s2", "s3"]
+    assert len(field.world.scans) == 4
+
+
+def test_a_frame_that_tf_lacks_is_named_with_those_that_it_has() -> None:
+    field = RosField(settings=RosSettings(frames=FrameNames(map="site_map")))
+    refused = field.order("start")
+    assert refused.outcome == "refused"
+    telemetry = field.world.telemetry
+    assert telemetry is not None
+    told = telemetry.silence()
+    assert told == "tf has no transform from site_map to base_link; its frames: base_link, map, odom"
