@@ -5,7 +5,7 @@ robot's own thread, which follows run after run as `stopgo watch` does, and reco
 
 Invariants:
 - A state on the feed is the newest by the robot's sealed sequence; its age is never understated.
-- What was told live is read again from the robot's journal, so that nothing is missing (`ShownRun`).
+- What was reported live is read again from the robot's journal, so that nothing is missing (`ShownRun`).
 """
 
 from __future__ import annotations

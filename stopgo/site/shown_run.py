@@ -1,4 +1,4 @@
-"""The present run of a robot on the feed: its events as soon as they are told, and the path that it drove.
+"""The present run of a robot on the feed: its events as soon as the robot reports them, and the path that it drove.
 
 Invariants:
 - Events of the present run have a key each, so that no page misses one; a new run replaces them all.
@@ -70,7 +70,7 @@ class PagePath:
 
 
 class ShownRun:
-    """Run of a robot as pages show it; told by the link's threads and by the robot's own."""
+    """Run of a robot as pages show it; updated by the link's threads and by the robot's own."""
 
     def __init__(self, feed: EventFeed, robot: str) -> None:
         self._feed = feed
@@ -96,7 +96,7 @@ class ShownRun:
         self._feed.tell(("run", self._robot), {"run": run_id})
 
     def take_live(self, event: Any, pose: PoseReport | None) -> None:
-        """Show an event that was just told, if it belongs to the run that is shown, or begins another."""
+        """Show an event that was just reported, if it belongs to the run that is shown, or begins another."""
         with self._lock:
             if isinstance(event, Started):
                 self._begin(event.run_id)
