@@ -18,7 +18,7 @@ import numpy as np
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import write
-from tests.recordings.truth import drives, senses
+from tests.recordings.truth import disturbances, drives
 from tests.recordings.truth.disturbances import SENSES, SLOW, Sense, Sensed
 from tests.recordings.truth.drives import MISHAPS, STOPS, Mishap, Tour, mission_with_return
 from tests.recordings.truth.formats import BAGS, FIRST, FITTED, MAP, VEHICLES, WRITERS, Writer, write_log
@@ -82,7 +82,7 @@ def cases(seeds: int = 1) -> Iterator[Case]:
                 writer = WRITERS[(number + k + 3 * seed) % len(WRITERS)]
                 if sense in SLOW and writer in BAGS:
                     writer = VEHICLES[k % len(VEHICLES)]
-                if sense is senses.without_headings:
+                if sense is disturbances.without_headings:
                     writer = WRITERS[0]
                 placing = (MAP, FIRST, FITTED, MAP)[(n + 2 * k + seed) % 4]
                 yield Case(1000 * seed + number, mishap, sense, writer, placing)
