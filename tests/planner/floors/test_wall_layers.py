@@ -129,6 +129,23 @@ def test_one_kind_of_evidence_is_not_enough_and_one_option_accepts(draw: list, t
     assert read(draw, tmp_path, layers={name.upper(): kind}).area > 50
 
 
+def test_walls_that_were_drawn_on_the_columns_layer_are_found(tmp_path: Path) -> None:
+    floor = read([lambda model: double_walls(model, "COLUMNS"), swing], tmp_path)
+    assert sorted(round(room.area, 1) for room in floor.rooms) == [20.0, 25.0]
+
+
+def test_a_corner_between_walls_is_not_the_floor(tmp_path: Path) -> None:
+    def few(model: Modelspace) -> None:
+        rectangle(model, "WALLS", 1, 4, 2.5, 5)
+        rectangle(model, "WALLS", 4, 0, 4.2, 2)
+        model.add_line((-0.2, -0.2), (9.4, -0.2), dxfattribs={"layer": "WALLS"})
+
+    floor = read([few, lambda model: double_walls(model, "CONCRETE-COLUMN"), swing, names], tmp_path)
+    assert floor.area > 40
+    with pytest.raises(InputError, match="the walls on WALLS enclose no floor"):
+        read([few], tmp_path)
+
+
 def test_the_option_of_a_layer_with_spaces_can_be_pasted(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--layer 'My lines=walls' accepts them"):
         read([lambda model: cells(model, "My lines")], tmp_path)
