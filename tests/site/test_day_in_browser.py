@@ -203,3 +203,29 @@ def test_german_is_german_throughout(world: BrowserWorld) -> None:
                 assert left == set(), view
         finally:
             tab.run("localStorage.removeItem('stopgo-language')")
+
+
+PRESSED = "document.querySelector('.map .stop').dispatchEvent(new KeyboardEvent('keydown', {key: '%s'}))"
+
+
+def test_a_change_by_hand_shows_its_cost_before_it_is_planned(world: BrowserWorld) -> None:
+    with world.tab("#plan") as tab:
+        tab.shows("32 m², 2 rooms, 1 openings")
+        tab.press("Plan", ".options button")
+        tab.until("document.querySelector('.variant.focus.done') && document.querySelector('.map .stop')")
+        variants = tab.run("document.querySelectorAll('.variant').length")
+        tab.run(PRESSED % "Delete")
+        tab.until("document.querySelector('.hand').innerText.includes('Coverage')")
+        coverage, twice = tab.run("[...document.querySelector('.hand').innerText.matchAll(/\\((.*?) %\\)/g)]"
+                                  ".map((one) => one[1])")  # fmt: skip
+        assert (coverage[0], twice[0]) == ("−", "−")
+        assert tab.run("document.querySelectorAll('.variant').length") == variants
+        tab.press("Discard")
+        tab.run(PRESSED % "ArrowUp")
+        tab.until("document.querySelector('.hand').innerText.includes('Coverage')")
+        assert tab.run("document.activeElement.dataset.stop") == "+1"
+        nodes = tab.call("Accessibility.getFullAXTree")["nodes"]
+        assert "Stop +1" in {one.get("name", {}).get("value") for one in nodes}
+        tab.press("Plan with these changes")
+        tab.until(f"document.querySelectorAll('.variant.done').length === {variants + 1}")
+        tab.shows("Seen twice", ".variant")
