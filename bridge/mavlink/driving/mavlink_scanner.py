@@ -235,9 +235,9 @@ class MavlinkScanner:
         From the first of the two times on, when it should have ended, it is requested again.
         """
         asked_s, until_s = times_s[0] - AGAIN_S, times_s[1]
-        told = False
+        reported = False
         while not (interrupt.is_set() or watch.why()) and (left := until_s - self._now_s()) > 0:
-            told = told or self._tell_hold()
+            reported = reported or self._report_hold()
             message = waiting.get(min(LOOK_S, left))
             if message is not None and self._is_new(message, next_index):
                 return message
@@ -246,8 +246,8 @@ class MavlinkScanner:
                 self._request_picture(next_index)
         return None
 
-    def _tell_hold(self) -> bool:
-        """Tell of a hold that somebody else has commanded; the scan goes on, for the vehicle stands."""
+    def _report_hold(self) -> bool:
+        """Report a hold that somebody else has commanded; the scan goes on, for the vehicle stands."""
         control = self._autopilot.control
         return control.is_put_on_hold and (self.pause(control.mode_change()) or True)
 
