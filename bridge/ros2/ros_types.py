@@ -82,11 +82,8 @@ def _fits(value: Any, kind: str) -> bool:
     wanted = {"boolean": bool, "string": str, "float": float, "double": float}.get(kind)
     if wanted is not None:
         return isinstance(value, wanted)
-    return (
-        isinstance(value, int) and not isinstance(value, bool)
-        if "int" in kind.split("<", maxsplit=1)[0]
-        else True
-    )
+    whole = kind.startswith(("int", "uint")) and "[" not in kind
+    return not whole or (isinstance(value, int) and not isinstance(value, bool))
 
 
 def _as_type(value: Any, kind: str) -> Any:

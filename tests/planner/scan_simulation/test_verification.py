@@ -232,7 +232,7 @@ def test_the_first_start_that_misses_decides() -> None:
     assert good.starts == 4 and good.least_error_m <= good.error_m
 
 
-def test_scans_along_a_corridor_are_free_along_it_and_told_so() -> None:
+def test_scans_along_a_corridor_are_free_along_it_and_reported_so() -> None:
     """Its ends are out of range: nothing holds the pair along x."""
     simulation = replace(COARSEST, range_m=4.0, joining_m=4.0)
     (pair,) = pair_of(hall(30, 2), (13.0, 1.0), (15.0, 1.0), simulation)
@@ -254,7 +254,7 @@ def test_how_far_off_a_pose_is() -> None:
     assert off(turned) == pytest.approx((0.05, 3.0))
 
 
-def test_rays_are_told_by_the_step() -> None:
+def test_rays_are_reported_by_the_step() -> None:
     fan = RayFan.of(replace(COARSE, fov_deg=90.0, step_deg=1.0, cone_deg=60.0), heading=0.0)
     assert len(fan.azimuth) == 90
     assert math.degrees(fan.azimuth[0]) == pytest.approx(-44.5)
