@@ -232,7 +232,7 @@ class PlanProgress:
         self.results: dict[str, Any] = {}
         """Result of each stage, by its type's name."""
         self.twice: float | None = None
-        """Share of all visible targets that two stops or more see."""
+        """Fraction of all visible targets that two stops or more see."""
 
     def observe(self, result: object) -> None:
         """Take the result of a stage."""

@@ -1,4 +1,4 @@
-"""What a change of stops by hand costs, before the plan is made again: coverage, views from two stops, time.
+"""Cost of a change of stops by hand, before the plan is made again: coverage, views from two stops, time.
 
 Only the changed stops are looked from, and the targets that the others see are known. The tour stays in its
 order; a new stop is driven where the detour is shortest. So the cost is there at once, and the route of the
@@ -51,7 +51,7 @@ class EditablePlan:
         return self.figures([stop.id for stop in self.mission.stops], ())
 
     def figures(self, kept: Sequence[str], added: Sequence[Spot]) -> dict[str, float]:
-        """Return the number of stops, coverage, share of targets seen from two stops, route and time."""
+        """Return the number of stops, coverage, fraction of targets seen from two stops, route and time."""
         totals = self.sight.totals
         views = self.sight.views_from(kept) + sum(self._views_from(spot) for spot in added)
         visible = totals.amount(totals.visible)
