@@ -13,7 +13,7 @@ TYPES := $(wildcard planner/*/*_compiled.pxd planner/*/*/*_compiled.pxd)
 # Every test that starts a process would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo docs test lint types faults benchmarks wheels clean
+.PHONY: demo docs test lint types faults ros2 benchmarks wheels clean
 
 # pip would compile all packages one after another; what is imported is compiled then, by as many as import it.
 $(STAMP): pyproject.toml setup.py constraints.txt $(TYPES) $(TYPES:_compiled.pxd=.py)
@@ -42,6 +42,11 @@ test: lint
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
 	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/recordings/truth tests/bridge/mavlink/driving/test_driving_processes.py
+
+# A real ROS 2 of wheels in .venv-ros2 (330 MB), and the tests that drive a mission with it.
+ros2: $(STAMP)
+	$(BIN)/python -m tests.ros2.environment
+	$(BIN)/python -m pytest tests/ros2
 
 benchmarks: $(STAMP)
 	$(BIN)/python -m benchmarks

@@ -47,7 +47,7 @@ def main() -> None:
 
 
 def outcome(name: str, seconds: float) -> str:
-    """How one benchmark ended: done, failed, or for want of time."""
+    """Outcome of one benchmark: done, failed, or out of time."""
     if seconds <= 0:
         return "no time left"
     command = [sys.executable, "-m", f"benchmarks.{name}", *ALL[name]]

@@ -79,7 +79,7 @@ def _path(module: str) -> Path | None:
 
 
 def _names(module: str) -> Iterator[str]:
-    """What a module imports anywhere, and names of modules in its texts: those of readers and processes."""
+    """Imports of a module, and names of modules in its texts: those of readers and processes."""
     if module == "benchmarks.ages":  # it names modules of every benchmark
         return
     for node in _statements(_source(module)):
@@ -99,7 +99,7 @@ def _source(module: str) -> str:
 
 @cache
 def _meaning(module: str) -> str:
-    """What a module does, and the types with which it is compiled."""
+    """Code of a module, and the types with which it is compiled."""
     path = _path(module)
     assert path is not None
     types = path.with_name(f"{path.stem}_compiled.pxd")
@@ -141,7 +141,7 @@ class Section:
 
     @property
     def problem(self) -> str:
-        """What is wrong with its ages; empty if every table is current, or marked as older."""
+        """Problem of the ages; empty if every table is current, or marked as older."""
         stamps = list(CURRENT.finditer(self.text))
         if not stamps and not OLDER.search(self.text):
             return f"{self.heading}: no table of it says with what code it was measured"

@@ -1,8 +1,8 @@
 """Measures the link: commands per second, large missions on a slow link, and the load of an idle robot.
 
 Run: python -m benchmarks.bridge [--keys]; one line per figure, medians and p99. With --far instead: pushes
-and pauses on a line of long round trips, several pieces under way and, as formerly, one. With --stops: how
-long `pause` and `abort` take, alone, beside a push of 10 MB by another process, and on a full disk; --former
+and pauses on a line of long round trips, several chunks in flight and, as formerly, one. With --stops: how
+long `pause` and `abort` take, alone, during a push of 10 MB by another process, and on a full disk; --former
 DIR has a former version's checkout measured in the same run.
 """
 

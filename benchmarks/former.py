@@ -1,7 +1,7 @@
-"""Plans of a former version beside the present ones: `python -m benchmarks.former FORMER_TREE [NAME…]`.
+"""Plans of a former version next to the present ones: `python -m benchmarks.former FORMER_TREE [NAME…]`.
 
 A former tree is made by `git archive REVISION | tar x -C FOLDER`; both run with the present environment. Each
-plan is made by the real command, once by either. The table tells if their missions are the same, byte for byte.
+plan is made by the real command, once by either. The table says if their missions are the same, byte for byte.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Time and memory of reading field logs: `python -m benchmarks.logs [--evo PYTHON]`.
 
-With the Python of an environment in which evo is installed, evo reads the same files beside us.
+With the Python of an environment in which evo is installed, evo reads the same files too.
 """
 
 from __future__ import annotations

@@ -155,7 +155,7 @@ class Ours:
 
     @property
     def generated(self) -> int:
-        """Candidates before the distance to elements is asked for: on the floor, of good triangles."""
+        """Candidates before the distance to elements is required: on the floor, of good triangles."""
         left_out = (OUTSIDE, IN_HOLE, TOO_SMALL, SLIVER)
         return int(np.sum(~np.isin(self.candidates.reason, left_out)))
 

@@ -1,7 +1,7 @@
 """Size and time of recordings: `python -m benchmarks.recordings [--large] [CHECKOUT]`.
 
 Plans of synthetic offices are drawn, a run of four hours is recorded, a folder of a thousand files is listed,
-and a large plan is opened by a viewer. With the folder of an older checkout its figures stand beside ours, from
+and a large plan is opened by a viewer. With the folder of an older checkout its figures are next to ours, from
 the same plans in the same run.
 """
 

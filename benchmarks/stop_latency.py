@@ -47,7 +47,7 @@ LEG_M = 500.0
 
 @dataclass(frozen=True)
 class Fault:
-    """What happens while a robot is paused, and the number of trials."""
+    """Disturbance while a robot is paused, and the number of trials."""
 
     name: str
     trials: int

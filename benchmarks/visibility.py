@@ -1,6 +1,6 @@
 """Visibility of whole candidate × unit matrices: `python -m benchmarks.visibility`.
 
-Exact visibility interpreted and compiled, beside prepared shapely geometry asked pair by pair; then a
+Exact visibility interpreted and compiled, next to prepared shapely geometry asked pair by pair; then a
 large floor, with the memory that its result takes.
 """
 

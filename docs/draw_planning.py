@@ -174,7 +174,7 @@ def units(visibility: Visibility, mask: BoolArray, window: Window, **style: obje
 
 
 def draw_floor(drawn: PartPlan) -> str:
-    """What is read from the drawing."""
+    """Draw the elements that are read."""
     window = Window()
     names = []
     halo: dict[str, Any] = {"stroke": "#ffffff", "stroke_width": 4, "paint_order": "stroke"}
@@ -195,7 +195,7 @@ def draw_floor(drawn: PartPlan) -> str:
 
 
 def draw_navigable(drawn: PartPlan) -> str:
-    """Where the robot's centre may drive, and where it may stop."""
+    """Draw the space of the robot's centre, for driving and for stops."""
     window, space = Window(), drawn.space
     even: dict[str, Any] = {"fill_rule": "evenodd"}
     stand = (part for room in space.rooms for part in room.stop_area)
@@ -266,7 +266,7 @@ def _mask(drawn: PartPlan, seen: IntArray) -> BoolArray:
 
 
 def draw_visibility(drawn: PartPlan) -> str:
-    """What one candidate sees: wedges of light onto faces, and beams overhead."""
+    """Draw the visibility of one candidate: wedges of light onto faces, and beams overhead."""
     window, seen = Window(), drawn.visibility
     targets, row = seen.targets, row_at(seen, VIEW)
     eye = seen.candidates.xy[seen.candidates.kept[row]]

@@ -63,7 +63,7 @@ def plan_files(
 
 @dataclass(frozen=True, eq=False)
 class _Writing:
-    """Where the files of a plan go, and the means to write them."""
+    """Folder of a plan's files, and the means to write them."""
 
     out: Path
     options: PrintOptions

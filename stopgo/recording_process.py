@@ -112,7 +112,7 @@ class RecordingProcess:
 
 
 class PlanDrawing:
-    """A recording that is drawn, beside the other files of a plan."""
+    """A recording that is drawn, next to the other files of a plan."""
 
     def __init__(self, process: RecordingProcess, recording_id: str, results: tuple[object, ...]) -> None:
         self._process = process

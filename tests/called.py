@@ -10,7 +10,7 @@ from stopgo.command_line import main
 
 
 def stopgo(*arguments: str) -> CompletedProcess[str]:
-    """What a command printed, and its exit code; for all but signals, killed processes and imports."""
+    """Output and exit code of a command; for all but signals, killed processes and imports."""
     out, error = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(error):
         code = main(list(arguments))

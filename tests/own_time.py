@@ -75,7 +75,7 @@ class World:
         world = self
 
         class Bound:
-            """What these classes have in common: the world that made them."""
+            """Common base of these classes: the world that made them."""
 
             _world = world
 
@@ -90,7 +90,7 @@ class World:
 
     @property
     def shims(self) -> dict[object, object]:
-        """What a module of the world gets instead of what it has imported."""
+        """Stand-ins for the imports of a module in the world."""
         of_threads = _Instead(
             threading, Lock=self.Lock, RLock=self.RLock, Condition=self.Condition, Event=self.Event,
             Thread=self.Thread,
@@ -121,7 +121,7 @@ class World:
             self._park(None, self._due_ns(seconds))
 
     def _due_ns(self, seconds: float | None) -> int | None:
-        """When so many seconds will have passed: always later, so that no loop goes round in no time."""
+        """Time after so many seconds: always later, so that no loop repeats in no time."""
         return None if seconds is None else self._now_ns + max(1, math.ceil(seconds * 1e9))
 
     def _is_past(self, due_ns: int | None) -> bool:

@@ -18,7 +18,7 @@ LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
 def anchors(page: Path) -> set[str]:
-    """What the headings of a page can be linked by."""
+    """Link targets of a page's headings."""
     heads = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", head.strip().lower()).replace(" ", "-") for head in heads}
 
@@ -105,6 +105,19 @@ def test_messages_and_help_use_no_retired_word() -> None:
         f"{name}: {one[0]!r} in: {text}"
         for name in MODULES
         for text in messages(name)
+        for one in ANY_RETIRED.finditer(text)
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_docstrings_use_no_retired_word() -> None:
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    found = [
+        f"{name}: {one[0]!r} in: {text}"
+        for name in MODULES
+        for node in ast.walk(tree_of(name))
+        if isinstance(node, kinds)
+        for text in [re.sub(r"`[^`]*`|^\w+$", "", ast.get_docstring(node) or "", flags=re.MULTILINE)]
         for one in ANY_RETIRED.finditer(text)
     ]
     assert not found, "\n".join(found)

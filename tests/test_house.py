@@ -60,7 +60,7 @@ def _from(node: ast.ImportFrom) -> Iterator[str]:
 
 
 def composes(name: str) -> bool:
-    """Whether a module may bring folders together."""
+    """True if a module may bring folders together."""
     return not folder_of(name)
 
 
@@ -123,7 +123,7 @@ def _from_first(way: list[str]) -> str:
 
 
 def siblings(parent: str) -> Graph:
-    """How the folders and modules right below a folder import each other, whatever lies in them."""
+    """Imports between the folders and modules right below a folder, whatever lies in them."""
     graph: Graph = {}
     depth = parent.count(".") + 2
     for name in MODULES:
@@ -290,16 +290,25 @@ def test_no_function_is_longer_than_forty_lines() -> None:
     assert not _filled({name: long - KERNELS for name, long in found.items()})
 
 
+QUESTIONS = ("What", "Whether", "How", "Who", "Whose", "Where", "Which", "When", "Why")
+
+
 def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
     kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
     found = {
         name: {ast.get_docstring(node) or "" for node in ast.walk(tree_of(name)) if isinstance(node, kinds)}
         for name in MODULES
     }
-    odd = ("What", "Whether", "How")
     assert not _filled(
-        {name: {one for one in texts if one.split(" ")[0] in odd} for name, texts in found.items()}
+        {name: {one for one in texts if one.split(" ")[0] in QUESTIONS} for name, texts in found.items()}
     )
+
+
+def test_the_first_line_of_a_test_module_is_no_question() -> None:
+    for path in [*ROOT.glob("tests/**/*.py"), *ROOT.glob("benchmarks/*.py")]:
+        with path.open(encoding="utf-8") as lines:
+            first = next(lines, "").removeprefix('"""').split(" ")[0]
+        assert first not in QUESTIONS, path
 
 
 def test_every_module_says_what_it_is_for() -> None:

@@ -1,4 +1,4 @@
-"""What an installation relies on: names that others have too, old Pythons, and systems without file locks."""
+"""Installations: names that others have too, old Pythons, and systems without file locks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What others write takes part in a plan, and where it misbehaves one line says so."""
+"""Plug-ins take part in a plan, and where one misbehaves a line says so."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ TYPED = tuple(f"{name}/py.typed" for name in ("mission", "planner", "bridge", "r
 
 
 def problems(wheel: Path, python: str, extra: str, folder: Path) -> list[str]:
-    """What an environment with this extra does not do as promised."""
+    """Broken promises of an environment with this extra."""
     place = Path(tempfile.mkdtemp(dir=folder))
     run(python, "-m", "venv", str(place / "venv"))
     ours = place / "venv" / "bin"

@@ -83,7 +83,7 @@ class RelayedConnection:
 
 @dataclass(frozen=True)
 class InnerEndpoints:
-    """Where zenoh listens for what is admitted: on this machine only."""
+    """Endpoints at which zenoh receives admitted connections: on this machine only."""
 
     port: int
     """Port of 127.0.0.1, with TLS."""

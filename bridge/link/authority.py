@@ -90,7 +90,7 @@ def issue(
 ) -> KeyFiles:
     """Issue keys for `name` from the authority in `folder`, into a folder of that name.
 
-    `addresses` are those that a robot or router is reached at, beside this machine's own.
+    `addresses` are those that a robot or router is reached at, besides this machine's own.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Keys of one holder, and the check of other holders' certificates: all have the same authority.
 
-A certificate names who holds it in its common name (`robot:r1`, `station:alice`), so that a router can tell
-one from another, and carries the role apart, as its organisational unit. Keys are Ed25519 and serve both the
-links (mTLS) and of messages. `stopgo.bridge.link.authority` issues them and calls them back.
+A certificate names who holds it in its common name (`robot:r1`, `station:alice`), so that a router can
+distinguish them, and carries the role apart, as its organisational unit. Keys are Ed25519, for the
+links (mTLS) and for the signatures of messages. `stopgo.bridge.link.authority` issues and revokes them.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ An attachment is an Ed25519 signature, and the values that bind it to one use. N
 change, swap, replay or long delay a message unnoticed. Without keys (`NO_SIGNING`) every message is unsigned
 and is accepted: for use on one machine only.
 
-What is signed (`_signed`): a line for the kind of message ("question", "answer" or "told"), a line for each
+What is signed (`_signed`): a line for the kind of message (`question`, `answer` or `told`), a line for each
 thing that it is bound to, four lines with its `nonce`, `boot_id`, `number` and `at_ns`, then the bytes as
 they were sent. It is bound to the key that it is sent on, which names the robot; a question to its
 parameters too; an answer to the question's parameters and the hash of its payload.

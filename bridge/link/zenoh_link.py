@@ -342,7 +342,7 @@ def check_endpoint(endpoint: str, guard: Guard, *, option: str) -> None:
     Raises
     ------
     InputError
-        Naming the option, the endpoint and the way out.
+        Naming the option, the endpoint and the remedy.
     """
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]

@@ -115,7 +115,7 @@ class RosBase:
             raise RosDriveEnded("blocked", why)
 
     def _await_scanner(self, interrupt: Event) -> None:
-        """A scan that may be under way keeps the robot where it is, until a person lets it go on."""
+        """A scan that may be in progress keeps the robot where it is, until a person lets it go on."""
         why = self._scanner.wait_until_free(interrupt)
         if interrupt.is_set():
             raise RosDriveEnded("interrupted")

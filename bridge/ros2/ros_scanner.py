@@ -54,9 +54,9 @@ class RosScanner:
         return None
 
     def wait_until_free(self, interrupt: Event) -> str:
-        """Wait for the end of a scan that was given up; return why it may still be under way.
+        """Wait for the end of a scan that was given up; return why it may still be in progress.
 
-        After `late_s` it is told once and forgotten: who lets the robot go on then has looked.
+        After `late_s` it is reported once and forgotten: who lets the robot go on then has looked.
         """
         end_ns = self._clock.now_ns() + round(self._settings.late_s * 1e9)
         while self._is_busy() and not self._clock.wait(LOOK_S, interrupt):
@@ -145,7 +145,7 @@ def filled(value: Any, values: Mapping[str, Any]) -> Any:
 
 
 def result_of(call: RosCall, settings: ScanCall) -> ScanResult | ScanFailed:
-    """Return the scan that a response tells of; whatever it lacks is empty, so that it is not confirmed."""
+    """Return the scan that a response reports; whatever it lacks is empty, so that it is not confirmed."""
     if call.error:
         return ScanFailed(reason=f"the scanner's call failed: {call.error}")
     fields = call.fields or {}

@@ -149,7 +149,7 @@ class BackgroundQuery:
         self._begun_s: float | None = None
 
     def answer(self, ask: Callable[[], bytes | None], wait_s: float) -> Answered | None:
-        """Return the answer of the query that is under way, else of `ask`; `None` if there is none yet.
+        """Return the answer of the query in flight, else of `ask`; `None` if there is none yet.
 
         Only a new query is waited for.
         """

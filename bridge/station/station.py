@@ -484,7 +484,7 @@ class Station:
         beside: DirectQuestion | None = None,
         **parameters: str,
     ) -> bytes | None:
-        """Repeat a query until it is answered, there or `beside` it, or the time is up."""
+        """Repeat a query until it is answered, there or by `beside`, or the time is up."""
         deadline = time.monotonic() + within_s
         while (left := deadline - time.monotonic()) > 0:
             if beside is not None:

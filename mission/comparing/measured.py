@@ -78,7 +78,7 @@ class Measured:
 
     @property
     def placing_text(self) -> str:
-        """Why the clouds cannot be compared with the floor; empty if all lie on it."""
+        """Return the reason why the clouds cannot be compared with the floor; empty if all lie on it."""
         off = [away for away in self.misplaced_m or () if away != 0]
         if not off:
             return ""

@@ -186,7 +186,7 @@ def _key_sheet(tiles: Sequence[Tile]) -> PaperSheet:
 
 
 def _key_window(tile: Tile, tiles: Sequence[Tile], box: PaperBox) -> str:
-    """Where the sheet lies among the others."""
+    """Draw the sheet's position among the others."""
     small = _key_sheet(tiles)
     x, y = box.x + box.width / 2, box.y + box.height / 2
     marks = []

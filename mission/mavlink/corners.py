@@ -57,7 +57,7 @@ def _thinned(leg: Sequence[Point], within: float) -> list[Point]:
 
 
 def _spots(leg: Sequence[Point], within: float) -> Iterator[_Corner]:
-    """Yield the leg's points, points outside its corners, and points beside the middles of inner segments."""
+    """Yield the leg's points, points outside its corners, and points next to the middle of inner segments."""
     yield _Corner(leg[0], 0.0, 0.0)
     for k in range(1, len(leg) - 1):
         before, here, after = leg[k - 1 : k + 2]

@@ -97,7 +97,7 @@ def layers_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> Layer
 
 @instance_cached
 def _last_seen(drawing: Drawing) -> dict[tuple, LayersSeen]:
-    """The shapes by the meanings of layers that were asked for last."""
+    """The shapes by the meanings of layers of the last request."""
     return {}
 
 

@@ -82,7 +82,7 @@ def _triangles(floor: FloorPlan, given: GivenHeights, ceiling: float) -> Iterato
 
 
 def _spans(item: Element, ceiling: float) -> list[tuple[float, float]]:
-    """Heights at which an element is opaque: beside glass it is what is below and above."""
+    """Heights at which an element is opaque: next to glass, the parts below and above it."""
     if item.heights is None:
         return [(0.0, ceiling)] if item.occludes else []
     low, high = item.heights

@@ -56,5 +56,5 @@ def _area_of_sides(text: str) -> float | None:
 
 
 def is_only_area(text: str) -> bool:
-    """Return True if a text names an area and nothing else: it stands beside a room's name, or alone."""
+    """Return True if a text names an area and nothing else: it is next to a room's name, or alone."""
     return area_in(text) is not None and not _LETTERS.search(_SIDES.sub("", _AREA.sub("", text)))

@@ -1,6 +1,6 @@
 """Rays past a floor's solids: which heights of a target a scanner sees, at its own height above the floor.
 
-A level ray at the scanner's height tells what stands in the way at that height alone. What stands below it
+A level ray at the scanner's height meets what is at that height alone. What stands below it
 or hangs above it hides a part of a target: furniture, lintels, ceilings, beams. Here the solids' surfaces
 are marked in columns of a grid; each column is a pattern of bits by height. A ray from the scanner to each
 height of a target is followed over the grid. Columns within what the plan knows as solid are left out: there

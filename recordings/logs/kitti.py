@@ -1,7 +1,7 @@
 """Reader of trajectories in KITTI's format: a 3 x 4 matrix in each line, and a second file with the times.
 
 KITTI's own poses are of a camera: x right, y down, z forward. Other programs write matrices with z up. The
-rotations tell which: a robot turns about its vertical axis.
+rotations show which: a robot turns about its vertical axis.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def read_kitti(path: Path) -> FieldLog:
     Raises
     ------
     InputError
-        When there are no times, or too few, or the matrices do not tell which axis is vertical.
+        When there are no times, or too few, or the matrices do not show which axis is vertical.
     """
     rows = [_numbers(line, COLUMNS) for line in _lines(path)]
     seconds_file = _times_file(path)

@@ -16,7 +16,7 @@ from stopgo.recordings.plan.story import SPACE, describe_step
 
 
 def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
-    """Where the robot may drive and stop, which openings it passes, what it is to look at."""
+    """Draw the navigable space, the openings that the robot passes, and the targets."""
     spacing = _hatch_spacing(space.floor)
     drive = strokes.hatch(space.drive_area, spacing=spacing, angle=np.pi / 4)
     draw(canvas, entities.DRIVE_AREA, drive, Pen(palette.DRIVE, "area", THIN), step=SPACE, planning_only=True)

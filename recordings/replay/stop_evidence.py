@@ -97,7 +97,7 @@ STOOD = "the robot stood there long enough, though a later item of its list was 
 
 
 def _why_not_the_end(replay: Replay, number: int, item: StopComparison) -> str:
-    """Return why the log's events do not tell that a stop was missed; empty if they do.
+    """Return why the log's events do not show that a stop was missed; empty if they do.
 
     A vehicle that is followed by its messages may come back to a stop that was jumped over.
     """

@@ -30,8 +30,9 @@ def why_unseen(
     """Return why a good visit of a stop may have happened unseen; empty if the poses exclude one.
 
     Stops may be visited in any order, so that every gap counts that is long enough to drive there, scan and
-    drive on. `unsure_m` is the uncertainty of positions. `halted`: the robot halted near it for long enough,
-    so that only its shorter halts within tolerance count. `drifts`: a halt at no stop may have been there.
+    drive on. `unsure_m` is the uncertainty of positions. `halted`: the robot was at standstill near it
+    for long enough, so that only its shorter standstills within tolerance count. `drifts`: a standstill at no
+    stop may have been there.
     """
     stop, track = replay.mission.stops[number], replay.run.poses
     if not len(track):

@@ -1,7 +1,7 @@
 """The engine whose entries are planned by the workers of a dask cluster.
 
 An entry is given to workers that have room for it and the same stopgo. Workers may come and go: new ones
-are asked for their version before they get an entry. A scheduler that is started again is waited for.
+report their version before they get an entry. A scheduler that is started again is waited for.
 """
 
 from __future__ import annotations

@@ -144,7 +144,7 @@ def read_work(task: ReadTask, tell: Tell) -> WorkAnswer:
 
 
 def variant_work(task: VariantTask, tell: Tell) -> WorkAnswer:
-    """Plan a floor into the task's folder; progress is told stage by stage."""
+    """Plan a floor into the task's folder; progress is reported stage by stage."""
     from stopgo.plan_files import PrintOptions, plan_files
 
     more: dict[str, Any] = {}

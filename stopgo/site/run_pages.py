@@ -44,7 +44,7 @@ class PageDownload:
 
 
 class RunRoom:
-    """Missions and runs of a folder; everything is read when it is asked for."""
+    """Missions and runs of a folder; everything is read on request."""
 
     def __init__(self, folder: SiteFiles, merged: Path, lane: WorkLane) -> None:
         self._folder = folder

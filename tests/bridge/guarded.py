@@ -53,7 +53,7 @@ class GuardedField(Field):
         self.answer_as("r1")
 
     def signing(self, name: str, *, boot_id: str = "") -> KeySigning:
-        """How `name` signs, on the field's clock."""
+        """Signatures of `name`, on the field's clock."""
         held = read_keys(self.site / name, now=now_utc())
         return KeySigning(held, boot_id=boot_id, clock_ns=self.steady_ns)
 
@@ -67,7 +67,7 @@ class GuardedField(Field):
         self.clock.jump(seconds)
 
     def agent_state(self) -> StateReport:
-        """What the robot says of itself just now."""
+        """The robot's present report of its state."""
         return self.agent._state()
 
     def answer_as(self, name: str) -> None:

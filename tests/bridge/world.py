@@ -124,7 +124,7 @@ class Field:
         self.agent.serve()
 
     def report(self) -> StateReport:
-        """What the robot tells of itself."""
+        """The robot's report of its state."""
         newest = self.journal.newest
         return state_report(self.controller, robot="r1", seq=1, ns=self.clock.now_ns(), newest=newest)
 

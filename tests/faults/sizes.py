@@ -1,4 +1,4 @@
-"""How large the tests are that sweep many cases: a short form by default, all with STOPGO_FAULTS=full."""
+"""Sizes of tests that sweep many cases: a short form by default, all with STOPGO_FAULTS=full."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FULL = os.environ.get("STOPGO_FAULTS") == "full"
 
 
 def size(*, short: int, full: int) -> int:
-    """How many trials there are."""
+    """Number of trials."""
     return full if FULL else short
 
 

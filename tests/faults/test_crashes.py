@@ -127,7 +127,7 @@ def kinds(events: tuple[Event, ...], kind: type[Event]) -> int:
 
 
 def entries() -> int:
-    """How many journal entries an undisturbed mission makes."""
+    """Number of journal entries of an undisturbed mission."""
     mains = Mains()
     field = Field()
     field.journal.rows.commit_hook = mains

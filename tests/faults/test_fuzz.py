@@ -134,7 +134,7 @@ def test_a_command_on_the_key_of_another_verb_is_malformed() -> None:
 @given(data=st.data())
 @settings(max_examples=size(short=60, full=3000), deadline=None, derandomize=True, database=None)
 def test_no_document_brings_the_robot_down(data: st.DataObject) -> None:
-    """What is transferred whole and with the right hash may still be anything."""
+    """A document that arrives whole and with the right hash may still be anything."""
     field = Field()
     station = field.station()
     document = data.draw(st.one_of(bent(), torn(), deep, st.just(b"[" * 200_000), st.just(b'{"a":' * 99_999)))

@@ -185,7 +185,7 @@ def beside(mission: Mission, pose: Pose) -> float:
 
 @pytest.fixture
 def stood(monkeypatch: pytest.MonkeyPatch) -> list[Pose]:
-    """Where the vehicle truly stood at the end of each scan that was not spoilt, on the site."""
+    """True positions of the vehicle on the site at the end of each unspoilt scan."""
     found: list[Pose] = []
     end = VehicleScanner.end
 

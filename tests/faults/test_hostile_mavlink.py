@@ -95,7 +95,7 @@ def test_a_vehicle_on_a_stream_answers_whoever_else_talks_nonsense() -> None:
 
 
 def answered(station: Wire, message: Message) -> bool:
-    """Whether an AUTOPILOT_VERSION comes; a vehicle that was made to reboot is away for a second."""
+    """True if an AUTOPILOT_VERSION comes; a vehicle that was made to reboot is away for a second."""
     with station.waiting("AUTOPILOT_VERSION") as waiting:
         for _ in range(60):
             station.send(message)

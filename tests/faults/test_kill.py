@@ -166,7 +166,7 @@ def see_through(station: Station, chance: random.Random, outcome: Outcome, *, pa
 
 @dataclass(frozen=True)
 class Severity:
-    """How many kills a trial has, and how soon after a boot they come."""
+    """Number of kills of a trial, and their delay after a boot."""
 
     crashes: tuple[int, int] = (0, 3)
     """Least and greatest number of boots that die at a journal entry."""
@@ -189,7 +189,7 @@ def faults_of(chance: random.Random, severity: Severity) -> list[str]:
 
 @dataclass(frozen=True)
 class Site:
-    """How robot and station reach one another: in the open, or by mTLS with signed orders."""
+    """Link of robot and station: open, or by mTLS with signed commands."""
 
     protocol: str = "tcp"
     robot: tuple[str, ...] = ()
@@ -257,7 +257,7 @@ def trial_of_a_revision(seed: int, folder: Path) -> Outcome:
 
 
 def check(folder: Path, ran: Mission, paused: int) -> None:
-    """What the journal and the scanner's record must agree on."""
+    """Compare the journal with the scanner's record."""
     with open_journal(folder, "r1") as journal:
         events = journal.events()
         stored = journal.missions.read(ran.id, ran.revision)

@@ -53,7 +53,7 @@ class FieldTime:
 
 
 class Malice:
-    """What a router may do to each message that passes it."""
+    """Manipulation by a router of each message that passes it."""
 
     def __init__(self, field: GuardedField, chance: random.Random) -> None:
         self.field = field
@@ -117,7 +117,7 @@ class Malice:
         return {which: bytes(data)}
 
     def deliver(self, message: SignedMessage) -> None:
-        """What was held back arrives after all; nobody waits for its answer any more."""
+        """Deliver messages that were held back; nobody waits for their answers any more."""
         if message.kind == "told":
             self.honest = True
             self.field.board.tell(message)

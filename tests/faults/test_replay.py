@@ -61,7 +61,7 @@ def truth_of(run: Run, match: Match) -> int | None:
 
 
 def counts_of(run: Run, matches: tuple[Match, ...]) -> Counter[str]:
-    """How many halts were told rightly, wrongly called a stop, or not called one though they were."""
+    """Numbers of standstills reported rightly, wrongly called a stop, or wrongly not called one."""
     found: Counter[str] = Counter()
     for match in matches:
         true = truth_of(run, match)

@@ -37,7 +37,7 @@ Rows = list[tuple[int, float, float]]
 
 @pytest.fixture
 def rows(monkeypatch: pytest.MonkeyPatch) -> Rows:
-    """When the vehicle was where on the site, by itself."""
+    """Times and positions of the vehicle on the site, by itself."""
     found: Rows = []
     look, turn = Wheels.at, math.radians(SITE.heading_deg)
 

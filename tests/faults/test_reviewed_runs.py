@@ -63,7 +63,7 @@ class Story:
         return any(shot.good for shot in self.witness.shots_at(stop))
 
     def outcome(self, stop: Stop) -> set[str]:
-        """What may be said of it."""
+        """Allowed verdicts."""
         if self.scanned(stop):
             return {"scanned"}
         withdrawn = stop.id not in {item.id for item in self.missions[-1].stops}

@@ -1,4 +1,4 @@
-"""What a run left out is brought by its top-up, driven on the simulated robot like any mission."""
+"""A follow-up mission scans the rest of a run, driven on the simulated robot like any mission."""
 
 from __future__ import annotations
 
@@ -45,6 +45,6 @@ def test_a_run_with_two_stops_skipped_and_its_top_up_reach_the_coverage(
 
 
 def places(witness: Witness, mission: Mission) -> np.ndarray:
-    """Where the simulated scanner made a scan, by the witness."""
+    """Positions of the simulated scanner's scans, by the witness."""
     shots = [shot.pose for stop in mission.stops for shot in witness.shots_at(stop) if shot.good]
     return np.array([(pose.x, pose.y, pose.heading) for pose in shots]).reshape(-1, 3)

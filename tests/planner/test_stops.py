@@ -1,4 +1,4 @@
-"""Where stops may be, which rooms get one, and what is told of rooms that get none."""
+"""Positions where stops may be, rooms that get one, and reports of rooms that get none."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from tests.planner.worlds import (
 
 
 def reason_at(floor: FloorPlan, x: float, y: float, settings: Settings | None = None) -> str:
-    """Why a stop may not be at a point of the first room, or `kept`."""
+    """Reason why a stop may not be at a point of the first room, or `kept`."""
     place = StopFeasibility(navigable(floor, settings or Settings()))
     return DROP_REASONS[int(place.reasons(np.array([[x, y]]), np.array([0]))[0])]
 

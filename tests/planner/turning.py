@@ -36,7 +36,7 @@ ALIKE = 1e-3
 
 @dataclass(frozen=True)
 class Place:
-    """Where a drawing is put: mirrored, then turned by degrees, then shifted by metres."""
+    """Placement of a drawing: mirrored, then rotated by degrees, then shifted by metres."""
 
     degrees: float = 0.0
     mirrored: bool = False

@@ -86,7 +86,7 @@ def reports_of_two(
 
 
 def _scanned(told: list[StateReport | PoseReport | AnyEvent], stop: str) -> int:
-    """Where in a run the scan of a stop is told."""
+    """Index of the report of a stop's scan in a run."""
     return next(k for k, item in enumerate(told) if isinstance(item, Scanned) and item.stop == stop)
 
 

@@ -37,7 +37,7 @@ def room(place: Path) -> Iterator[PlanningRoom]:
 
 
 def waited(room: PlanningRoom, number: int) -> dict[str, Any]:
-    """What pages show of a variant once its process has answered."""
+    """Display of a variant on the pages once its process has answered."""
     order = room.variant(number).order
     assert order is not None
     while room.variant(number).shown["state"] in ("waiting", "running"):

@@ -100,7 +100,7 @@ class ExternalChanges:
         return runs.started(run, run_id=uuid.uuid4().hex[:12], now_ns=now_ns, by=by)
 
     def _by(self, observed: Observation) -> str:
-        """Who changed the mode, or disarmed the vehicle.
+        """Author of a change of mode, or of disarming.
 
         First the author of a recent command for it whose outcome was unknown, then a station whose command
         was heard. A remote control counts only without a failsafe, which may move its channels itself.
@@ -120,11 +120,11 @@ class ExternalChanges:
         return (self._book.clock.now_ns() - self._observer.status.mode_began_ns) / 1e9
 
     def jumped_by(self) -> str:
-        """Who has made an item beyond the run's stop the current one."""
+        """Author of a jump to an item beyond the run's stop."""
         return self._item_set_by(self._observer.position.jumped_ns)
 
     def _item_set_by(self, seen_ns: int) -> str:
-        """Who has set the current item, which was seen then."""
+        """Author of a change of the current item, which was seen then."""
         age_s = (self._book.clock.now_ns() - seen_ns) / 1e9
         return self._peer.foreign.station("item", age_s) or SOMEBODY
 

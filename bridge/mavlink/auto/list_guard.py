@@ -87,7 +87,7 @@ class ListGuard:
         return now_ns > last.began_ns + (CHECK_NS if known else self._pause_ns)
 
     def compare(self) -> None:
-        """Read the list back, unless no run is under way; the vehicle may refuse it for now."""
+        """Read the list back, unless no run is in progress; the vehicle may refuse it for now."""
         with self._comparing:
             listed, began_ns = self._book.listed, self._book.clock.now_ns()
             if listed is None or self._book.run.state in ("FINISHED", "ABORTED"):

@@ -50,7 +50,7 @@ NO_MESSAGE = 0.0
 OLD_AGAIN_S = 0.2
 """Interval at which the last picture is requested before a scan."""
 BUSY_S = 1.0
-"""Interval between two tries of a trigger, while an older scan is under way."""
+"""Interval between two tries of a trigger, while an older scan is in progress."""
 
 
 class StandstillWatch:

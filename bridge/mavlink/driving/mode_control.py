@@ -121,7 +121,7 @@ class ModeControl:
         return f"{moved} steers the vehicle" if moved else ""
 
     def _author(self, effect: Effect, mode: Mode | None = None) -> str:
-        """Who did that: our guard, a station that was heard, a failsafe, a remote control, or not known."""
+        """Author of the change: our guard, a station, a failsafe, a remote control, or unknown."""
         if time.monotonic() - self._guard_stop_s < GUARD_S:
             return "the gateway's own guard (its program did not run for a while)"
         station = self._peer.foreign.station(effect, mode=mode)

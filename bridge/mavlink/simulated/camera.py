@@ -35,12 +35,12 @@ class Camera:
 
     @property
     def due_ns(self) -> int | None:
-        """End of the scan under way."""
+        """End of the current scan."""
         return None if self._scanner.scan is None else self._scanner.scan.ends_ns
 
     @property
     def under_way(self) -> int | None:
-        """Number in the trigger of the scan under way."""
+        """Number in the trigger of the current scan."""
         return None if self._scanner.scan is None else self._scanner.scan.number
 
     @property
@@ -54,7 +54,7 @@ class Camera:
         return next(reversed(self.reports.values()), None)
 
     def begin(self, number: int, seconds: float, now_ns: int) -> bool:
-        """Begin a scan; false if one is under way. 0 seconds: not given."""
+        """Begin a scan; false if one is in progress. 0 seconds: not given."""
         lasts, pose = seconds if seconds > 0 else self._default_s(), self._rover.at(now_ns)[0]
         if not self._scanner.begin(number, lasts, index=self.count, pose=pose, now_ns=now_ns):
             return False

@@ -284,14 +284,14 @@ def _script_message(vehicle: Vehicle, command: ReceivedCommand) -> int:
 
 
 def _stop_capture(vehicle: Vehicle, command: ReceivedCommand) -> int:
-    """Break off the scan under way, without a report."""
+    """Break off the current scan, without a report."""
     vehicle.camera.stop()
     vehicle.auto.scan_over(vehicle.now_ns)
     return int(ACCEPTED)
 
 
 def _scan(vehicle: Vehicle, command: ReceivedCommand, number: int, seconds: float) -> int:
-    """Begin a scan; a repeated trigger of the scan under way does not begin another."""
+    """Begin a scan; a repeated trigger of the current scan does not begin another."""
     same = number == vehicle.camera.under_way or (command.again and number == vehicle.camera.last)
     if number > 0 and same:
         return int(ACCEPTED)

@@ -103,7 +103,7 @@ class Transfers:
         }
 
     def reset(self) -> None:
-        """Forget transfers under way, as a reboot does."""
+        """Forget transfers in progress, as a reboot does."""
         self._upload = self._download = self._done = None
 
     def tick(self) -> None:

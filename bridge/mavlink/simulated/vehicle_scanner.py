@@ -22,7 +22,7 @@ MOVED_M, TURNED_RAD = 0.01, 0.02
 
 @dataclass(frozen=True)
 class RunningScan:
-    """A scan under way."""
+    """A scan in progress."""
 
     number: int
     """Number in the trigger; 0 if none."""
@@ -54,7 +54,7 @@ class VehicleScanner:
         self.scan: RunningScan | None = None
 
     def begin(self, number: int, seconds: float, *, index: int, pose: Pose, now_ns: int) -> bool:
-        """Begin a scan of this duration; false if one is under way."""
+        """Begin a scan of this duration; false if one is in progress."""
         if self.scan is not None:
             return False
         self._begun += 1

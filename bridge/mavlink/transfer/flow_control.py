@@ -1,4 +1,4 @@
-"""Flow control of a transfer: items under way at once, repetition, and the end for lack of data."""
+"""Flow control of a transfer: items in flight at once, repetition, and the end for lack of data."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.round_trips import RoundTrips
 
 WINDOW = 8
-"""Items under way at once: some 400 bytes, as much as a telemetry radio takes at once."""
+"""Items in flight at once: some 400 bytes, as much as a telemetry radio takes at once."""
 FIRST_S = 0.3
 """Wait before a repetition while no round trip has been measured."""
 LEAST_S = 0.05
@@ -21,7 +21,7 @@ MOST_GROWTH = 4.0
 
 
 class Pace:
-    """Times at which items under way are sent again."""
+    """Times at which items in flight are sent again."""
 
     def __init__(self, window: int, trips: RoundTrips) -> None:
         self.window = window
@@ -81,5 +81,5 @@ class TransferTimeout:
 
 
 def window_for(peer: Peer) -> int:
-    """Number of items under way at once; on a slow link answers must not queue behind items."""
+    """Number of items in flight at once; on a slow link answers must not queue behind items."""
     return 1 if peer.wire.slow else WINDOW

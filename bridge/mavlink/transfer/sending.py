@@ -91,7 +91,7 @@ class _Sending:
         self._sent_again: set[int] = set()
         self._moved_s = time.monotonic()
         self._error = False
-        """True if the vehicle has reported that no transfer is under way, since its last request."""
+        """True if the vehicle has reported that no transfer is in progress, since its last request."""
         self._errors = 0
         self._result: int = MissionResult.ACCEPTED
         self._unanswered = 0

@@ -191,7 +191,7 @@ def _attempted(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
             return _given_up(peer, ended, len(items))
         else:
             failure = Failure(f"it ended the transfer at item {ended.at} ({result_name(ended.result)})")
-            window = 1  # then what is refused is the one item that is under way
+            window = 1  # then what is refused is the one item in flight
     return failure
 
 

@@ -1,6 +1,6 @@
 """Filter of messages to a vehicle: by default a tunnel passes only telemetry requests and stop commands.
 
-A station whose messages all pass could arm, change the mission and drive while a run is under way, and no
+A station whose messages all pass could arm, change the mission and drive while a run is in progress, and no
 commander's lease would count. To stop a vehicle must always be possible.
 """
 

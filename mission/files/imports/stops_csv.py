@@ -210,7 +210,7 @@ def _choice(row: _Row, column: str, words: tuple[str, ...]) -> Any:
 
 
 def _legs(rows: Sequence[_Row], visits: Sequence[Visit]) -> tuple[Point | None, tuple[Visit, ...]]:
-    """Where the first leg begins, and the visits with what lies on their legs."""
+    """Return the beginning of the first leg, and the visits with the points of their legs."""
     begin, legs, before = None, list[Visit](), None
     for row, visit in zip(rows, visits, strict=True):
         leg = _leg(row)

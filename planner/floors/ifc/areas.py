@@ -62,7 +62,7 @@ def modelled_rooms(level: Level, model: Model, scan_height: float) -> tuple[list
 
 
 def _apart(spaces: Sequence[Space]) -> list[Space]:
-    """Where spaces overlap, the smaller one keeps the place; what is left of a gross area is no room."""
+    """Areas without overlaps: the smaller space keeps an overlap; the rest of a gross area is no room."""
     kept: list[Space] = []
     for space in sorted(spaces, key=lambda item: (item.region.area, item.global_id or "")):
         others = [other.region for other in kept if other.region.intersects(space.region)]

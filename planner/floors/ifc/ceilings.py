@@ -27,7 +27,7 @@ REVEAL = 0.02
 def without_hidden_beams(
     solids: list[Solid], model: Model, level: Level, heights: Heights
 ) -> tuple[list[Solid], list[Finding]]:
-    """Return the solids without what ceilings and walls hide of beams, and a finding that tells it."""
+    """Return the solids without what ceilings and walls hide of beams, and a finding that reports it."""
     kept: list[Solid] = []
     hidden, whole = 0.0, 0.0
     ceilings = _ceilings(model, level, heights) if any(item.kind == "beams" for item in solids) else []

@@ -41,7 +41,7 @@ class _Read:
 
 
 def georeference_of(place: OnEarth, *, level: float) -> tuple[Georeference | None, list[Finding]]:
-    """Where the drawing's origin is, at a floor `level` metres above the model's zero."""
+    """Position on earth of the drawing's origin, at a floor `level` metres above the model's zero."""
     mapped, sited = _by_map(place), _by_site(place)
     chosen = mapped.at or sited.at
     findings = [*mapped.findings, *(sited.findings if mapped.at is None else _disagreeing(mapped, sited))]

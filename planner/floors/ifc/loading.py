@@ -64,7 +64,7 @@ def load(file: FloorFile) -> Model:
 
 
 def cache_folder() -> Path:
-    """Where models are kept, after the user's XDG_CACHE_HOME."""
+    """Folder of loaded models, below the user's XDG_CACHE_HOME."""
     home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     return Path(home).expanduser() / "stopgo" / "models"
 

@@ -26,7 +26,7 @@ class Storey(msgspec.Struct, frozen=True):
 
 
 class Task(msgspec.Struct, frozen=True):
-    """When something is done to a product; days as YYYY-MM-DD."""
+    """Days of work on a product, as YYYY-MM-DD."""
 
     name: str
     start: str | None = None

@@ -103,7 +103,7 @@ def _openings(one: Region, other: Region, free: Region) -> Iterator[FloatArray]:
 
 
 def _side(part: Region, room: Region) -> FloatArray | None:
-    """Where an opening meets a room: the ends (2, 2) of the longest line they share."""
+    """Side of an opening at a room: the ends (2, 2) of the longest line they share."""
     shared = shapely.line_merge(_lines_of(part.boundary.intersection(room.buffer(TOUCH))))
     lines = [line for line in shapely.get_parts(shared) if line.length >= NARROWEST]
     if not lines:

@@ -162,7 +162,7 @@ class _Strokes:
 
 
 def _leaf(swing: Swing, leaves: _Strokes, walls: _Near) -> Leaf:
-    """Which end of a swing is shut: where walls go on beyond hinge and edge, and no leaf is drawn."""
+    """End of a swing at which the door is shut: walls go on beyond hinge and edge, and no leaf is drawn."""
     near = walls.around(shapely.MultiPoint([swing.hinge, *swing.ends]), 0.5)
     drawn = [leaves.along(swing.hinge, end) for end in swing.ends]
     away = [_to_walls(swing.hinge, end, near) for end in swing.ends]
@@ -221,7 +221,7 @@ def _depth(
 
 
 def _common(depths: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Where walls of both jambs reach; if they do not overlap, the one nearest the line."""
+    """Extent of the walls of both jambs; if they do not overlap, of the one nearest the line."""
     if not depths:
         return -0.05, 0.05
     low, high = max(d[0] for d in depths), min(d[1] for d in depths)

@@ -140,7 +140,7 @@ def _free_ends(drawn: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _to_lines(ends: FloatArray, drawn: FloatArray) -> tuple[BoolArray, FloatArray]:
-    """Which ends nearly meet another line, and the segments over those gaps."""
+    """Ends that nearly meet another line, and the segments over those gaps."""
     lines = shapely.linestrings(drawn)
     points = shapely.points(ends)
     point, line = shapely.STRtree(lines).query(points, predicate="dwithin", distance=_MEETS)

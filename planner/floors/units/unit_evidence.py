@@ -184,7 +184,7 @@ def _thickness(shapes: Sequence[Shape], size: float) -> float | None:
 
 
 def _next_parallel(segments: FloatArray, others: FloatArray) -> FloatArray:
-    """Distance from each segment (n, 2, 2) to the next line that runs beside at least half of it.
+    """Distance from each segment (n, 2, 2) to the next line that runs along at least half of it.
 
     Infinite where there is none.
     """

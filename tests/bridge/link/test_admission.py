@@ -53,7 +53,7 @@ def tls(keys: Path | None, protocol: int = ssl.PROTOCOL_TLS_CLIENT) -> ssl.SSLCo
 
 
 class Echo:
-    """What listens behind the admission, and sends back what it receives."""
+    """Listener behind the admission that sends back all that it receives."""
 
     def __init__(self, listener: socket.socket, context: ssl.SSLContext | None) -> None:
         self.listener, self.context, self.met = listener, context, 0

@@ -143,7 +143,7 @@ def issue_until(folder: Path, role: site_keys.HolderRole, name: str, *, seconds:
 
 
 class Presence:
-    """When a robot was seen to come and go on a link."""
+    """Times at which a robot appeared and disappeared on a link."""
 
     def __init__(self, link: Link, robot: str) -> None:
         self.changes: list[bool] = []
@@ -209,7 +209,7 @@ def test_a_link_is_closed_when_the_stations_certificate_ends(site: Path, tmp_pat
 
 
 def left_when_the_stations_ends(site: Path, endpoint: str, lasts: int) -> bool:
-    """Whether there was a link before the certificate ended; then it was closed at that end."""
+    """True if there was a link before the certificate ended; then it was closed at that end."""
     name = f"brief{lasts}"
     issue_until(site / "site", "station", name, seconds=lasts)
     brief = read_keys(site / "site" / name, now=now_utc())
@@ -234,7 +234,7 @@ def test_a_link_is_closed_when_the_robots_certificate_ends(site: Path, tmp_path:
 
 
 def left_when_the_robots_ends(site: Path, folder: Path, lasts: int) -> bool:
-    """Whether there was a link before the certificate ended; then it was closed at that end."""
+    """True if there was a link before the certificate ended; then it was closed at that end."""
     name = f"robot{lasts}"
     issue_until(site / "site", "robot", name, seconds=lasts)
     endpoint = f"tls/127.0.0.1:{free_port()}"

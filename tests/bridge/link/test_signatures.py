@@ -92,7 +92,7 @@ def test_a_question_is_bound_to_its_parameters_and_its_robot(site: Path) -> None
 
 
 def told(field: GuardedField, key: str, number: int) -> list[bytes]:
-    """What a station hears of so many states that the robot tells, a second apart."""
+    """States that a station receives, of so many that the robot reports, a second apart."""
     station = field.guarded_station()
     heard: list[bytes] = []
     station.link.hear(key, lambda key, payload: heard.append(payload))

@@ -1,4 +1,4 @@
-"""What the controller does when something goes wrong, stop by stop, in simulated time."""
+"""Failures of base and scanner, stop by stop, in simulated time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot writes down of its runs comes back whole, or is told to be missing."""
+"""A robot's records of its runs come back whole, or are reported as missing."""
 
 from __future__ import annotations
 

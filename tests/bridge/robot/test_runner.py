@@ -1,4 +1,4 @@
-"""What an agent says of whoever carries out a run, and what becomes of both when the work ends."""
+"""An agent's reports of its runner, and the end of both when the work ends."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class Watched:
             self.link.publisher(keys.state)(encode(self.field.agent._state()))
 
     def reports(self, seconds: float) -> list[tuple[float, Followed]]:
-        """What the station is told in that time, and when; `told` has it also if that ends by an error."""
+        """Reports to the station in that time, with times; `told` has them also if that ends by an error."""
         self.told = told = list[tuple[float, Followed]]()
         for report in self.station.reports():
             told.append((self.monotonic(), report))

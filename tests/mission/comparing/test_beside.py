@@ -1,4 +1,4 @@
-"""How far beside its way a robot is: along the leg that is driven, whatever other legs pass by."""
+"""Path deviation: distance from the leg that is driven, whatever other legs pass by."""
 
 from __future__ import annotations
 

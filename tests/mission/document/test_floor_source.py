@@ -1,4 +1,4 @@
-"""What makes a floor this floor enters the mission's id; of a plain file it is the digest alone."""
+"""A floor's source enters the mission's id; of a plain file it is the digest alone."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def words(page: PdfPage) -> list[str]:
 
 
 def streams(pdf: bytes) -> list[bytes]:
-    """What is drawn, page by page and form by form."""
+    """Drawing commands, page by page and form by form."""
     from base64 import a85decode
 
     found = re.findall(rb"stream\r?\n(.*?)endstream", pdf, re.DOTALL)

@@ -224,7 +224,7 @@ def test_shortened_text_is_never_wider(content: str, width: float) -> None:
 
 @pytest.mark.parametrize("wide", [0.4, 1.2, 2.0, 4.0, 9.0])
 def test_room_names_cross_no_wall_and_no_other_name(wide: float) -> None:
-    """Where the whole name has no place its first word has; where that has none the room has no name."""
+    """A name without room is cut to its first word; without room for that, it is left out."""
     sheet = PaperSheet(
         *("A0", 1189.0, 841.0, 200, PaperBox(10.0, 10.0, 1000.0, 800.0), NOWHERE, NOWHERE, ()), (0.0, 0.0)
     )

@@ -1,4 +1,4 @@
-"""What a vehicle's parameters make of a mission's tolerances, before it is pushed."""
+"""A mission's tolerances at a vehicle's parameters, before the mission is pushed."""
 
 from __future__ import annotations
 

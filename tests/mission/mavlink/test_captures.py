@@ -1,4 +1,4 @@
-"""What a vehicle's camera must tell for a scan to be confirmed."""
+"""Reports of a vehicle's camera that confirm a scan."""
 
 from __future__ import annotations
 

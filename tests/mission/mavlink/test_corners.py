@@ -1,4 +1,4 @@
-"""Which points of a leg become waypoints."""
+"""Points of a leg that become waypoints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When an autopilot's metres count from the mission's georeference, and when from elsewhere."""
+"""Origin of an autopilot's metres: the mission's georeference, or another one."""
 
 from __future__ import annotations
 

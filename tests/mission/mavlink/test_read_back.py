@@ -1,4 +1,4 @@
-"""What vehicles keep, and how a difference is told."""
+"""Items that vehicles keep, and reports of differences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a real ArduPilot Rover kept of a mission of scan stops, from its own log."""
+"""A mission of scan stops on a real ArduPilot Rover, from the Rover's own log."""
 
 from __future__ import annotations
 

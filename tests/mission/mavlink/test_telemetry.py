@@ -1,4 +1,4 @@
-"""When a vehicle stands still, and when nobody knows what it does any more."""
+"""Standstill of a vehicle, and vehicles whose state is unknown."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Fired:
 
 
 def scans_of(items: Sequence[Item]) -> list[Fired]:
-    """What a vehicle does that runs commands which are no NAV commands as the next NAV command starts."""
+    """Scans of a vehicle that runs commands other than NAV as the next NAV command starts."""
     fired: list[Fired] = []
     waiting, stood = 0, 0.0
     for item in items:

@@ -46,7 +46,7 @@ def first_scan(mission: Mission, **fields: object) -> Mission:
 
 
 def read_back(sent: ItemList) -> list[Item]:
-    """What a vehicle that keeps its word gives back, with a home of its own."""
+    """Items that an honest vehicle gives back, with a home of its own."""
     vehicle = AUTOPILOTS[sent.autopilot]
     kept = [vehicle.kept(item) for item in upload_of(sent)]
     if vehicle.home_first:

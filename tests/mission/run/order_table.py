@@ -1,4 +1,4 @@
-"""What every order does in every state of a run: worked out by `decide` itself, printed in the protocol."""
+"""Effect of every command in every state of a run: computed by `decide` itself, printed in the protocol."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every order does in every state: one table, walked whole, which docs/reference/protocol.md prints."""
+"""Effect of every command in every state: one table, walked whole; docs/reference/protocol.md prints it."""
 
 from __future__ import annotations
 

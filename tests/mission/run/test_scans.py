@@ -1,4 +1,4 @@
-"""What a scan needs to be one."""
+"""Conditions of a confirmed scan."""
 
 from __future__ import annotations
 

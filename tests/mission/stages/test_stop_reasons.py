@@ -1,4 +1,4 @@
-"""Why a stop stands where it does: figures that can be checked on paper."""
+"""Reasons for a stop's position: figures that can be checked on paper."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ def replayed(path: Path, plan: Mission) -> Replay:
 
 
 def test_a_log_of_auto_tells_its_scans_by_the_camera(tmp_path: Path) -> None:
-    """Where only halts were seen nobody would know of them."""
+    """Standstills alone would not show them."""
     plan = mission()
     laid = replayed(logged(tmp_path / "auto.tlog", plan), plan)
     words = [f"{word} S{number}" for number in (1, 2, 3) for word in ("Arrived", "Settled", "Scanned")]

@@ -105,7 +105,7 @@ class Witness:
         return (ns - self.began_ns) / 1e9
 
     def arrivals(self, stop: Stop) -> list[tuple[int, Pose]]:
-        """When drives to the stop ended on it; of one that ended there early, when it was to go on."""
+        """Ends of drives to the stop; of one that ended there early, the time when it was to go on."""
         found = []
         for drove, after in zip(self.drives, [*self.drives[1:], None], strict=True):
             there = near((drove.end.x, drove.end.y), stop, stop.tolerance_m)
@@ -120,7 +120,7 @@ class Witness:
         return found
 
     def rests(self, *, least_s: float) -> list[tuple[int, int]]:
-        """When the robot was where it was for so long, but for what it shook."""
+        """Times at which the robot was stationary for so long, except for vibration."""
         spans, first = [], self.rows[0]
         for before, row in pairwise([*self.rows, (self.rows[-1][0], math.inf, 0.0, 0.0)]):
             shaken = math.dist(first[1:3], row[1:3]) <= 2 * self.shakes_m and first[3] == row[3]

@@ -1,4 +1,4 @@
-"""What a robot's log keeps of a drive: its poses with every disturbance that logs of the field have.
+"""A robot's log of a drive: its poses with every disturbance that logs of the field have.
 
 The error of each pose and its true time stay known, so that an oracle can say what a log could tell.
 """

@@ -29,7 +29,7 @@ PROFILES = ["ardupilot", "px4"]
 
 
 def refused(site: Site, verb: str, **details: object) -> str:
-    """Why an order was refused."""
+    """Reason of a command's refusal."""
     with pytest.raises(NegativeResult) as no:
         site.order(verb, **details)
     return str(no.value)

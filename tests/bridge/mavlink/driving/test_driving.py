@@ -187,7 +187,7 @@ def test_who_drives_by_hand_keeps_the_vehicle_until_it_is_handed_over(tmp_path: 
 
 
 def _refusal(station: Any) -> str:
-    """Why the robot does not start."""
+    """Reason why the robot does not start."""
     with pytest.raises(NegativeResult) as refused:
         station.command("start")
     return str(refused.value)

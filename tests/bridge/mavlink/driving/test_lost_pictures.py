@@ -21,7 +21,7 @@ SCAN = Scan(profile="default", duration_s=6.0, timeout_s=60.0)
 
 @pytest.fixture
 def begun(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Whether the scanner took each trigger."""
+    """True for each trigger that the scanner took."""
     taken: list[bool] = []
     begin = VehicleScanner.begin
 

@@ -56,7 +56,7 @@ def cornered_mission(*, speed: float = 0.5, **details: Any) -> Mission:
 
 
 def site_pose(pose: Pose) -> Pose:
-    """Where on the site a vehicle is that stands there, x to the east and y to the north of the origin."""
+    """Pose on the site of a vehicle there, x to the east and y to the north of the origin."""
     return to_east(pose, -SITE.heading_deg)
 
 

@@ -28,7 +28,7 @@ WAIT_S = 20.0
 
 @contextmanager
 def vehicle() -> Iterator[tuple[Url, queue.Queue[Any]]]:
-    """Where it listens, and the missions it says it was given."""
+    """Its endpoint, and the missions that it reports."""
     port, given = free_port(), queue.Queue[Any]()
     kind = mavsdk.ComponentType.AUTOPILOT
     sdk = mavsdk.Mavsdk(mavsdk.Configuration.create_with_component_type(kind))

@@ -1,4 +1,4 @@
-"""Who is named for a change by what was heard: stations, remote controls, and nobody without evidence."""
+"""Senders of changes, by messages that were received: stations, remote controls; nobody without evidence."""
 
 from __future__ import annotations
 

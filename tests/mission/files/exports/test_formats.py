@@ -1,4 +1,4 @@
-"""What holds of every export format alike."""
+"""Properties of every export format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What waypoints, delays and triggers become, and what is refused."""
+"""Imports of waypoints, delays and triggers, and refusals."""
 
 from __future__ import annotations
 

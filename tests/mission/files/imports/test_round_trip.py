@@ -1,4 +1,4 @@
-"""What is exported comes back: ids, places within a step of 1e-7 degrees, waits; noise does not."""
+"""Exported missions come back: ids, positions within a step of 1e-7 degrees, waits; noise does not."""
 
 from __future__ import annotations
 

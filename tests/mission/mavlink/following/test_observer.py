@@ -1,4 +1,4 @@
-"""What a vehicle tells, and what that comes to."""
+"""A vehicle's reports, and the observations made of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is seen of a vehicle, as steps of a run; no vehicle is needed for it."""
+"""Observations of a vehicle as steps of a run; no vehicle is needed for it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def seen(place: int, **fields: object) -> Observation:
 
 
 def after(run: Run, listed: ListedMission, observed: Observation) -> tuple[list[str], Run]:
-    """What is told of it, and the run then."""
+    """Its reports, and the run then."""
     changes = steps(run, listed, observed)
     return told([event_of(telling) for change in changes for telling in change.events]), (
         changes[-1].run if changes else run

@@ -17,7 +17,7 @@ Read = Callable[..., FloorPlan]
 
 @pytest.fixture(scope="session")
 def models(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Where models are kept during the tests."""
+    """Folder of loaded models during the tests."""
     folder = tmp_path_factory.mktemp("models")
     patch = pytest.MonkeyPatch()
     patch.setattr(loading, "cache_folder", lambda: folder)

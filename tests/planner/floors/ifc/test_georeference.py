@@ -1,4 +1,4 @@
-"""Where models stand on earth, against values computed by hand; defaults and nonsense are no positions."""
+"""Positions of models on earth, against values computed by hand; defaults and nonsense are no positions."""
 
 from __future__ import annotations
 

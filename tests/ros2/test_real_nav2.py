@@ -1,0 +1,166 @@
+"""A mission to its end by a real ROS 2: rclpy, Fast DDS, and servers that behave as Nav2's do.
+
+They need the environment that `make ros2` makes; without it these tests are skipped and say so. Nothing here
+counts time: a deadline is only the last resort.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import msgspec
+import pytest
+
+from stopgo.bridge.link.protocol import encode
+from stopgo.mission.document import Mission, RobotSpec, with_digest
+from tests.bridge.world import corridor
+from tests.called import stopgo
+from tests.ports import free_port
+from tests.ros2.environment import activated, is_made
+
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(not is_made(), reason="no ROS 2 environment; make it with: make ros2"),
+]
+HERE = Path(__file__).parent
+DEADLINE_S = 60.0
+FAST = RobotSpec(radius=0.35, speed=1.5, turn_rate=2.0, acceleration=2.0)
+SETTINGS = """
+[topics]
+cmd_vel = "cmd_vel"
+[drive]
+spin = "spin"
+"""
+
+
+def quick_corridor() -> Mission:
+    made = corridor(stops=3, settle_s=0.3)
+    stops = [
+        msgspec.structs.replace(stop, scan=msgspec.structs.replace(stop.scan, duration_s=0.3))
+        for stop in made.stops
+    ]
+    return with_digest(msgspec.structs.replace(made, stops=tuple(stops), robot=FAST))
+
+
+class Site:
+    """The stand-in robot, and stopgo's agent on it, each a process with ROS's Python."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.environment = activated({"ROS_DOMAIN_ID": str(random.Random(str(folder)).randint(1, 100))})
+        (folder / "scans").mkdir()
+        (folder / "ros2.toml").write_text(SETTINGS)
+        (folder / "mission.json").write_bytes(encode(quick_corridor()))
+        self.processes: list[subprocess.Popen[str]] = []
+        self._python("-m", "tests.ros2.stand_in_nav2", str(folder / "scans"))
+
+    def robot(self) -> subprocess.Popen[str]:
+        return self._python(
+            "-m", "stopgo", "robot", "--name", "r1", "--listen", self.endpoint,
+            "--state", str(self.folder / "r1.state"),
+            "--controller", f"ros2:{self.folder / 'ros2.toml'}",
+        )  # fmt: skip
+
+    def _python(self, *arguments: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [str(self.environment["STOPGO_ROS2_PYTHON"]), *arguments], env=self.environment, text=True,
+            cwd=HERE.parents[1], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        self.processes.append(process)
+        _wait_for_line(process.stdout, "ready")
+        return process
+
+    def stopgo(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        return stopgo(*arguments, "--robot", "r1", "--connect", self.endpoint)
+
+    def state(self) -> dict[str, object]:
+        answer = self.stopgo("status", "--json")
+        return dict(json.loads(answer.stdout)) if answer.returncode == 0 else {}
+
+    def until(self, reached: Callable[[dict[str, object]], bool]) -> dict[str, object]:
+        end_s = time.monotonic() + DEADLINE_S
+        while not reached(state := self.state()):
+            assert time.monotonic() < end_s, state
+            time.sleep(0.1)
+        return state
+
+    def reviewed(self) -> dict[str, list[dict[str, Any]]]:
+        """The report on the run, once it has ended."""
+        recording = str(self.folder / "field.rrd")
+        assert self.stopgo("watch", "--rrd", recording).returncode == 0
+        answer = stopgo("review", recording, "--json")
+        assert answer.returncode == 0, answer.stderr
+        return dict(json.loads(answer.stdout))
+
+    def close(self) -> None:
+        for process in self.processes:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+
+
+def _wait_for_line(stream: IO[str] | None, begin: str) -> None:
+    assert stream is not None
+    lines = []
+    for line in stream:
+        lines.append(line)
+        if line.startswith(begin) or f" {begin} " in line:
+            return
+    raise AssertionError("".join(lines))
+
+
+@contextmanager
+def site_in(folder: Path) -> Iterator[Site]:
+    site = Site(folder)
+    try:
+        yield site
+    finally:
+        site.close()
+
+
+def test_a_mission_is_driven_to_its_end_and_reviewed(tmp_path: Path) -> None:
+    with site_in(tmp_path) as site:
+        site.robot()
+        assert site.stopgo("push", str(tmp_path / "mission.json")).returncode == 0
+        assert site.stopgo("start").returncode == 0
+        (run,) = site.reviewed()["runs"]
+        state = site.state()
+        assert (state["state"], state["done"]) == ("FINISHED", ["s1", "s2", "s3"])
+        distances = {stop["stop"]: stop["deviation_m"] for stop in run["stops"]}
+        print("distances from the stops:", distances)
+        assert list(distances) == ["s1", "s2", "s3"]
+        assert max(distances.values()) <= 0.05
+        scans = [file.read_text().split() for file in sorted((tmp_path / "scans").iterdir())]
+        assert [round(float(scan[0])) for scan in scans] == [2, 4, 6]
+        assert {scan[3] for scan in scans} == {"False"}, "the robot moved during a scan"
+
+
+def test_a_killed_agent_takes_up_its_run_and_another_clients_goal_holds_it(tmp_path: Path) -> None:
+    with site_in(tmp_path) as site:
+        robot = site.robot()
+        assert site.stopgo("push", str(tmp_path / "mission.json")).returncode == 0
+        assert site.stopgo("start").returncode == 0
+        site.until(lambda state: state.get("done") == ["s1"])
+        robot.send_signal(signal.SIGKILL)
+        robot.wait()
+        site.robot()
+        assert site.until(lambda state: "state" in state)["state"] == "PAUSED"
+        assert site.stopgo("resume").returncode == 0
+        foreign = subprocess.run(
+            [str(site.environment["STOPGO_ROS2_PYTHON"]), "-m", "tests.ros2.foreign_client"],
+            env=site.environment, cwd=HERE.parents[1], capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert foreign.returncode == 0, foreign.stderr
+        site.until(lambda state: state.get("state") == "HELD")
+        assert site.stopgo("retry").returncode == 0
+        assert site.until(lambda state: state.get("state") == "FINISHED")["done"] == ["s1", "s2", "s3"]
+        (run,) = site.reviewed()["runs"]
+        assert "another client" in " ".join(state["why"] for state in run["states"])
