@@ -28,7 +28,7 @@ from tests.planner.worlds import FLOORS, changed, moved, planned, shared, shifte
 
 LARGEST = "layered/office-l1.dxf"
 AGAIN = FLOORS if FULL else [name for name in FLOORS if name != LARGEST and "case1" not in name]
-"""In the short form, the floors that take a second at most; the others take five times as long together."""
+"""In the short form, the floors that take a second at most: the others take five times as long together."""
 
 
 @cache
@@ -63,7 +63,7 @@ def test_two_plans_of_a_floor_are_the_same_bytes(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in AGAIN if name != LARGEST])
 def test_the_order_of_entities_does_not_change_a_plan(name: str) -> None:
-    """Stairs, which are no targets, meet walls in both floors of case 2: whose face it is depends on the order."""
+    """Stairs, which are no targets, meet walls in case 2: whose face it is depends on the order."""
     one, other = the_plan(name)[0], planned(in_another_order(name))[0]
     assert one.network
     assert encode(one) == encode(other)
@@ -121,8 +121,11 @@ def test_other_settings_are_planned_well(name: str, settings: Settings) -> None:
     check_plan(mission, nouns, settings, brute=settings.fov == 360)
 
 
+TURNED = some(["layered/fzk-haus-eg.dxf", "paper/synthetic_case1_rooms.dxf"], every=2)
+
+
 @pytest.mark.parametrize("degrees", [17.0, 45.0])
-@pytest.mark.parametrize("name", some(["layered/fzk-haus-eg.dxf", "paper/synthetic_case1_rooms.dxf"], every=2))
+@pytest.mark.parametrize("name", TURNED)
 def test_a_turned_floor_is_planned_well_and_alike(name: str, degrees: float) -> None:
     there, nouns = planned(moved(shared(name), turned(degrees)))
     check_plan(there, nouns, Settings(), brute=False)
