@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.table import put, table, versions
 from tests.recordings.truth.auto_logs import auto_answers
 from tests.recordings.truth.bench import answered, cases
+from tests.recordings.truth.cloud_cases import cloud_answers, small_floor
 from tests.recordings.truth.own_runs import own_answers
 
 KINDS = ("right", "false yes", "false no", "untold", "open")
@@ -19,7 +20,7 @@ OWN_SEEDS = range(1, 4)
 
 def main() -> None:
     """Judge every case and put the tables into the README."""
-    found = [*_logs(), *_auto(), *_own()]
+    found = [*_logs(), *_auto(), *_clouds(), *_own()]
     text = "\n\n".join(
         (
             versions("numpy", "rosbags", "pymavlink", "pyulog"),
@@ -50,7 +51,16 @@ def _auto() -> Iterator[tuple[str, str, str]]:
         for answer in auto_answers(Path(folder)):
             if answer.kind not in ("right", "open"):
                 print(f"{answer.kind}: {answer.name}: {answer.text[:200]}", file=sys.stderr, flush=True)
-            yield "AUTO telemetry", answer.name.split(" / ")[1].split(" #")[0], answer.kind
+            yield answer.source, answer.name.split(" / ")[1].split(" #")[0], answer.kind
+
+
+def _clouds() -> Iterator[tuple[str, str, str]]:
+    """Yield the same of clouds of the surveying scanner."""
+    with TemporaryDirectory() as folder:
+        for answer in cloud_answers(small_floor(Path(folder))):
+            if answer.kind != "right":
+                print(f"{answer.kind}: {answer.name}: {answer.text[:200]}", file=sys.stderr, flush=True)
+            yield "clouds", f"clouds: {answer.name}", answer.kind
 
 
 def _own() -> Iterator[tuple[str, str, str]]:

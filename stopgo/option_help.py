@@ -28,7 +28,7 @@ OptionGroup = tuple[str, list[TyperOption]]
 
 
 class PlainCommand:
-    """A command that starts without pydantic, and whose help never breaks a line at a hyphen: words are copied."""
+    """A command that starts without pydantic; its help breaks no line at a hyphen, since words are copied."""
 
     help: str | None
     epilog: str | None

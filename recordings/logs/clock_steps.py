@@ -2,7 +2,8 @@
 
 A stamp that alone lies far from both neighbours is wrong, and its pose is left out. From a step back on, the
 times count on from the last one before it. A step forward may be a gap, unless the robot drove through it
-without moving farther than from one pose to the next.
+without moving farther than from one pose to the next. A log with many such steps is of a robot that writes
+no poses while it stands.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ STEP_NS = 10**9
 """Least step; poses that are out of order by less are only sorted."""
 MOST_STEPS = 20
 """Limit of steps; with more, the log is out of order, and no clock was set."""
+MOST_FORWARD = 2
+"""Limit of long times without poses; with more, a robot that writes no poses while it stands is likely."""
 ALONE_NS, ALONE_USUAL = 60 * 10**9, 1000
 """Least distance of a wrong stamp from its neighbours, also as a multiple of the usual interval."""
 DRIVES_M_S = 0.1
@@ -32,6 +35,8 @@ class MendedTimes:
     """False for poses whose stamp is wrong (n,)."""
     lines: tuple[str, ...]
     """Steps and wrong stamps, one line each."""
+    steps_ns: tuple[int, ...] = ()
+    """Times of the steps, as mended: how long each took is unknown."""
 
 
 def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
@@ -56,9 +61,10 @@ def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
     ]
     for k in steps:
         times[k + 1 :] += usual - step[k]
+    steps_ns = tuple(int(times[k]) for k in steps)
     mended = ns.copy()
     mended[kept] = times
-    return MendedTimes(mended, kept, tuple(lines[0 if wrong else 1 :]))
+    return MendedTimes(mended, kept, tuple(lines[0 if wrong else 1 :]), steps_ns)
 
 
 def _undone(step: IntArray, back: IntArray, usual: int) -> list[int]:
@@ -82,6 +88,8 @@ def _forward_steps(step: IntArray, xy: FloatArray, usual: int) -> IntArray:
     """Return the steps forward through which the robot drove on as from one pose to the next."""
     moved = np.hypot(*np.diff(xy, axis=0).T)
     inner = np.flatnonzero(step > max(STEP_NS, 10 * usual))
+    if len(inner) > MOST_FORWARD:
+        return np.zeros(0, np.int64)
     inner = inner[(inner > 0) & (inner < len(step) - 1)]
     speeds = moved / np.maximum(step, 1)
     speed = np.minimum(speeds[inner - 1], speeds[inner + 1])

@@ -78,6 +78,8 @@ class Poses:
     """Heights (n,), metres upwards from any level; None where the source has none."""
     restarts_ns: tuple[int, ...] = ()
     """Times of the first data after each restart of the robot, where the log reports it."""
+    steps_ns: tuple[int, ...] = ()
+    """Times at which the clock was set: how much time passed there is unknown."""
 
     @property
     def seconds(self) -> float:
@@ -205,7 +207,7 @@ def poses_of(
     heights = None if height is None else frozen(np.asarray(height, float)[order])
     return Poses(
         source, frame, frozen(times[order], np.int64), frozen(positions[order]), headings,
-        **{"oddities": oddities, "height": heights, **more},
+        **{"oddities": oddities, "height": heights, "steps_ns": mended.steps_ns, **more},
     )  # fmt: skip
 
 

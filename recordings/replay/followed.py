@@ -19,7 +19,7 @@ from stopgo.mission.mavlink.following.followed_run import FollowedRun
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.recognise import recognise
-from stopgo.mission.run.events import AnyEvent, Arrived, Pose, Scanned, Unconfirmed
+from stopgo.mission.run.events import AnyEvent, Arrived, Pose, Scanned, Settled, Unconfirmed
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import FieldLog, LoggedMission
 from stopgo.recordings.logs.telemetry_log import FORMAT, messages_of
@@ -111,22 +111,28 @@ def _followed(
 def _with_standstills(
     events: Sequence[AnyEvent], mission: Mission, standstills: Sequence[Standstill]
 ) -> Iterator[AnyEvent]:
-    """Give unconfirmed stops without a pose that of the standstill which the poses of the log show there."""
+    """Give unconfirmed stops the pose of the standstill which the poses of the log show there.
+
+    An arrival is reported while the vehicle still brakes: of a stop without a report of its scan, the pose
+    after it has settled counts.
+    """
     stops = {stop.id: stop for stop in mission.stops}
-    after_ns = 0
+    after_ns, settled = 0, None
     for event in events:
-        if isinstance(event, Unconfirmed) and event.pose is None:
-            yield _at_standstill(event, stops[event.stop], standstills, after_ns)
+        if isinstance(event, Unconfirmed):
+            yield _at_standstill(event, stops[event.stop], standstills, after_ns, settled)
         else:
             yield event
         if isinstance(event, Arrived | Scanned | Unconfirmed):
-            after_ns = event.robot_ns
+            after_ns, settled = event.robot_ns, None
+        if isinstance(event, Settled):
+            settled = event
 
 
 def _at_standstill(
-    event: Unconfirmed, stop: Stop, standstills: Sequence[Standstill], after_ns: int
+    event: Unconfirmed, stop: Stop, standstills: Sequence[Standstill], after_ns: int, settled: Settled | None
 ) -> Unconfirmed:
-    """Return the event with the last standstill at the stop since a time, if there is one."""
+    """Return the event with the last standstill at the stop since a time, else with the settled pose."""
     found = [
         item
         for item in standstills
@@ -134,7 +140,8 @@ def _at_standstill(
         if math.dist(item.xy, (stop.x, stop.y)) <= NEAR_M and long_enough(item, stop)
     ]
     if not found:
-        return event
+        own = settled is not None and settled.stop == event.stop
+        return changed(event, pose=settled.pose) if settled is not None and own else event
     pose = Pose(x=found[-1].x, y=found[-1].y, heading=found[-1].heading)
     reason = f"{event.reason}; stationary {found[-1].seconds:.1f} s"
     return changed(event, pose=pose, reason=reason)

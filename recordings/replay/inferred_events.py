@@ -28,7 +28,7 @@ from stopgo.mission.run.events import (
 from stopgo.mission.run.run_log import Track
 from stopgo.mission.run.tolerance import is_outside
 from stopgo.recordings.logs.field_log import Remark
-from stopgo.recordings.replay.matching import Match, long_enough
+from stopgo.recordings.replay.matching import ENOUGH, SLACK_S, Match, long_enough
 from stopgo.recordings.replay.standstills import Standstill
 
 
@@ -159,6 +159,19 @@ FAILED = ", failed"
 """End of the text of a picture that the camera reports as failed."""
 
 
+def _left_after_s(triggers: Sequence[Remark], standstill: Standstill) -> float:
+    """Return the time from the first trigger that begins a scan to the end of the standstill; else infinite.
+
+    A report of a picture, and a camera's own event, may come at the end of its scan.
+    """
+    begins = [item.ns for item in triggers if item.text.startswith(BEGINS) or item.text.endswith(")")]
+    return (standstill.end_ns - begins[0]) / 1e9 if begins else math.inf
+
+
+BEGINS = ("camera_trigger", "trigger ")
+"""Begin of the text of a trigger that begins a scan; so does an item, whose text ends with its number."""
+
+
 def _visit(stop: Stop, standstill: Standstill, remarks: Sequence[Remark]) -> Iterator[InferredEvent]:
     pose = Pose(x=standstill.x, y=standstill.y, heading=standstill.heading)
     deviation_m = math.dist(standstill.xy, (stop.x, stop.y))
@@ -174,9 +187,12 @@ def _visit(stop: Stop, standstill: Standstill, remarks: Sequence[Remark]) -> Ite
     if trigger is not None:
         yield InferredEvent(max(trigger.ns, standstill.begin_ns), Settled, {"stop": stop.id, "pose": pose})
     evidence = f"; {_scan_evidence(trigger, standstill, remarks)}"
-    if not long_enough(standstill, stop):
+    left_s = _left_after_s(triggers, standstill)
+    if not long_enough(standstill, stop) or left_s < ENOUGH * stop.scan.duration_s - SLACK_S:
         planned = stop.settle_s + stop.scan.duration_s
         reason = f"stationary {standstill.seconds:.1f} s of {planned:.1f} s{evidence}"
+        if long_enough(standstill, stop):
+            reason += f"; left {left_s:.1f} s after the trigger of a scan of {stop.scan.duration_s:.1f} s"
         yield InferredEvent(standstill.end_ns, Failed, {"stop": stop.id, "reason": reason})
     else:
         reason = f"stationary {standstill.seconds:.1f} s{evidence}"

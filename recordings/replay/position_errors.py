@@ -7,7 +7,7 @@ visits suffice, a fit of the drift separates both (`drift_model`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.own import SITE
 from stopgo.recordings.replay.drift_model import DriftFit, drift_fit
 from stopgo.recordings.replay.fitting import STRETCH
+from stopgo.recordings.replay.jumps import lasting_jump
 from stopgo.recordings.replay.matching import Match
 from stopgo.recordings.replay.path_and_time import smoothed_track
 from stopgo.recordings.replay.replayed import Replay
@@ -26,12 +27,12 @@ NEIGHBOURS = 4
 """Number of visits around a stop whose common offset is its uncertainty."""
 COHERENT = 0.5
 """Fraction of the offsets below which their neighbours must predict them, for a frame tied to the site."""
+SIGMAS, STILL_M, LEAST_MEANS = 2.0, 0.1, 4
+"""Standard deviations of noise; distance across a gap up to which the robot stood in it; least for a mean."""
+STEP_M = 0.01
+"""Step of latitudes and longitudes in an autopilot's items and reports, 1e-7 degrees."""
 SCATTERED, LEAST_SCATTERED = 0.9, 6
 """Fraction from which on they do not follow each other as drift does, and the number of visits needed."""
-JUMP_M, JUMP_M_S = 0.5, 5.0
-"""Distance and speed from which on the step between two poses is a jump."""
-HEALED_S = 5.0
-"""Time within which poses come back from a jump that does not last."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,12 @@ class PositionErrors:
     """What a fit of the drift leaves, by visit; None where none is needed, or none explains the offsets."""
     visits: tuple[int, ...]
     """Indices of the visited stops, in the order of `drift`."""
+    spread_m: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """Uncertainty that the noise of the poses leaves at each stop (n,)."""
+    moved_m: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """Motion during the last standstill at each stop (n,): noise may join two standstills into one."""
+    noise_m: float = 0.0
+    """Standard deviation of a pose of a stationary robot."""
 
     @property
     def drifts(self) -> bool:
@@ -62,6 +69,10 @@ class PositionErrors:
 
 def position_errors(replay: Replay) -> PositionErrors:
     """Return the uncertainty of each stop's position, and the fit of the drift where it is needed."""
+    return _with_noise(_common_errors(replay), replay)
+
+
+def _common_errors(replay: Replay) -> PositionErrors:
     stops = np.array([(stop.x, stop.y) for stop in replay.mission.stops])
     visits = visits_of(replay)
     indices = tuple(k for k, _ in visits)
@@ -73,14 +84,29 @@ def position_errors(replay: Replay) -> PositionErrors:
     left, least = _left_of(offsets, common), min(stop.tolerance_m for stop in replay.mission.stops)
     drift = _drift(replay, visits, stops, least) if np.hypot(*offsets.T).max() > least / 2 else None
     if is_tied(replay) and drift is None and (len(visits) < NEIGHBOURS or left >= COHERENT):
-        scattered = np.median(np.hypot(*offsets.T)) <= least or len(replay.extra) <= PARKED
-        return PositionErrors(sure, sure if scattered else np.full(len(stops), np.inf), None, indices)
+        few = np.median(np.hypot(*offsets.T)) <= least
+        scattered = few or (len(replay.extra) <= PARKED and not _path_is_lost(replay.run.poses))
+        most = sure.copy() if scattered else np.full(len(stops), np.inf)
+        most[list(indices[_drifting_since(offsets, least) :])] = np.inf
+        return PositionErrors(sure, most, None, indices)
     by_stop = dict(zip(indices, np.hypot(*common.T).tolist(), strict=True))
     everywhere = float(np.hypot(*np.median(offsets, axis=0)))
     unsure = np.maximum([by_stop.get(k, everywhere) for k in range(len(stops))], _residual(replay, offsets))
     if drift is None and len(visits) >= LEAST_SCATTERED and left >= SCATTERED:
         return PositionErrors(unsure, sure, None, indices)
     return PositionErrors(unsure, _most(replay, visits, offsets, unsure, least), drift, indices)
+
+
+def _drifting_since(offsets: FloatArray, tolerance_m: float) -> int:
+    """Return the visit since which the offsets (n, 2) grow like drift until the last one; n if they do not.
+
+    They begin within tolerance, and each is at least as large as the one before it.
+    """
+    size, since = np.hypot(*offsets.T), len(offsets) - 1
+    while since > 0 and size[since - 1] <= size[since]:
+        since -= 1
+    grows = size[-1] > max(tolerance_m, 2 * size[since]) and size[since] <= tolerance_m
+    return since if grows and len(offsets) - since >= LEAST_MEANS else len(offsets)
 
 
 def _most(
@@ -112,33 +138,47 @@ def visits_of(replay: Replay) -> list[tuple[int, Match]]:
     return sorted(last.items(), key=lambda item: item[1].standstill.begin_ns)
 
 
+def _with_noise(errors: PositionErrors, replay: Replay) -> PositionErrors:
+    """Return the errors with the noise of the poses, and what it leaves of the last standstill at each stop.
+
+    That is the uncertainty of the mean of its seconds, or of a few poses with the noise of all standstills.
+    """
+    spread, moved, few = np.zeros(len(replay.mission.stops)), np.zeros(len(replay.mission.stops)), {}
+    squares = freedom = 0.0
+    for k, match in visits_of(replay):
+        standstill = match.standstill
+        moved[k] = standstill.moved_m if replay.inferred else 0.0
+        poses = replay.run.poses.between(standstill.begin_ns, standstill.end_ns)
+        if not replay.inferred:  # a reported visit contains some of the driving
+            near = np.hypot(*(poses.xy - standstill.xy).T) <= STILL_M
+            poses = Track.of(poses.ns[near], poses.xy[near], poses.heading[near])
+        if len(poses) < 2:
+            few[k] = 1
+            continue
+        off = poses.xy - poses.xy.mean(axis=0)
+        means = [off[group].mean(axis=0) for group in _groups(((poses.ns - poses.ns[0]) // 10**9).tolist())]
+        squares, freedom = squares + float((off**2).sum()), freedom + len(off) - 1
+        spread[k] = SIGMAS * float(np.sqrt((np.array(means) ** 2).sum())) / len(means)
+        if len(means) < LEAST_MEANS:
+            few[k] = len(poses)
+    noise_m = float(np.sqrt(squares / freedom)) if freedom else 0.0
+    for k, count in few.items():
+        spread[k] = max(spread[k], SIGMAS * noise_m / count**0.5)
+    if replay.placed.by_earth:
+        spread += STEP_M
+    return replace(errors, spread_m=spread, moved_m=moved, noise_m=noise_m)
+
+
+def _groups(values: list[int]) -> list[IntArray]:
+    """Return the indices of equal values that follow each other."""
+    return np.split(np.arange(len(values)), np.flatnonzero(np.diff(values)) + 1)
+
+
 def is_tied(replay: Replay) -> bool:
     """True for poses that the earth, a map or stopgo itself ties to the site, without a jump that lasts."""
     placed = replay.placed
     tied = placed.by_earth or placed.source.frame in (SITE, "map", "world")
     return tied and lasting_jump(replay.run.poses) is None
-
-
-def lasting_jump(track: Track) -> tuple[int, float] | None:
-    """Return the time and size of the first jump from which poses do not come back; None without one."""
-    if len(track) < 2:
-        return None
-    step, seconds = np.hypot(*np.diff(track.xy, axis=0).T), np.diff(track.ns) / 1e9
-    jumps = np.flatnonzero((step > JUMP_M) & (step > JUMP_M_S * seconds)).tolist()
-    closed: set[int] = set()
-    for number, k in enumerate(jumps):
-        back = next((m for m in jumps[number + 1 :] if _comes_back(track, k, m)), None)
-        closed |= set() if back is None else {m for m in jumps if k <= m <= back}
-        if k not in closed:
-            return int(track.ns[k + 1]), float(step[k])
-    return None
-
-
-def _comes_back(track: Track, leaves: int, returns: int) -> bool:
-    """True if the jump after a pose is undone by a later one, soon and to where the robot was."""
-    seconds = (track.ns[returns + 1] - track.ns[leaves]) / 1e9
-    away = float(np.hypot(*(track.xy[returns + 1] - track.xy[leaves])))
-    return bool(seconds <= HEALED_S and away <= JUMP_M + seconds)
 
 
 def _around(count: int) -> list[IntArray]:
@@ -169,12 +209,18 @@ def _residual(replay: Replay, offsets: FloatArray) -> float:
     return float(np.median(np.hypot(*offsets.T)))
 
 
+def _path_is_lost(track: Track) -> bool:
+    """True if the path is not known from pose to pose: the robot moved in a gap, or its poses jumped."""
+    moved = np.hypot(*np.diff(track.xy, axis=0).T) > STILL_M
+    return bool((track.gaps & moved).any()) or lasting_jump(track) is not None
+
+
 def _drift(
     replay: Replay, visits: list[tuple[int, Match]], stops: FloatArray, tolerance_m: float
 ) -> DriftFit | None:
     """Return the fit of the drift to the visits, for a path without gaps and jumps."""
     track = replay.run.poses
-    if not len(track) or track.gaps.any() or lasting_jump(track) is not None:
+    if not len(track) or _path_is_lost(track):
         return None
     path = smoothed_track(track, replay.matches)
     ns: IntArray = np.array([match.standstill.end_ns for _, match in visits], np.int64)

@@ -13,7 +13,14 @@ from stopgo.recordings.page.runs_together import together
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.replay.drive_verdict import drive_verdict, missing, outside
 from stopgo.recordings.replay.path_and_time import lost_times, smoothed_track
-from stopgo.recordings.replay.replay_text import absent_of, measured_lines, notes_of, path_lines, truth_lines
+from stopgo.recordings.replay.replay_text import (
+    absent_of,
+    measured_lines,
+    notes_of,
+    path_lines,
+    truth_lines,
+    uncertainty_lines,
+)
 from stopgo.recordings.replay.replayed import Replay
 
 RunLines = tuple[str, tuple[str, ...]]
@@ -77,7 +84,8 @@ def run_texts(replay: Replay) -> Iterator[RunLines]:
                 for planned, group in replay.sight.pairs
             ),
         )
-    yield "Driven path", tuple(" ".join(line.split()) for line in (*path_lines(replay), *truth_lines(replay)))
+    lines = (*path_lines(replay), *uncertainty_lines(replay), *truth_lines(replay))
+    yield "Driven path", tuple(" ".join(line.split()) for line in lines)
     found = [" ".join(line.split()) for line in measured_lines(replay) if line.strip()]
     if found:
         yield "Measured by the scans", tuple(found)

@@ -7,6 +7,8 @@ import io
 import math
 from typing import Any
 
+import numpy as np
+
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_table
 from stopgo.mission.comparing.measured import Absent, Measured
@@ -16,6 +18,7 @@ from stopgo.recordings.logs.field_log import FieldLog
 from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.path_and_time import driven_path, lost_times
 from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.stop_evidence import StopEvidence, stop_evidence
 
 MOST_LOST = 5
 """Limit of listed causes of lost time on a terminal; --json has all."""
@@ -33,6 +36,7 @@ def as_text(replay: Replay) -> str:
         *(f"  {line}" for line in comparison_table(replay.comparison).split("\n")),
         "",
         *truth_lines(replay),
+        *uncertainty_lines(replay),
         *path_lines(replay),
         *(f"  time lost  {item.seconds:+7.1f} s  {item.where}" for item in lost_times(replay)[:MOST_LOST]),
         *_sight(replay),
@@ -62,6 +66,25 @@ def truth_lines(replay: Replay) -> list[str]:
     return [f"  true error {', '.join(errors)}"] if errors else []
 
 
+def uncertainty_lines(replay: Replay) -> list[str]:
+    """Return the uncertainty of the position errors: one for most stops, and the stops with a greater one."""
+    known = [(one.item.stop, one.unsure_m) for one in stop_evidence(replay) if one.unsure_m is not None]
+    if not known:
+        return []
+    usual = float(np.median([unsure_m for _, unsure_m in known]))
+    worse = [(stop, unsure_m) for stop, unsure_m in known if unsure_m > max(2 * usual, usual + LEAST_WORSE_M)]
+    others = ", ".join(f"{stop} {_plus_minus(unsure_m)}" for stop, unsure_m in worse[:MOST_LOST])
+    rest = f", and {len(worse) - MOST_LOST} more" if len(worse) > MOST_LOST else ""
+    return [f"  uncertain  position errors {_plus_minus(usual)}" + (f"; {others}{rest}" if others else "")]
+
+
+LEAST_WORSE_M = 0.005
+
+
+def _plus_minus(metres: float) -> str:
+    return f"± {max(1.0, 1000 * metres):.0f} mm" if math.isfinite(metres) else "without a limit"
+
+
 def path_lines(replay: Replay) -> list[str]:
     path = driven_path(replay)
     if path.driven_m is None or path.extra_m is None:
@@ -70,11 +93,13 @@ def path_lines(replay: Replay) -> list[str]:
         f"  path       {path.driven_m:.1f} m driven, {path.planned_m:.1f} m planned to the last stop visited "
         f"({path.extra_m:+.1f} m)"
     ]
+    seen = "≤ " if replay.comparison.sighted.gaps else ""
     if path.rms_m is not None and path.mean_m is not None:
         lines.append(
             f"  off route  mean {1000 * path.mean_m:+.0f} mm (left positive), rms {1000 * path.rms_m:.0f}, "
             f"median {1000 * (path.median_m or 0):.0f}, 95 % below {1000 * (path.p95_m or 0):.0f}, "
-            f"greatest {1000 * (path.greatest_m or 0):.0f} mm at {path.greatest_s or 0:.1f} s"
+            f"greatest {seen}{1000 * (path.greatest_m or 0):.0f} mm at {path.greatest_s or 0:.1f} s"
+            + (f", {replay.comparison.sighted.limits}" if seen else "")
         )
     return lines
 
@@ -136,6 +161,7 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "poses": {"source": replay.placed.source.source, "count": len(replay.placed.track)},
         "alignment": None if alignment is None else vars(alignment),
         "inferred": replay.inferred,
+        "evidence": [_evidence_json(one) for one in stop_evidence(replay)],
         "answer": judgement.answer,
         "verdict": judgement.text,
         "way": {**vars(driven_path(replay)), "extra_m": driven_path(replay).extra_m},
@@ -146,6 +172,13 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "measured": None if replay.measured is None else _measured_json(replay, replay.measured),
         "run": comparison_json(replay.comparison),
     }
+
+
+def _evidence_json(one: StopEvidence) -> dict[str, Any]:
+    """Return a stop's answer; `unsure_m` is None without a position, or where nothing limits it."""
+    limited = one.unsure_m is not None and math.isfinite(one.unsure_m)
+    unsure_m = one.unsure_m if limited else None
+    return {"stop": one.item.stop, "answer": one.answer, "why": one.why, "unsure_m": unsure_m}
 
 
 def _sight_json(sight: AsDriven) -> dict[str, Any]:
@@ -214,7 +247,8 @@ def as_csv(replay: Replay) -> bytes:
     """Return a row per stop: plan and result, dwell time, and movement during it."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow((*COLUMNS, "stood_s", "moved_m", "true_offset_m"))
+    writer.writerow((*COLUMNS, "stood_s", "moved_m", "true_offset_m", "unsure_m", "answer"))
+    evidence = {one.item.stop: one for one in stop_evidence(replay)}
     numbers = {stop.id: k for k, stop in enumerate(replay.mission.stops)}
     for item in replay.comparison.asked:
         standstills = replay.at(numbers[item.stop])
@@ -223,7 +257,11 @@ def as_csv(replay: Replay) -> bytes:
             if standstills
             else (None, None)
         )
-        cells = (*(getattr(item, name) for name in COLUMNS), *dwell, replay.true_offset_m(numbers[item.stop]))
+        one = evidence[item.stop]
+        cells = (
+            *(getattr(item, name) for name in COLUMNS), *dwell, replay.true_offset_m(numbers[item.stop]),
+            one.unsure_m, one.answer,
+        )  # fmt: skip
         writer.writerow("" if cell is None else _cell(cell) for cell in cells)
     return text.getvalue().encode()
 

@@ -13,7 +13,7 @@ from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.measured import Measured
 from stopgo.mission.document import Mission
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.run.events import Scanned, Unconfirmed
+from stopgo.mission.run.events import Scanned, Settled, Unconfirmed
 from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs.field_log import FieldLog
 from stopgo.recordings.replay.log_placing import PlacedLog
@@ -54,8 +54,22 @@ class Replay:
     @cached_property
     def scanned_from(self) -> FloatArray:
         """Poses (x, y, heading) of each scan, or of each standstill as long as a scan takes (n, 3)."""
-        own = [event.pose for event in self.run.events if isinstance(event, Scanned | Unconfirmed)]
+        own = [
+            event.pose
+            for event in self.run.events
+            if isinstance(event, Scanned | Unconfirmed) and event.stop not in self.unlogged
+        ]
         return np.array([(pose.x, pose.y, pose.heading) for pose in own if pose is not None]).reshape(-1, 3)
+
+    @cached_property
+    def unlogged(self) -> frozenset[str]:
+        """Stops without a scan in the log, where it contains one at another stop.
+
+        Inferred events contain triggers; a vehicle's own events, finished scans.
+        """
+        kind = Settled if self.inferred else Scanned
+        logged = {event.stop for event in self.run.events if isinstance(event, kind)}
+        return frozenset(stop.id for stop in self.mission.stops if logged and stop.id not in logged)
 
     @cached_property
     def extra(self) -> tuple[Match, ...]:

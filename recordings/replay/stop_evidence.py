@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from dataclasses import replace as changed
 from itertools import pairwise
 
 import numpy as np
@@ -16,13 +17,14 @@ import numpy as np
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.document import Point
-from stopgo.mission.run.events import JUMPED_OVER, Aborted, Finished
+from stopgo.mission.run.events import JUMPED_OVER, Aborted, AnyEvent, Finished, Settled
 from stopgo.mission.run.tolerance import is_outside
 from stopgo.recordings.logs.telemetry_log import FORMAT
 from stopgo.recordings.replay.fit_error import fit_error_m
 from stopgo.recordings.replay.fitting import STRETCH
+from stopgo.recordings.replay.jumps import lasting_error_m, lasting_jump
 from stopgo.recordings.replay.matching import long_enough
-from stopgo.recordings.replay.position_errors import PositionErrors, lasting_jump, position_errors, visits_of
+from stopgo.recordings.replay.position_errors import PositionErrors, position_errors, visits_of
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.unseen_visits import DRIFTS, why_unseen
 
@@ -39,16 +41,32 @@ class StopEvidence:
     item: StopComparison
     answer: Certainty
     why: str = ""
+    unsure_m: float | None = None
+    """Uncertainty of its position error; infinite where nothing limits it, None without a position."""
 
 
 def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
     """Return the evidence for each stop, in the mission's order."""
     errors, fit_m = position_errors(replay), fit_error_m(replay)
-    found = (_evidence(replay, k, item, errors) for k, item in enumerate(replay.comparison.asked))
-    return tuple(
-        _with_error_of_fit(one, float(errors.unsure_m[k] + fit_m[k]), headings=replay.placed.turns)
-        for k, one in enumerate(found)
-    )
+    jump_m = lasting_error_m(replay.run.poses)
+    found = []
+    for k, item in enumerate(replay.comparison.asked):
+        evidence = _with_jump(_evidence(replay, k, item, errors), jump_m)
+        common_m = float(errors.unsure_m[k] + fit_m[k])
+        one = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
+        unsure_m = None if item.deviation_m is None else common_m + jump_m + float(errors.spread_m[k])
+        found.append(changed(one, unsure_m=unsure_m))
+    return tuple(found)
+
+
+def _with_jump(evidence: StopEvidence, jump_m: float) -> StopEvidence:
+    """Return a yes as undecided if a jump of the poses, before or after it, exceeds the tolerance."""
+    item = evidence.item
+    holds = not is_outside((item.deviation_m or 0.0) + jump_m, item.tolerance_m or 0.0)
+    if evidence.answer != "yes" or holds:
+        return evidence
+    why = f"the poses jump by {jump_m:.2f} m and do not come back; give poses matched to a map"
+    return StopEvidence(item, "unknown", why)
 
 
 def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: bool) -> StopEvidence:
@@ -69,27 +87,64 @@ FIT = (
 
 
 def _evidence(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
-    unsure_m = float(errors.unsure_m[number])
-    if item.outcome not in DONE:
-        if replay.inferred:
-            why = why_unseen(replay, number, unsure_m, drifts=errors.drifts)
-        else:
-            why = _why_not_the_end(replay, number, item)
-        return StopEvidence(item, "unknown" if why else "no", why)
-    if item.deviation_m is None:
-        return StopEvidence(item, "unknown", "no pose in the log; the robot's own log may have it")
-    within = _within(item, number, errors)
-    if within == "unknown":
-        return StopEvidence(item, "unknown", DRIFTS)
-    where = other_storey(replay, number) if within == "yes" else ""
-    if where:
-        return StopEvidence(item, "unknown", where)
-    if within == "no" and replay.inferred:
-        why = why_unseen(replay, number, unsure_m, halted=True, drifts=errors.drifts)
-        return StopEvidence(item, "unknown" if why else "no", why)
-    return StopEvidence(item, within)
+    if item.outcome in DONE and item.deviation_m is not None:
+        return _of_visit(replay, number, item, errors)
+    if item.outcome in DONE:
+        seen = len(replay.run.poses) and not _why_unseen(replay, number, errors)
+        why = "" if seen else NO_POSE
+    elif replay.inferred:
+        why = _why_unseen(replay, number, errors)
+    else:
+        why = _why_not_the_end(replay, number, item)
+    return StopEvidence(item, "unknown" if why else "no", why)
 
 
+def _why_unseen(replay: Replay, number: int, errors: PositionErrors, *, halted: bool = False) -> str:
+    unsure_m, noise_m = float(errors.unsure_m[number]), errors.noise_m
+    return why_unseen(replay, number, unsure_m, noise_m=noise_m, halted=halted, drifts=errors.drifts)
+
+
+def _of_visit(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
+    """Return the answer for a stop that the log places the robot at."""
+    within, why = _within(item, number, errors), ""
+    if item.disputed_m is not None:
+        why = f"{item.disputed_text}; the scan's cloud would show it"
+    elif within == "unknown":
+        why = DRIFTS if errors.drifts else NOISE
+    elif within == "yes":
+        why = other_storey(replay, number) or _why_unlogged(replay, item.stop)
+    elif replay.inferred:
+        why = _why_unseen(replay, number, errors, halted=True)
+    return StopEvidence(item, "unknown" if why else within, why)
+
+
+def _why_unlogged(replay: Replay, stop: str) -> str:
+    if replay.inferred and _restarted_in_scan(replay, stop):
+        return RESTARTED
+    if stop not in replay.unlogged:
+        return ""
+    return NO_TRIGGER if replay.inferred else NO_REPORT
+
+
+def _restarted_in_scan(replay: Replay, name: str) -> bool:
+    """True if the robot restarted between the trigger and the end of a scan."""
+    stop = next(stop for stop in replay.mission.stops if stop.id == name)
+    triggered = [event.robot_ns for event in replay.run.events if _is_trigger(event, name)]
+    lasts_ns = round(stop.scan.duration_s * 1e9)
+    return any(ns <= restart <= ns + lasts_ns for ns in triggered for restart in replay.run.poses.restarts_ns)
+
+
+def _is_trigger(event: AnyEvent, stop: str) -> bool:
+    return isinstance(event, Settled) and event.stop == stop
+
+
+RESTARTED = "the robot restarted during its scan; the scanner's files would show it"
+NOISE = "the poses are too noisy, or too few, for the tolerance; give another source of poses"
+NO_POSE = "no pose in the log; the robot's own log may have it"
+NO_TRIGGER = (
+    "the log shows no trigger of the scanner there, and one elsewhere; the scanner's files would show it"
+)
+NO_REPORT = "the log contains no report of its scan, and those of others; the scanner's files would show it"
 RUN_GOES_ON = "the log ends before the run; give a log that continues"
 
 
@@ -120,14 +175,17 @@ def _within(item: StopComparison, number: int, errors: PositionErrors) -> Certai
     map is turned or stretched drives the same path, truly off its stops.
     """
     away_m, limit_m = item.deviation_m or 0.0, item.tolerance_m or 0.0
-    unsure_m = float(errors.unsure_m[number])
-    if not is_outside(away_m + unsure_m, limit_m):
+    spread_m = float(errors.spread_m[number])
+    if not is_outside(away_m + float(errors.unsure_m[number]) + spread_m, limit_m):
         return "yes"
+    moved_m = float(errors.moved_m[number])
+    if moved_m > limit_m and not is_outside(away_m - moved_m, limit_m):
+        return "unknown"
     fitted = errors.without_drift(number)
     if fitted is None:
-        return "no" if is_outside(away_m - float(errors.most_m[number]), limit_m) else "unknown"
+        return "no" if is_outside(away_m - float(errors.most_m[number]) - spread_m, limit_m) else "unknown"
     left_m, sure_m = fitted
-    return "no" if is_outside(left_m - sure_m, limit_m) else "unknown"
+    return "no" if is_outside(left_m - sure_m - spread_m, limit_m) else "unknown"
 
 
 def other_storey(replay: Replay, stop: int) -> str:

@@ -12,10 +12,11 @@ from stopgo.mission.document import Stop
 from stopgo.mission.geometry import BoolArray
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.fitting import STRETCH
+from stopgo.recordings.replay.jumps import lasting_jump
 from stopgo.recordings.replay.matching import REACH_M, Match, least_stay_s, long_enough
-from stopgo.recordings.replay.position_errors import lasting_jump
 from stopgo.recordings.replay.replayed import Replay
 
+SIGMAS = 2.0
 LEAST_GAP_S = 1.0
 """Time without poses from which on the robot was not seen."""
 BROKEN_NS = 6 * 10**9
@@ -25,14 +26,20 @@ FASTER = 1.5
 
 
 def why_unseen(
-    replay: Replay, number: int, unsure_m: float, *, halted: bool = False, drifts: bool = False
+    replay: Replay,
+    number: int,
+    unsure_m: float,
+    *,
+    noise_m: float = 0.0,
+    halted: bool = False,
+    drifts: bool = False,
 ) -> str:
     """Return why a good visit of a stop may have happened unseen; empty if the poses exclude one.
 
     Stops may be visited in any order, so that every gap counts that is long enough to drive there, scan and
     drive on. `unsure_m` is the uncertainty of positions. `halted`: the robot was at standstill near it
-    for long enough, so that only its shorter standstills within tolerance count. `drifts`: a standstill at no
-    stop may have been there.
+    for long enough, so that only its shorter standstills within tolerance count. `noise_m`: standard
+    deviation of a pose. `drifts`: a standstill at no stop may have been there.
     """
     stop, track = replay.mission.stops[number], replay.run.poses
     if not len(track):
@@ -44,8 +51,8 @@ def why_unseen(
             match for match in there if match.away_m <= near_m and not long_enough(match.standstill, stop)
         ]
     reasons = (
-        _possibly_longer(track, there, stop),
-        _in_a_gap(replay, stop, unsure_m),
+        _possibly_longer(track, there, stop) or _across_a_step(replay, there),
+        _in_a_gap(replay, stop, unsure_m + SIGMAS * noise_m),
         _before_or_after(replay),
         _after_a_jump(track),
         _elsewhere_by_drift(replay, stop, unsure_m, drifts=drifts),
@@ -72,6 +79,15 @@ def _possibly_longer(track: Track, at: Sequence[Match], stop: Stop) -> str:
         if possible_s(track, match) >= least_s:
             return "poses are too rare to measure the standstill; give another source of poses"
     return ""
+
+
+def _across_a_step(replay: Replay, at: Sequence[Match]) -> str:
+    """Return whether the clock was set during a standstill: it may have been longer than the log shows."""
+    slack_ns, offset_ns = int(LEAST_GAP_S * 1e9), replay.placed.alignment.time_offset_ns
+    steps = [ns + offset_ns for ns in replay.placed.source.steps_ns]
+    spans = [(item.standstill.begin_ns - slack_ns, item.standstill.end_ns + slack_ns) for item in at]
+    stepped = any(begin <= ns <= end for ns in steps for begin, end in spans)
+    return "the clock was set while it was stationary; give a log with another clock" if stepped else ""
 
 
 JUMPS = "its poses jump while it is stationary; give another source of poses"
@@ -210,7 +226,7 @@ def _elsewhere_by_drift(replay: Replay, stop: Stop, unsure_m: float, *, drifts: 
         path_m = track.between(int(track.ns[0]), match.standstill.begin_ns).length_m if drifts else 0.0
         reach = stop.tolerance_m + 2 * unsure_m + STRETCH * path_m
         away = math.dist(match.standstill.xy, (stop.x, stop.y))
-        if match.stop is None and away <= reach and long_enough(match.standstill, stop):
+        if match.stop is None and away <= reach and possible_s(track, match) >= least_stay_s(stop):
             return DRIFTS
     return ""
 

@@ -50,12 +50,12 @@ class RobotTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DayTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The table `[day]`: robots, and the ways between floors."""
+    """The table `[day]`: robots, and the transfers of robots between floors."""
 
     robots: list[RobotTable]
-    ways: str | None = None
+    transfers: str | None = None
     """CSV of from, to, minutes."""
-    way: str = "15min"
+    transfer: str = "15min"
     """Time between floors that the CSV does not name."""
     setup: str = "10min"
     """Time before each mission."""
@@ -106,7 +106,7 @@ def read_batch(path: Path) -> tuple[list[FloorGroup], list[str]]:
 
 
 def read_day(path: Path) -> DayTable:
-    """Return the robots and ways of a batch's file.
+    """Return the robots and transfers of a batch's file.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from pathlib import Path
 from stopgo.batches.batch_file import read_day
 from stopgo.batches.batch_run import Batch
 from stopgo.batches.day_page import Day, begin_of, write_day
-from stopgo.batches.day_plan import DayJob, plan_day, read_ways, robots_of, span
+from stopgo.batches.day_plan import DayJob, plan_day, read_transfers, robots_of, span
 from stopgo.batches.record import BatchRecord, EntryRecord
 from stopgo.batches.visits import Visits
 from stopgo.mission.errors import InputError
@@ -21,7 +21,7 @@ def write_day_of(file: Path, out: Path, date: str, batch: Batch, record: BatchRe
     Raises
     ------
     InputError
-        When the file has no robots, two variants of a floor are planned, or the ways cannot be read.
+        When the file has no robots, two variants of a floor are planned, or the transfers cannot be read.
     """
     table = read_day(file)
     dates = {entry.name: entry.settings.date for entry in batch.entries}
@@ -29,12 +29,12 @@ def write_day_of(file: Path, out: Path, date: str, batch: Batch, record: BatchRe
     due = [item for item in record.entries if item.stops and dates[item.name] in (date, None)]
     _one_variant([sites[item.name] for item in due], date)
     acquired = [item.name for item in due if visits.acquired(item.missions)]
-    robots, ways = robots_of(table), None if table.ways is None else file.parent / table.ways
+    robots, transfers = robots_of(table), None if table.transfers is None else file.parent / table.transfers
     plan = plan_day(
         [_job(item, sites[item.name]) for item in due if item.name not in acquired],
         robots,
-        read_ways(ways),
-        default_s=span(table.way, "way"),
+        read_transfers(transfers),
+        default_s=span(table.transfer, "transfer"),
         setup_s=span(table.setup, "setup"),
     )
     day = Day(

@@ -108,7 +108,7 @@ def _cells(day: Day, step: DayStep) -> Iterator[str]:
     yield _clock(day, step.end_s)
     yield shown(step.job.name)
     yield str(step.job.stops)
-    yield shown(duration(step.way_s))
+    yield shown(duration(step.transfer_s))
     yield shown(duration(step.job.duration_s))
     yield tag("a", "plan", href=quote(f"../../{step.job.name}/plan.svg"))
 

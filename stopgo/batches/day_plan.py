@@ -49,8 +49,8 @@ class DayStep:
     """A job in a robot's day."""
 
     job: DayJob
-    way_s: float
-    """Time for the way to it."""
+    transfer_s: float
+    """Time to bring the robot to it."""
     begin_s: float
     """Time since the begin of the shift."""
     end_s: float
@@ -100,15 +100,15 @@ def span(text: str, key: str) -> float:
     return value
 
 
-def read_ways(path: Path | None) -> dict[tuple[str, str], float]:
-    """Return the times between floors, both ways, in seconds, from a CSV of from, to, minutes.
+def read_transfers(path: Path | None) -> dict[tuple[str, str], float]:
+    """Return the times between floors, in both directions, in seconds, from a CSV of from, to, minutes.
 
     Raises
     ------
     InputError
         Naming the file and the line.
     """
-    ways: dict[tuple[str, str], float] = {}
+    transfers: dict[tuple[str, str], float] = {}
     for number, cells in () if path is None else rows_of(_text(path), str(path)):
         if number == 1 and cells[-1].strip() == "minutes":
             continue
@@ -119,8 +119,8 @@ def read_ways(path: Path | None) -> dict[tuple[str, str], float]:
             raise InputError(f"{path}: line {number}: give from, to and minutes") from None
         if not 0 <= value <= 86400:
             raise InputError(f"{path}: line {number}: {minutes} minutes; give 0 to 1440")
-        ways[one, other] = ways[other, one] = value
-    return ways
+        transfers[one, other] = transfers[other, one] = value
+    return transfers
 
 
 def _text(path: Path) -> str:
@@ -128,19 +128,21 @@ def _text(path: Path) -> str:
 
 
 def plan_day(
-    jobs: Sequence[DayJob], robots: Sequence[DayRobot], ways: Mapping[tuple[str, str], float],
+    jobs: Sequence[DayJob], robots: Sequence[DayRobot], transfers: Mapping[tuple[str, str], float],
     *, default_s: float, setup_s: float, seed: int = 1,
 ) -> DayPlan:  # fmt: skip
     """Allocate jobs to robots; the same input gives the same plan."""
 
-    def way(one: str, other: str) -> float:
-        return 0.0 if one == other or "" in (one, other) else ways.get((one, other), default_s)
+    def transfer_s(one: str, other: str) -> float:
+        return 0.0 if one == other or "" in (one, other) else transfers.get((one, other), default_s)
 
     fitting = [
-        job for job in jobs if any(_alone(job, robot, way) + setup_s <= robot.shift_s for robot in robots)
+        job
+        for job in jobs
+        if any(_alone(job, robot, transfer_s) + setup_s <= robot.shift_s for robot in robots)
     ]
-    orders = _orders(fitting, robots, way, setup_s, seed) if fitting else [() for _ in robots]
-    days = [_day(order, robot, way, setup_s) for order, robot in zip(orders, robots, strict=True)]
+    orders = _orders(fitting, robots, transfer_s, setup_s, seed) if fitting else [() for _ in robots]
+    days = [_day(order, robot, transfer_s, setup_s) for order, robot in zip(orders, robots, strict=True)]
     taken = {job.name for order in orders for job in order}
     return DayPlan(
         robots=tuple(robots),
@@ -150,34 +152,34 @@ def plan_day(
     )
 
 
-def _alone(job: DayJob, robot: DayRobot, way: Any) -> float:
+def _alone(job: DayJob, robot: DayRobot, transfer_s: Any) -> float:
     """Duration of a day with this job only, without set-up."""
-    return float(way(robot.at, job.site) + job.duration_s + way(job.site, robot.at))
+    return float(transfer_s(robot.at, job.site) + job.duration_s + transfer_s(job.site, robot.at))
 
 
 def _day(
-    order: Sequence[DayJob], robot: DayRobot, way: Any, setup_s: float
+    order: Sequence[DayJob], robot: DayRobot, transfer_s: Any, setup_s: float
 ) -> tuple[tuple[DayStep, ...], float]:
     """A robot's steps, and when it is back."""
     now, here, steps = 0.0, robot.at, []
     for job in order:
-        needed = way(here, job.site)
+        needed = transfer_s(here, job.site)
         begin = now + needed + setup_s
         now, here = begin + job.duration_s, job.site
         steps.append(DayStep(job, needed, begin, now))
-    return tuple(steps), now + way(here, robot.at)
+    return tuple(steps), now + transfer_s(here, robot.at)
 
 
 def _orders(
-    jobs: Sequence[DayJob], robots: Sequence[DayRobot], way: Any, setup_s: float, seed: int
+    jobs: Sequence[DayJob], robots: Sequence[DayRobot], transfer_s: Any, setup_s: float, seed: int
 ) -> list[tuple[DayJob, ...]]:
     """The jobs of each robot, in order."""
     import pyvrp
     from pyvrp.stop import MaxIterations
 
     count, sites = len(jobs), [*(job.site for job in jobs), *(robot.at for robot in robots)]
-    times: Any = np.array([[np.ceil(way(a, b)) for b in sites] for a in sites], dtype=np.int64)
-    prize = int(times.sum()) + 1  # more than any way around: a job is left out only if it does not fit
+    times: Any = np.array([[np.ceil(transfer_s(a, b)) for b in sites] for a in sites], dtype=np.int64)
+    prize = int(times.sum()) + 1  # more than any round trip: a job is left out only if it does not fit
     data = pyvrp.ProblemData(
         locations=[pyvrp.Location(0, 0) for _ in sites],
         clients=[

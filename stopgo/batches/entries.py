@@ -58,7 +58,7 @@ class EntryFault:
 
 @dataclass(frozen=True)
 class Expansion:
-    """All entries of a batch, and the problems found on the way."""
+    """All entries of a batch, and the problems found meanwhile."""
 
     entries: tuple[Entry, ...]
     problems: tuple[EntryFault, ...]

@@ -95,7 +95,7 @@ def test_an_entry_that_cannot_be_planned_leaves_the_others(site: Path) -> None:
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_faults_of_the_file_are_told_before_anything_is_planned(site: Path) -> None:
+def test_faults_of_the_file_are_reported_before_anything_is_planned(site: Path) -> None:
     batch_file(site, TWO + '\n[[floors]]\nfiles = "x.dxf"')
     code, record, error = batch(site)
     assert (code, record["error"]["exit_code"] if "error" in record else 2) == (2, 2)

@@ -12,7 +12,7 @@ import pytest
 
 from stopgo.batches import engine
 from stopgo.batches.day_page import begin_of
-from stopgo.batches.day_plan import DayJob, DayPlan, DayRobot, plan_day, read_ways, span
+from stopgo.batches.day_plan import DayJob, DayPlan, DayRobot, plan_day, read_transfers, span
 from stopgo.batches.entries import Entry
 from stopgo.batches.visits import PlannedMission, Visits, with_since
 from stopgo.batches.work import work
@@ -49,16 +49,16 @@ def test_what_fits_into_no_shift_is_left_and_named() -> None:
     assert [step.job.name for step in plan.steps[0]] == ["short"]
 
 
-def test_the_way_back_belongs_to_the_shift() -> None:
+def test_the_return_belongs_to_the_shift() -> None:
     assert planned([job("a", 3.0)], [DayRobot("r1", 4 * HOUR, "depot")]).left == ()
     assert len(planned([job("a", 3.01)], [DayRobot("r1", 4 * HOUR, "depot")]).left) == 1
 
 
 def test_times_of_a_day_add_up() -> None:
-    ways = {("depot", "a"): 600.0, ("a", "b"): 60.0, ("b", "depot"): 600.0, ("a", "depot"): 600.0}
-    ways |= {("depot", "b"): 600.0, ("b", "a"): 60.0}
+    transfers = {("depot", "a"): 600.0, ("a", "b"): 60.0, ("b", "depot"): 600.0, ("a", "depot"): 600.0}
+    transfers |= {("depot", "b"): 600.0, ("b", "a"): 60.0}
     robot = DayRobot("r1", 8 * HOUR, "depot")
-    plan = plan_day([job("a", 1.0), job("b", 1.0)], [robot], ways, default_s=9e3, setup_s=300.0)
+    plan = plan_day([job("a", 1.0), job("b", 1.0)], [robot], transfers, default_s=9e3, setup_s=300.0)
     first, second = plan.steps[0]
     assert (first.begin_s, first.end_s) == (900.0, 900.0 + HOUR)
     assert second.begin_s == first.end_s + 60.0 + 300.0
@@ -93,24 +93,24 @@ def _fits(jobs: Sequence[DayJob], robot: DayRobot) -> bool:
 
 def _length(order: Sequence[DayJob], robot: DayRobot) -> float:
     sites = [robot.at, *(item.site for item in order), robot.at]
-    ways = sum(0.5 * HOUR for one, other in pairwise(sites) if one != other)
-    return ways + sum(item.duration_s for item in order)
+    transfers = sum(0.5 * HOUR for one, other in pairwise(sites) if one != other)
+    return transfers + sum(item.duration_s for item in order)
 
 
 @pytest.mark.parametrize("text", ["from,to,minutes\na,b", "a,b,x", "a,b,-1", "a,b,nan", "a,b,1e9"])
-def test_a_wrong_way_is_named_with_its_line(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "ways.csv"
+def test_a_wrong_transfer_is_named_with_its_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "transfers.csv"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"ways.csv: line \d"):
-        read_ways(path)
+    with pytest.raises(InputError, match=r"transfers.csv: line \d"):
+        read_transfers(path)
 
 
-def test_ways_go_both_ways(tmp_path: Path) -> None:
-    path = tmp_path / "ways.csv"
+def test_transfers_are_in_both_directions(tmp_path: Path) -> None:
+    path = tmp_path / "transfers.csv"
     path.write_text("from;to;minutes\na;b;2\n")
-    assert read_ways(path) == {("a", "b"): 120.0, ("b", "a"): 120.0}
+    assert read_transfers(path) == {("a", "b"): 120.0, ("b", "a"): 120.0}
     with pytest.raises(InputError, match="cannot be read"):
-        read_ways(tmp_path / "none.csv")
+        read_transfers(tmp_path / "none.csv")
 
 
 @pytest.mark.parametrize("text", ["", "soon", "-1h", "nan", "9000h"])

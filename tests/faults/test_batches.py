@@ -1,4 +1,4 @@
-"""Batches that are killed at any step, on a full disk, or beside another one: nothing half-written counts."""
+"""Batches that are killed at any step, on a full disk, or with another one: nothing half-written counts."""
 
 from __future__ import annotations
 

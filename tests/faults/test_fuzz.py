@@ -23,7 +23,7 @@ VERBS = ("start", "pause", "resume", "skip", "retry", "abort", "home", "explode"
 
 
 class Zeros(bytes):
-    """Many zero bytes, told in few words when a test fails."""
+    """Many zero bytes, reported in few words when a test fails."""
 
     def __new__(cls, length: int) -> Zeros:
         return super().__new__(cls, length)

@@ -139,7 +139,7 @@ Befalls = list[tuple[Callable[[Any], bool], Mishap]]
 
 
 def driven(site: Site, befalls: Befalls, chance: random.Random) -> list[Pose]:
-    """Start, let it all befall it, and do as an operator would, until the run is over; the poses told."""
+    """Start, let it all befall it, and do as an operator would, until the run is over; the poses reported."""
     poses: list[Pose] = []
     began_ns = site.world.monotonic_ns()
     site.station.command("start")

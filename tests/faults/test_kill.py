@@ -144,7 +144,7 @@ def give(station: Station, order: RunCommand, outcome: Outcome) -> bool:
 
 
 def begin(station: Station, outcome: Outcome) -> None:
-    """Order the start; anew if the robot was started anew in between, which refuses the old order."""
+    """Order the start; again if the robot was started again in between, which refuses the old order."""
     while not give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome):
         assert stubbornly(station.status, outcome).state == "READY"
 

@@ -89,7 +89,7 @@ def test_a_goal_that_a_killed_program_has_left_is_cancelled_at_the_next_start() 
         (lambda world: setattr(world.telemetry, "emergency_stop", True), "the emergency stop is pressed"),
     ],
 )
-def test_what_goes_wrong_in_a_drive_stops_the_robot_and_is_told(
+def test_what_goes_wrong_in_a_drive_stops_the_robot_and_is_reported(
     harm: Callable[[World], object], words: str
 ) -> None:
     field = started(RosField())

@@ -34,7 +34,7 @@ def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiling, "compiled_module", lambda name: None)
 
 
-def test_an_uncompiled_kernel_is_told_once_and_before_large_work_only(
+def test_an_uncompiled_kernel_is_reported_once_and_before_large_work_only(
     nothing_said: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert compiled(iterated_search, large=False) is None

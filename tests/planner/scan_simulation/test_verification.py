@@ -246,7 +246,7 @@ def test_the_first_start_that_misses_decides() -> None:
     assert good.starts == 4 and good.least_error_m <= good.error_m
 
 
-def test_scans_along_a_corridor_are_free_along_it_and_told_so() -> None:
+def test_scans_along_a_corridor_are_free_along_it_and_reported_so() -> None:
     pair = pair_in_a_corridor()
     assert not pair.registered
     assert pair.free_deg is not None
@@ -266,7 +266,7 @@ def test_how_far_off_a_pose_is() -> None:
     assert off(turned) == pytest.approx((0.05, 3.0))
 
 
-def test_rays_are_told_by_the_step() -> None:
+def test_rays_are_reported_by_the_step() -> None:
     fan = RayFan.of(replace(COARSE, fov_deg=90.0, step_deg=1.0, cone_deg=60.0), heading=0.0)
     assert len(fan.azimuth) == 90
     assert math.degrees(fan.azimuth[0]) == pytest.approx(-44.5)

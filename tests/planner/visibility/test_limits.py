@@ -142,7 +142,7 @@ def test_what_a_run_acquires_counts_views_too() -> None:
     assert claimed == nouns[Visibility].seen_from(nouns[Selection].chosen).sum()
 
 
-def test_each_limit_is_told_with_about_what_it_costs() -> None:
+def test_each_limit_is_reported_with_about_what_it_costs() -> None:
     made = plan(FLOOR, replace(QUALITY, views=2)).first
     quality = made.figures.quality
     assert quality is not None
@@ -156,7 +156,7 @@ def test_each_limit_is_told_with_about_what_it_costs() -> None:
     assert plan(FLOOR, Settings()).first.figures.quality is None
 
 
-def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
+def test_what_cannot_be_seen_as_asked_is_reported_and_strict_refuses_it() -> None:
     closet = hall(2.2, 2.2)
     made = plan(closet, Settings(views=9)).first
     assert [item.code for item in made.figures.grave] == ["limits_not_met"]

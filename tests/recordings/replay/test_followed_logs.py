@@ -2,144 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from stopgo.bridge.link.clock import SimulatedClock
-from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
-from stopgo.bridge.mavlink.simulated.profiles import PROFILES
-from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from stopgo.mission.document import Mission
-from stopgo.mission.frames.transform import SiteOrigin
-from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.run.events import Pose, Scanned, Skipped
-from stopgo.recordings.logs import read_log
+from stopgo.mission.run.events import Arrived, Scanned, Skipped
 from stopgo.recordings.replay.drive_verdict import drive_verdict
-from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_text
-from stopgo.recordings.replay.replayed import Replay
-from stopgo.recordings.replay.replaying import replay
-from tests.mission.mavlink.following.worlds import told, tour
-from tests.recordings.logs.writing import write_telemetry_log
-
-ORIGIN = SiteOrigin(lat=47.3977, lon=8.5456, alt=488.0, heading_deg=0.0)
-ROVER, STATION = 1, 255
-AUTO_MODE, HOLD_MODE = 10, 4
-
-
-BEFORE_S, AFTER_S, STEP_S = 3.0, 60.0, 0.05
-"""Before the order to go, from then on, and between two looks of the vehicle at its clock."""
-
-
-@dataclass(frozen=True)
-class FromVehicle:
-    """A message that is only in the log, as sent by the vehicle."""
-
-    message: Any
+from tests.mission.mavlink.following.worlds import told
+from tests.recordings.replay.auto_vehicle import (
+    AUTO_MODE,
+    HOLD_MODE,
+    FromVehicle,
+    in_mode,
+    item_of,
+    logged,
+    mission,
+    read_back,
+    replayed,
+)
 
 
-@dataclass(frozen=True)
-class FromStation:
-    """A message of another station than the one that logs."""
-
-    system: int
-    message: Any
-
-
-def mission(**details: Any) -> Mission:
-    """For a vehicle that drives as a real one, and so takes its time to stand still."""
-    return msgspec.structs.replace(tour(**{"settle_s": 3.0, **details}), georeference=ORIGIN)
-
-
-def rover_setting(folder: Path, faults: tuple[str, ...]) -> VehicleSetup:
-    start = Pose(x=0.0, y=0.0, heading=0.0)
-    found = VehicleFaults(tuple(map(read_vehicle_fault, faults)))
-    return VehicleSetup(PROFILES["ardupilot"], folder, ORIGIN, start, found, seed=1)
-
-
-def logged(
-    path: Path,
-    plan: Mission,
-    *,
-    faults: tuple[str, ...] = (),
-    orders: dict[float, Any] | None = None,
-    kept: Callable[[int, str], bool] = lambda ns, name: True,
-    witness: Callable[[Vehicle], None] = lambda vehicle: None,
-) -> Path:
-    """A log of an ArduPilot Rover that is given a mission and drives it; `orders` by seconds from AUTO.
-
-    `kept` decides which of its messages the station that logs receives, by time and name; an order may be
-    several messages. `witness` is given the vehicle before it drives.
-    """
-    clock, rows = SimulatedClock(), list[tuple[int, int, Any]]()
-    sent = translate(plan, "ardupilot", trigger="auto")
-    vehicle = complete_vehicle(
-        rover_setting(path.parent / "vehicle", faults),
-        clock=clock,
-        wall=clock,
-        send=lambda message: rows.append((clock.now_ns(), ROVER, message)),
-    )
-
-    witness(vehicle)
-
-    def say(message: Any) -> None:
-        if isinstance(message, FromVehicle):
-            rows.append((clock.now_ns(), ROVER, message.message))
-            return
-        station = STATION
-        if isinstance(message, FromStation):
-            station, message = message.system, message.message
-        rows.append((clock.now_ns(), station, message))
-        packed = dialect.MAVLink(None, srcSystem=station, srcComponent=190)
-        vehicle.receive(packed.decode(bytearray(message.pack(packed))))
-
-    def drive(seconds: float) -> None:
-        for _ in range(round(seconds / STEP_S)):
-            clock.wait(STEP_S)
-            vehicle.advance()
-
-    drive(BEFORE_S)
-    items = upload_of(sent)
-    say(dialect.MAVLink_mission_count_message(1, 1, len(items)))
-    for number, item in enumerate(items):
-        numbers = (*item.params, item.x, item.y, item.z)
-        say(dialect.MAVLink_mission_item_int_message(1, 1, number, item.frame, item.command, 0, 1, *numbers))
-    say(command(Command.COMPONENT_ARM_DISARM, 1))
-    say(in_mode(AUTO_MODE))
-    past = 0.0
-    for at, order in sorted((orders or {}).items()):
-        drive(at - past)
-        for message in order if isinstance(order, tuple) else (order,):
-            say(message)
-        past = at
-    drive(AFTER_S - past)
-    heard = [row for row in rows if row[1] != ROVER or kept(row[0], row[2].get_type())]
-    return write_telemetry_log(path, heard)
-
-
-def command(number: int, *params: float) -> Any:
-    given = (*params, *(0.0,) * (7 - len(params)))
-    return dialect.MAVLink_command_long_message(1, 1, number, 0, *given)
-
-
-def in_mode(number: int) -> Any:
-    return command(Command.DO_SET_MODE, 1, number)
-
-
-def replayed(path: Path, plan: Mission) -> Replay:
-    return replay(read_log(path), plan, Placing())
-
-
-def test_a_log_of_auto_tells_its_scans_by_the_camera(tmp_path: Path) -> None:
+def test_a_log_of_auto_reports_its_scans_by_the_camera(tmp_path: Path) -> None:
     """Standstills alone would not show them."""
     plan = mission()
     laid = replayed(logged(tmp_path / "auto.tlog", plan), plan)
@@ -149,8 +37,8 @@ def test_a_log_of_auto_tells_its_scans_by_the_camera(tmp_path: Path) -> None:
     assert {event.file[-4:] for event in laid.run.events if isinstance(event, Scanned)} == {".e57"}
 
 
-def test_stops_scanned_outside_their_tolerance_are_told_and_not_driven_as_planned(tmp_path: Path) -> None:
-    """The vehicle drives as a real one: beside its stops, which it calls reached."""
+def test_stops_scanned_outside_their_tolerance_are_reported_and_not_driven_as_planned(tmp_path: Path) -> None:
+    """The vehicle drives as a real one: off its stops, which it calls reached."""
     narrow, wide = mission(), mission(tolerance_m=0.4)
     path = logged(tmp_path / "auto.tlog", narrow)
     laid = replayed(path, narrow)
@@ -164,7 +52,7 @@ def test_stops_scanned_outside_their_tolerance_are_told_and_not_driven_as_planne
     assert drive_verdict(replayed(path, wide)).exit_code == 0
 
 
-def test_a_scan_that_failed_is_told_and_the_way_goes_on(tmp_path: Path) -> None:
+def test_a_scan_that_failed_is_reported_and_the_drive_goes_on(tmp_path: Path) -> None:
     plan = mission()
     laid = replayed(logged(tmp_path / "auto.tlog", plan, faults=("scanner@2",)), plan)
     assert "Failed S2" in told(laid.run.events)
@@ -202,12 +90,6 @@ def test_a_vehicle_that_was_stopped_and_sent_on_is_followed_through_it(tmp_path:
     ]
 
 
-def item_of(plan: Mission, stop: str) -> int:
-    """Sequence number of a stop's waypoint on the vehicle."""
-    sent = translate(plan, "ardupilot", trigger="auto")
-    return next(place for place, one in enumerate(sent.placed) if (one.role, one.stop) == ("stop", stop)) + 1
-
-
 def test_a_stop_that_the_station_jumped_over_is_skipped_and_never_visited(tmp_path: Path) -> None:
     """Whatever the tolerance: nobody waited there."""
     plan = mission(tolerance_m=0.4)
@@ -219,8 +101,8 @@ def test_a_stop_that_the_station_jumped_over_is_skipped_and_never_visited(tmp_pa
     assert "1 of 3 stops" in drive_verdict(laid).text
 
 
-def test_the_last_stop_skipped_by_order_is_no_visit(tmp_path: Path) -> None:
-    """With a return behind it: the vehicle is sent on while it is under way to the stop."""
+def test_the_last_stop_skipped_by_command_is_no_visit(tmp_path: Path) -> None:
+    """With a return behind it: the vehicle is sent on while it drives to the stop."""
     plan = msgspec.structs.replace(mission(tolerance_m=0.4), return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0)))
     sent = translate(plan, "ardupilot", trigger="auto")
     home = next(place for place, one in enumerate(sent.placed) if one.role == "return") + 1
@@ -241,19 +123,6 @@ def test_a_read_back_of_the_same_list_ends_no_run(tmp_path: Path) -> None:
     assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
     assert len(laid.log.uploads) == 1
     assert drive_verdict(laid).exit_code == 0
-
-
-def read_back(plan: Mission) -> tuple[FromVehicle, ...]:
-    """The vehicle's answers to a station that reads its list."""
-    items = upload_of(translate(plan, "ardupilot", trigger="auto"))
-    answers = [
-        dialect.MAVLink_mission_item_int_message(
-            255, 190, number, item.frame, item.command, 0, 1, *item.params, item.x, item.y, item.z
-        )
-        for number, item in enumerate(items)
-    ]
-    count = dialect.MAVLink_mission_count_message(255, 190, len(items))
-    return tuple(FromVehicle(message) for message in (count, *answers))
 
 
 def test_the_same_mission_uploaded_again_in_mid_run_is_one_run(tmp_path: Path) -> None:
@@ -298,6 +167,35 @@ def test_stops_whose_position_is_in_the_log_are_placed_by_it(tmp_path: Path, mis
     assert all(0.05 < (item.deviation_m or 0.0) < 0.4 for item in laid.comparison.stops)
 
 
+def test_a_stop_is_placed_where_the_vehicle_stood_and_not_where_it_was_reported_as_reached(
+    tmp_path: Path,
+) -> None:
+    """A PX4 rover calls a waypoint reached 0.3 m before it, brakes, and stands 0.3 m behind it."""
+    plan = mission(tolerance_m=0.36)
+    kept = lambda ns, name: name != "CAMERA_IMAGE_CAPTURED"  # noqa: E731
+    laid = replayed(logged(tmp_path / "a.tlog", plan, autopilot="px4", kept=kept), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["unconfirmed"] * 3
+    arrived = [event.deviation_m for event in laid.run.events if isinstance(event, Arrived)]
+    assert max(arrived) > 0.4
+    assert all(0.25 < (item.deviation_m or 0.0) < 0.31 for item in laid.comparison.stops)
+    assert drive_verdict(laid).answer == "yes"
+
+
+def test_a_stop_without_a_report_of_its_scan_is_undecided_where_others_have_one(tmp_path: Path) -> None:
+    plan = mission(tolerance_m=0.4)
+    whole = replayed(logged(tmp_path / "a.tlog", plan), plan)
+    scans = {event.stop: event.robot_ns for event in whole.run.events if isinstance(event, Scanned)}
+    late = scans["S2"] + 3 * 10**9
+
+    def kept(ns: int, name: str) -> bool:
+        return name != "CAMERA_IMAGE_CAPTURED" or not scans["S1"] + 10**9 < ns < late
+
+    laid = replayed(logged(tmp_path / "b.tlog", plan, kept=kept), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned", "unconfirmed", "scanned"]
+    assert drive_verdict(laid).answer == "unknown"
+    assert "S2 is undecided: the log contains no report of its scan" in drive_verdict(laid).text
+
+
 def test_the_heartbeat_of_a_camera_is_not_the_vehicles(tmp_path: Path) -> None:
     plan = mission(tolerance_m=0.4)
     camera = FromVehicle(dialect.MAVLink_heartbeat_message(30, 8, 0, 0, 4, 3))
@@ -306,7 +204,7 @@ def test_the_heartbeat_of_a_camera_is_not_the_vehicles(tmp_path: Path) -> None:
     assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
 
 
-def test_a_passed_stop_that_nothing_places_cannot_be_told(tmp_path: Path) -> None:
+def test_a_passed_stop_that_nothing_places_cannot_be_reported(tmp_path: Path) -> None:
     """The station hears nothing of the vehicle while it is at S2, and next of it on its way to S3."""
     plan = mission(tolerance_m=0.4)
     whole = replayed(logged(tmp_path / "a.tlog", plan), plan)

@@ -1,4 +1,4 @@
-"""Verdicts on logs with a known truth: none is false, and few logs that could tell are undecided."""
+"""Verdicts on logs with a known truth: none is false, and few logs that can decide are undecided."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from tests.faults.sizes import size
 from tests.recordings.truth.auto_logs import auto_answers
 from tests.recordings.truth.bench import answered, cases
+from tests.recordings.truth.cloud_cases import cloud_answers, small_floor
 from tests.recordings.truth.own_runs import own_answers
 
 PARTS = 4
@@ -39,6 +40,11 @@ def test_no_verdict_on_a_log_of_an_autopilots_own_run_is_false(part: int, tmp_pa
     if every == 1:
         counts = Counter(item.kind for item in found)
         assert counts["untold"] <= MOST_UNTOLD * (counts["untold"] + counts["right"])
+
+
+def test_no_verdict_on_clouds_is_false(tmp_path: Path) -> None:
+    found = list(cloud_answers(small_floor(tmp_path)))
+    assert [(item.name, item.text) for item in found if item.kind != "right"] == []
 
 
 def test_no_verdict_on_a_run_of_our_own_robot_is_false() -> None:

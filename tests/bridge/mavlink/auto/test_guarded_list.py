@@ -88,7 +88,7 @@ def test_a_scan_does_not_count_before_its_items_are_known_to_be_ours(profile: st
     assert "Scanned S1" not in told(site.events) and site.run.done == ()
 
 
-def test_the_station_that_uploads_is_named_where_it_is_heard(
+def test_the_station_that_uploads_is_named_if_its_messages_arrive(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a link that all share, as a radio."""

@@ -98,7 +98,7 @@ def offered(site: Site) -> str:
 
 
 @pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
-def test_jumped_stops_are_offered_at_the_end_and_one_order_drives_to_them(
+def test_jumped_stops_are_offered_at_the_end_and_one_command_drives_to_them(
     profile: str, tmp_path: Path
 ) -> None:
     """On the planned route, past the stops that are done."""
@@ -129,7 +129,7 @@ def test_a_stop_that_was_jumped_over_may_be_left_out(tmp_path: Path) -> None:
     assert site.run.skipped == ("S2",) and site.run.done == ("S1", "S3") and site.run.state == "FINISHED"
 
 
-def test_a_vehicle_that_is_set_back_on_its_way_home_is_held_and_goes_on_home(tmp_path: Path) -> None:
+def test_a_vehicle_that_is_set_back_on_its_return_home_is_held_and_goes_on_home(tmp_path: Path) -> None:
     back = ((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
     mission = with_digest(msgspec.structs.replace(real_tour(), return_=back))
     site = Site(tmp_path, "ardupilot", mission=mission, speed_up=1.0)

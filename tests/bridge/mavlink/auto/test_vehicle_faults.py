@@ -88,7 +88,7 @@ def test_a_stop_that_nobody_saw_is_not_said_to_be_scanned(tmp_path: Path) -> Non
     assert words[-1] == "Finished"
 
 
-def test_two_that_watch_tell_every_event_once(tmp_path: Path) -> None:
+def test_two_that_watch_report_every_event_once(tmp_path: Path) -> None:
     site = Site(tmp_path, "px4")
     with site.up(), watched(site) as one, watched(site) as other:
         site.order("start")
@@ -97,7 +97,7 @@ def test_two_that_watch_tell_every_event_once(tmp_path: Path) -> None:
         assert told([report for report in seen if hasattr(report, "number")]) == ALL
 
 
-def test_a_mode_that_somebody_else_chooses_is_told_as_theirs(tmp_path: Path) -> None:
+def test_a_mode_that_somebody_else_chooses_is_reported_as_theirs(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
     with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
         site.order("start")
@@ -131,7 +131,7 @@ def test_a_mission_that_somebody_else_changes_holds_the_run(tmp_path: Path) -> N
     assert any(isinstance(event, Held) for event in site.events)
 
 
-def test_a_silent_vehicle_is_told_as_silence_and_its_run_goes_on(tmp_path: Path) -> None:
+def test_a_silent_vehicle_is_reported_as_silence_and_its_run_goes_on(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
     silent, heard = threading.Event(), []
 
@@ -208,7 +208,7 @@ def test_a_stop_is_measured_where_the_vehicle_stands(tmp_path: Path) -> None:
     assert arrived.deviation_m == pytest.approx(0.03, abs=0.012)
 
 
-def test_an_order_whose_answer_was_lost_is_told_as_its_commanders_once_it_shows(
+def test_a_command_whose_answer_was_lost_is_reported_as_its_commanders_once_it_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     site = Site(tmp_path, "ardupilot")

@@ -225,7 +225,7 @@ def test_a_disarmed_vehicle_ends_the_leg(tmp_path: Path) -> None:
         assert "the autopilot was disarmed" in held.reason
 
 
-def test_a_blocked_leg_is_held_and_driven_once_the_way_is_free(
+def test_a_blocked_leg_is_held_and_driven_once_the_path_is_free(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     north, east = bearing_of_corridor()
@@ -297,7 +297,7 @@ def test_a_line_that_is_cut_holds_the_leg_and_stops_the_vehicle_once_it_is_back(
         assert scanned(station) == ALL
 
 
-def test_a_vehicle_that_dies_on_the_way_comes_back_and_is_driven_on(tmp_path: Path) -> None:
+def test_a_vehicle_that_dies_on_a_leg_comes_back_and_is_driven_on(tmp_path: Path) -> None:
     with rover(tmp_path, "ardupilot") as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
         station.push(site_mission())
         station.command("start")
@@ -396,7 +396,7 @@ def _strict(tmp_path: Path) -> None:
 
 
 def test_a_scan_during_which_the_estimate_jumps_does_not_count_and_is_made_again(tmp_path: Path) -> None:
-    """A jump of the estimate cannot be told from a motion of the vehicle."""
+    """A jump of the estimate cannot be distinguished from a motion of the vehicle."""
     scan = Scan(profile="default", duration_s=40.0, timeout_s=60.0)
     faults = VehicleFaults((VehicleFault("jump", 35, 0.12),))
     with (

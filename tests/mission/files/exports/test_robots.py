@@ -34,7 +34,7 @@ def test_turning_onto_the_map_and_back_is_nothing() -> None:
     assert MAP.back(MAP.point((12.5, -7.25))) == pytest.approx((12.5, -7.25))
 
 
-def test_the_way_is_start_corners_stops_and_back() -> None:
+def test_the_path_is_start_corners_stops_and_back() -> None:
     names = [(pose.leg, pose.stop.id if pose.stop else None) for pose in way(square_tour())]
     assert names == [("S1", None), ("S1", "S1"), ("S2", "S2"), ("return", None)]
     headings = [math.degrees(pose.heading) for pose in way(square_tour())]
@@ -61,7 +61,7 @@ def test_nav2_reads_a_pose_per_stop(mission: Mission) -> None:
         assert all(isinstance(value, float) for value in (*waypoint["pose"], *waypoint["orientation"]))
 
 
-def test_nav2_is_given_every_leg_and_the_way_back(mission: Mission) -> None:
+def test_nav2_is_given_every_leg_and_the_return(mission: Mission) -> None:
     document, there = nav2(mission), mapped(mission)
     for waypoint, stop_ in zip(document["waypoints"].values(), there.stops, strict=True):
         assert np.allclose(waypoint["approach"], stop_.approach, rtol=0, atol=1e-6)

@@ -182,7 +182,7 @@ class Unwilling(Deaf):
     result = dialect.MAV_RESULT_FAILED
 
 
-def test_a_vehicle_that_drives_on_is_told_and_its_stop_is_unknown(tmp_path: Path) -> None:
+def test_a_vehicle_that_drives_on_is_reported_and_its_stop_is_unknown(tmp_path: Path) -> None:
     with Deaf() as vehicle:
         said = stopgo("pause", "--mavlink", str(vehicle.url), "--state", str(tmp_path))
     assert said.returncode == 3

@@ -130,7 +130,7 @@ def test_one_that_refuses_to_arm_for_good_is_held_for_what_it_says(tmp_path: Pat
 def test_a_hold_during_a_silence_is_the_autopilots_own_or_somebodys(
     tmp_path: Path, world: World, by_hand: bool
 ) -> None:
-    """PX4 holds when it hears nobody, and drives on; that somebody meant it to hold, it tells as well."""
+    """PX4 holds when it hears nobody, and drives on; a hold by somebody it reports as well."""
     with (
         rover(tmp_path, "px4") as (vehicle, operator),
         Lossy(vehicle.url.number, Roughness(), seed=1) as line,

@@ -1,4 +1,4 @@
-"""Whoever changes mode, item or arming of a vehicle in AUTO is named as far as the line tells it."""
+"""Whoever changes mode, item or arming of a vehicle in AUTO is named as far as the line shows it."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ TELLING = Paused | Held | Skipped
 
 
 def reason_after(site: Site, does: Does) -> str:
-    """The reason that is told after somebody has done that to the running vehicle."""
+    """The reason that is reported after somebody has done that to the running vehicle."""
     with site.up(), watched(site), other_station(site) as peer:
         site.order("start")
         until(site, lambda events, run: "Scanned S1" in told(events))
@@ -84,7 +84,7 @@ def reason_after(site: Site, does: Does) -> str:
 
 @pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 @pytest.mark.parametrize("does", [manual, manual_by_message, disarmed, jumped_over, set_back])
-def test_a_station_that_is_heard_is_named_for_whatever_it_changes(
+def test_a_station_whose_messages_arrive_is_named_for_whatever_it_changes(
     tmp_path: Path, shared: None, profile: str, does: Does
 ) -> None:
     reason = reason_after(Site(tmp_path, profile, speed_up=1.0), does)

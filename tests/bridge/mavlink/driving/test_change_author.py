@@ -1,4 +1,4 @@
-"""Whoever takes a gateway's vehicle, or steers it besides, is named as far as the line tells it."""
+"""Whoever takes a gateway's vehicle, or steers it besides, is named as far as the line shows it."""
 
 from __future__ import annotations
 
