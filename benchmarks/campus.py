@@ -7,12 +7,14 @@ The storeys are sample offices of many sizes. Every floor is another one, so tha
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import resource
 import shutil
 import tempfile
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import ezdxf
@@ -44,7 +46,7 @@ def main() -> None:
         rows.append(batch(site, "two", 2, label="again, nothing changed"))
         draw(site / "floors", 1, seed=1)
         rows.append(batch(site, "two", 2, label="again, one floor changed"))
-    head = ["run", "plans", "planned", "wall s", "CPU s", "largest process MB", "store MB"]
+    head = ["run", "plans", "planned", "wall s", "CPU s", "memory MB", "store MB"]
     text = f"{versions('numpy', 'shapely', 'highspy')}\n\n{table(head, rows)}"
     print(text)
     put("campus", text)
@@ -64,19 +66,20 @@ def draw(folder: Path, count: int, *, seed: int = 0) -> None:
 def alone(site: Path) -> Sequence[object]:
     """The plan of each floor by a command of its own, in a process of its own."""
     floors = sorted((site / "floors").glob("*.dxf"))
-    begin, cpu = time.perf_counter(), children()
+    begin, cpu, memory = time.perf_counter(), children(), Memory()
     for floor in floors:
         child = os.fork()
         if child == 0:
             os._exit(stopgo(["plan", str(floor), "-o", str(site / "alone" / floor.stem)]))
         os.waitpid(child, 0)
-    return ["plans alone, one after another", len(floors), len(floors), *spent(begin, cpu), "-"]
+    took = [*spent(begin, cpu), memory.end()]
+    return ["plans alone, one after another", len(floors), len(floors), *took, "-"]
 
 
 def batch(site: Path, name: str, workers: int, *, label: str = "") -> Sequence[object]:
     """A batch in a process of its own."""
     out = site / name
-    begin, cpu = time.perf_counter(), children()
+    begin, cpu, memory = time.perf_counter(), children(), Memory()
     child = os.fork()
     if child == 0:
         arguments = ["batch", str(site / "plans.toml"), "-o", str(out), "--workers", str(workers), "--json"]
@@ -84,7 +87,7 @@ def batch(site: Path, name: str, workers: int, *, label: str = "") -> Sequence[o
             os.dup2(nowhere.fileno(), 1)
         os._exit(stopgo(arguments))
     os.waitpid(child, 0)
-    took = spent(begin, cpu)
+    took = [*spent(begin, cpu), memory.end()]
     record = msgspec.json.decode((out / "batch.json").read_bytes(), type=BatchRecord)
     counts = record.counts()
     size = sum(path.stat().st_size for path in (out / ".store").rglob("*") if path.is_file())
@@ -99,9 +102,44 @@ def children() -> float:
 
 
 def spent(begin: float, cpu: float) -> list[float]:
-    """Wall and CPU seconds, and the largest process so far."""
-    largest = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    return [time.perf_counter() - begin, children() - cpu, largest]
+    """Wall and CPU seconds since then."""
+    return [time.perf_counter() - begin, children() - cpu]
+
+
+class Memory:
+    """Most memory that all processes started from here have together (PSS, megabytes), looked at ten times a second."""
+
+    def __init__(self) -> None:
+        self._most = 0.0
+        self._ended = threading.Event()
+        self._looking = threading.Thread(target=self._look)
+        self._looking.start()
+
+    def end(self) -> float:
+        self._ended.set()
+        self._looking.join()
+        return self._most
+
+    def _look(self) -> None:
+        while not self._ended.wait(0.1):
+            self._most = max(self._most, sum(memory_of(child) for child in below(os.getpid())) / 1024)
+
+
+def below(process: int) -> Iterator[int]:
+    """All processes that this one, or one that it started, has started."""
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        with contextlib.suppress(OSError):
+            for child in map(int, task.read_text().split()):
+                yield child
+                yield from below(child)
+
+
+def memory_of(process: int) -> int:
+    """Memory of a process in kB, with its part of what it shares; 0 if it has ended."""
+    with contextlib.suppress(OSError, StopIteration):
+        lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+    return 0
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Commands called in this process, told of as if they had run in one of their own."""
+"""Commands called in this process, reported as if they had run in one of their own."""
 
 from __future__ import annotations
 

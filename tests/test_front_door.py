@@ -64,7 +64,7 @@ def test_importing_it_loads_nothing_slow() -> None:
 
 
 def test_a_name_that_is_not_text_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    """Linux lets a name be any bytes; one that cannot be told is refused before a file is written."""
+    """Linux lets a name be any bytes; one that cannot be printed is refused before a file is written."""
     assert main(["check", "caf\udce9.json", "--json"]) == 2
     told = capsys.readouterr()
     line = "caf\ufffd.json: is not UTF-8 text; rename the file or folder"

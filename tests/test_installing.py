@@ -54,7 +54,7 @@ def write_hall(path: Path) -> None:
 
 
 def run(code: str, site: Path) -> subprocess.CompletedProcess[str]:
-    """Code in a fresh Python that finds `site` before all else that is installed, beside a floor."""
+    """Code in a fresh Python that finds `site` before all else that is installed, next to a floor."""
     write_hall(site.parent / "hall.dxf")
     return subprocess.run(
         [sys.executable, "-P", "-c", code],
@@ -102,13 +102,13 @@ def test_packages_of_the_same_names_stay_the_users(installed: Path, code: str) -
     assert Path(place).parent == installed / "stopgo"
 
 
-def test_the_command_beside_packages_of_the_same_names(installed: Path, tmp_path: Path) -> None:
+def test_the_command_next_to_packages_of_the_same_names(installed: Path, tmp_path: Path) -> None:
     code = f"import sys, stopgo; sys.argv = ['stopgo', 'plan', 'hall.dxf', '-o', {str(tmp_path)!r}]\n"
     done = run(f"{THEIRS}\n{code}sys.exit(stopgo.main())", installed)
     assert (done.returncode, (tmp_path / "mission.json").exists()) == (0, True), done.stderr
 
 
-def test_an_older_installation_beside_it_changes_nothing(installed: Path, tmp_path: Path) -> None:
+def test_an_older_installation_next_to_it_changes_nothing(installed: Path, tmp_path: Path) -> None:
     """Of the time when a module `stopgo` stood in site-packages, and the folders below `_stopgo`."""
     site = shutil.copytree(installed, tmp_path / "site")
     (site / "stopgo.py").write_text("raise ImportError('the older stopgo')\n")
@@ -120,7 +120,9 @@ def test_an_older_installation_beside_it_changes_nothing(installed: Path, tmp_pa
 def test_of_two_versions_the_first_on_the_path_is_whole(installed: Path, tmp_path: Path) -> None:
     other = shutil.copytree(installed, tmp_path / "other")
     (other / "stopgo" / "planner" / "__init__.py").write_text("raise ImportError('the other version')\n")
-    code = f"import sys; sys.path.append({str(other)!r})\n{OURS}\nprint(stopgo.planner.__file__)"
+    code = (
+        f"import sys; sys.path.append({str(other)!r})\nimport stopgo.planner\nprint(stopgo.planner.__file__)"
+    )
     done = run(code, installed)
     assert (done.returncode, done.stdout.strip()) == (
         0,
@@ -148,7 +150,7 @@ def test_a_read_only_installation_plans(installed: Path, tmp_path: Path) -> None
     assert "Traceback" not in done.stderr
 
 
-def test_an_installation_that_was_cut_off_is_told_in_one_line(installed: Path, tmp_path: Path) -> None:
+def test_an_installation_that_was_cut_off_is_reported_in_one_line(installed: Path, tmp_path: Path) -> None:
     site = shutil.copytree(installed, tmp_path / "site")
     shutil.rmtree(site / "stopgo" / "bridge")
     done = run("import sys, stopgo; sys.exit(stopgo.main())", site)

@@ -195,7 +195,7 @@ def test_what_a_plug_in_sees_may_be_lists(module: Write) -> None:
     assert np.array_equal(one.selection.xy, other.selection.xy)
 
 
-def test_a_bound_of_a_plug_in_is_told_as_its_own(module: Write) -> None:
+def test_a_bound_of_a_plug_in_is_reported_as_its_own(module: Write) -> None:
     module("honest", NUMPY + "def f(cover, settings): return np.arange(cover.rows), cover.rows")
     made = plan(FLOOR, Settings(selector="honest:f", refine=False, register=False))
     assert made.selection.method == "honest:f, fewest as reported"

@@ -37,7 +37,7 @@ FILES = {
 
 
 @pytest.mark.skipif(not CAN_COPY, reason="one process runs all tests here")
-def test_every_test_is_told_once_also_where_a_worker_dies(tmp_path: Path) -> None:
+def test_every_test_is_reported_once_also_where_a_worker_dies(tmp_path: Path) -> None:
     for name, text in FILES.items():
         (tmp_path / name).write_text("\n".join(line[8:] for line in text.splitlines()))
     options = ["-p", "tests.workers", "--workers", "2", "-p", "no:cacheprovider", "-ra", "--rootdir"]

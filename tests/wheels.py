@@ -5,8 +5,8 @@ machine without them, as robots need it. The former serves the extras that plan.
 
     python -m tests.wheels [PYTHON ...]
 
-Each environment must plan, tell what is missing, or record, as its extra promises; another package called
-`mission` is put beside it and must change nothing. Takes minutes and downloads: not part of `make test`.
+Each environment must plan, report what is missing, or record, as its extra promises; another package called
+`mission` is put next to it and must change nothing. Takes minutes and downloads: not part of `make test`.
 """
 
 from __future__ import annotations

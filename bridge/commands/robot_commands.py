@@ -175,13 +175,14 @@ def ros_body_of(controller: str, given: GivenOptions, simulated: SimulatedOption
     from stopgo.bridge.ros2.rclpy_port import open_rclpy
     from stopgo.bridge.ros2.ros_body import RosBody
     from stopgo.bridge.ros2.ros_settings import read_ros_settings
+    from stopgo.bridge.ros2.run_topics import RunTopics
 
     others = tuple(option for option in ONLY_SIMULATED if option != "--map")
     refuse_options(given, "ROS 2", *others, *ONLY_DRIVEN)
     file = controller.partition(":")[2]
     settings = read_ros_settings(Path(file) if file else None)
     arguments = ("--ros-args", *shlex.split(ros_args)) if ros_args else ()
-    return RosBody(settings, partial(open_rclpy, ros_args=arguments), simulated.to_map)
+    return RosBody(settings, partial(open_rclpy, ros_args=arguments), RunTopics, simulated.to_map)
 
 
 def read_faults(texts: list[str] | None) -> Faults:

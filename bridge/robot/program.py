@@ -156,6 +156,7 @@ def robot_on(
                 refusals=RefusalLog(options.say, key_files.now_utc),
                 recorder=recorder,
             )  # fmt: skip
+            body.attach(controller)
             with on_link(agent):
                 yield agent
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.map_frame import OnMap, turned
 from stopgo.bridge.robot.simulator import (
     ENDURANCE_S,
@@ -25,11 +26,12 @@ from stopgo.mission.run.events import Pose
 
 @dataclass(frozen=True)
 class Body:
-    """A base and a scanner; `take` gives them the mission that will be run."""
+    """A base and a scanner; `take` gives them the mission that will be run, `attach` the run itself."""
 
     base: Base
     scanner: Scanner
     take: Callable[[Mission], None]
+    attach: Callable[[Controller], None] = lambda controller: None
 
 
 OpenBody = Callable[[Clock], AbstractContextManager[Body]]

@@ -12,9 +12,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
+import msgspec
+
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.ros2.ros_port import GoalStatus
-from stopgo.bridge.ros2.ros_settings import RosSettings
+from stopgo.bridge.ros2.ros_settings import RosSettings, changed_settings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
 from stopgo.bridge.ros2.ros_types import RosFields, checked_scan_type, filled_message, load, plain_fields
 from stopgo.mission.errors import InputError
@@ -111,9 +113,9 @@ class RclpyPort:
 
     def __init__(self, node: Any, settings: RosSettings, telemetry: RosTelemetry, clock: Clock) -> None:
         self.node = node
-        self._settings = settings
-        self._telemetry = telemetry
-        self._clock = clock
+        self.settings = self._settings = settings
+        self.telemetry = self._telemetry = telemetry
+        self.clock = self._clock = clock
         self._ours: set[bytes] = set()
         self._active: dict[str, dict[bytes, int]] = {}
         self._zero_until_ns = 0
@@ -320,10 +322,24 @@ def _ns(stamp: Any) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
+def with_parameters(node: Any, settings: RosSettings) -> RosSettings:
+    """Declare the settings as parameters of the node, such as `limits.jump_m`, and return them."""
+    wrong = load("rclpy.exceptions").InvalidParameterTypeException
+    read_only = load("rcl_interfaces.msg").ParameterDescriptor(read_only=True)
+    changes: dict[str, dict[str, Any]] = {}
+    for table in ("frames", "topics", "drive", "limits"):
+        values = msgspec.to_builtins(getattr(settings, table))
+        for key, value in values.items():
+            try:
+                taken = node.declare_parameter(f"{table}.{key}", value, read_only).value
+            except wrong as error:
+                raise InputError(f"parameter {table}.{key}: {error}") from None
+            changes.setdefault(table, {})[key] = list(taken) if isinstance(value, list | tuple) else taken
+    return changed_settings(settings, changes)
+
+
 @contextmanager
-def open_rclpy(
-    settings: RosSettings, telemetry: RosTelemetry, clock: Clock, *, ros_args: Sequence[str] = ()
-) -> Iterator[RclpyPort]:
+def open_rclpy(settings: RosSettings, clock: Clock, *, ros_args: Sequence[str] = ()) -> Iterator[RclpyPort]:
     """Run a node for as long as the block lasts; `ros_args` are those after --ros-args."""
     rclpy = load("rclpy")
     context = rclpy.Context()
@@ -331,8 +347,10 @@ def open_rclpy(
     try:
         rclpy.init(args=["stopgo", *ros_args], context=context, signal_handler_options=none)
         node = rclpy.create_node(settings.node, context=context)
+        settings = with_parameters(node, settings)
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{' '.join(ros_args)}: ROS 2 does not take it ({error})") from None
+    telemetry = RosTelemetry(clock, settings.frames, settings.limits)
     executor = load("rclpy.executors").SingleThreadedExecutor(context=context)
     executor.add_node(node)
     try:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Protocol
 
+from stopgo.bridge.ros2.ros_settings import RosSettings
+from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
 from stopgo.mission.run.events import Pose
 
 GoalStatus = Literal["sent", "rejected", "active", "succeeded", "canceled", "aborted"]
@@ -35,6 +37,9 @@ class RosCall(Protocol):
 
 class RosPort(Protocol):
     """The ROS side of a robot. No method waits for an answer."""
+
+    settings: RosSettings
+    telemetry: RosTelemetry
 
     def is_ready(self, what: Literal["drive", "spin", "scan"]) -> bool:
         """Return True if the server of the action or service is there."""

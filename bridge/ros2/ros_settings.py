@@ -107,6 +107,8 @@ class RosSettings(RosSection, frozen=True):
     """All of ros2.toml."""
 
     node: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] = "stopgo"
+    commands: bool = False
+    """True if services of the node may start, resume, skip, retry and send home; nobody signs them."""
     frames: FrameNames = FrameNames()
     topics: TopicNames = TopicNames()
     drive: DriveActions = DriveActions()
@@ -132,6 +134,25 @@ def read_ros_settings(path: Path | None) -> RosSettings:
         keys = where.strip("`").removeprefix("$").lstrip(".")
         found = value_at(document, keys)
         raise InputError(f"{path}: {keys or 'the file'}{found}: {what}") from None
+
+
+def changed_settings(settings: RosSettings, changes: dict[str, dict[str, Any]]) -> RosSettings:
+    """Return the settings with other values, by table and key.
+
+    Raises
+    ------
+    InputError
+        Naming the key and the value.
+    """
+    document = msgspec.to_builtins(settings)
+    for table, values in changes.items():
+        document[table] |= values
+    try:
+        return msgspec.convert(document, RosSettings)
+    except msgspec.ValidationError as error:
+        what, _, where = str(error).partition(" - at ")
+        keys = where.strip("`").removeprefix("$").lstrip(".")
+        raise InputError(f"parameter {keys}{value_at(document, keys)}: {what}") from None
 
 
 def value_at(document: Any, keys: str) -> str:

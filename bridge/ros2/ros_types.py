@@ -32,9 +32,10 @@ def checked_scan_type(scan: ScanCall) -> Any:
         Naming the missing field, and those that there are.
     """
     package, kind, name = scan.type.split("/")
-    found = getattr(load(f"{package}.{kind}"), name, None)
-    if found is None:
-        raise InputError(f"scan.type = {scan.type!r}: {package} has no {kind} of this name")
+    try:
+        found = getattr(import_module(f"{package}.{kind}"), name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"scan.type = {scan.type!r}: there is no such type here ({error})") from None
     request, response = (found.Goal, found.Result) if kind == "action" else (found.Request, found.Response)
     filled_message(request, {field: _example(value) for field, value in scan.request.items()})
     known = response.get_fields_and_field_types()
@@ -70,11 +71,19 @@ def filled_message(kind: Any, fields: RosFields, where: str = "scan.request") ->
             value = filled_message(type(getattr(made, field)), given, f"{where}.{field}")
         else:
             value = _as_type(given, known[field])
-        try:
-            setattr(made, field, value)
-        except (AssertionError, TypeError):
-            raise InputError(f"{where}.{field} = {given!r}: must be {known[field]}") from None
+        if not _fits(value, known[field]):
+            raise InputError(f"{where}.{field} = {given!r}: must be {known[field]}")
+        setattr(made, field, value)
     return made
+
+
+def _fits(value: Any, kind: str) -> bool:
+    """Return True if a field of this type takes the value; lists and messages are not looked at."""
+    wanted = {"boolean": bool, "string": str, "float": float, "double": float}.get(kind)
+    if wanted is not None:
+        return isinstance(value, wanted)
+    whole = kind.startswith(("int", "uint")) and "[" not in kind
+    return not whole or (isinstance(value, int) and not isinstance(value, bool))
 
 
 def _as_type(value: Any, kind: str) -> Any:

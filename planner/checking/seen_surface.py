@@ -10,6 +10,7 @@ from stopgo.mission.document.limits import scanner_height
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.seen_area import SeenArea, SeenSurface
+from stopgo.planner.overlap.boundary import ray_step
 from stopgo.planner.visibility.solid_rays import MOST_PAIRS, solid_rays
 
 
@@ -20,12 +21,13 @@ def seen_surface(route: Route) -> SeenSurface | None:
     if rays is None or solids is None:
         return None
     targets, elements, cells = space.targets, space.floor.elements, rays.cells
-    seen = np.zeros(cells.there.shape, dtype=bool)
+    seen = np.zeros(cells.there.shape)
     promised = np.zeros(targets.total, dtype=bool)
     for stop, units in _sights(route):
         promised[units] = True
         for part in np.array_split(units, max(1, -(-units.size * cells.z.shape[1] // MOST_PAIRS))):
-            seen[part] |= rays.reached(stop, part)
+            hit = rays.reached(stop, part) * _between_rays(route, stop, part)[:, None]
+            seen[part] = np.maximum(seen[part], hit)
     kinds = np.array([item.kind for item in elements])[targets.element[targets.unit_segment]]
     area = targets.unit_length[:, None] * cells.tall
     return SeenSurface(
@@ -38,7 +40,20 @@ def seen_surface(route: Route) -> SeenSurface | None:
     )
 
 
-def _area(of_kind: BoolArray, promised: BoolArray, area: FloatArray, seen: BoolArray) -> SeenArea:
+def _between_rays(route: Route, stop: FloatArray, units: IntArray) -> FloatArray:
+    """Fraction of each unit that rays hit (units,): less than 1 where it is seen so flat that some miss."""
+    targets = route.space.targets
+    along = (targets.b - targets.a)[targets.unit_segment[units]]
+    sight = targets.unit_xy[units] - stop
+    away = np.hypot(*sight.T)
+    across = np.abs(along[:, 0] * sight[:, 1] - along[:, 1] * sight[:, 0])
+    cosine = across / np.maximum(away * np.hypot(*along.T), 1e-12)
+    spacing = away * ray_step(route.settings)
+    found: FloatArray = np.minimum(targets.unit_length[units] * cosine / np.maximum(spacing, 1e-12), 1.0)
+    return found
+
+
+def _area(of_kind: BoolArray, promised: BoolArray, area: FloatArray, seen: FloatArray) -> SeenArea:
     own = of_kind & promised
     return SeenArea(
         total_m2=float(area[own].sum()),

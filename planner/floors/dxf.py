@@ -30,7 +30,10 @@ from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
 from stopgo.planner.floors.units.unit_lengths import METRES
 from stopgo.planner.floors.wall_layers import (
+    MOST_STRAY,
     NOT_ENCLOSING,
+    UNTOLD,
+    WIDEST_GAP,
     Deriving,
     WallLayers,
     has_wall_layers,
@@ -75,6 +78,9 @@ def _sheet(drawing: Drawing, options: FloorOptions, path: Path) -> tuple[DxfShee
         return _named_sheet(drawing, options, path, derive)
     found = wall_layers(drawing, options, derive, source=path)
     if found is None or not found.is_told:
+        other = wall_layers(drawing, options, derive, source=path, roles=NOT_ENCLOSING, more_than=UNTOLD)
+        found = other if other is not None and (other.is_told or found is None or not found.area) else found
+    if found is None or not found.is_told:
         return _sheet_without_unit(drawing, options, path), found or WallLayers()
     return _tried_sheet(found), found
 
@@ -93,6 +99,7 @@ def _named_sheet(
             found = wall_layers(drawing, options, derive, source=path, roles=NOT_ENCLOSING)
             if found is not None and found.is_told:
                 return _tried_sheet(found), found
+            return sheet, found if found is not None and found.area else None
         except InputError:
             pass  # the floor is derived again, and the message given there
     return sheet, None
@@ -196,13 +203,30 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
             f"{path}: what was taken for walls encloses {made.cells} cells smaller than a room: that is a "
             "pattern, no walls; put the walls on a layer of their own, or ask for such an export"
         )
-    if not any(stroke.role == "floor" for stroke in made.strokes):
-        walls = _listed(sorted({stroke.layer for stroke in sheet.strokes if stroke.role == "walls"}))
+    if _encloses_nothing(made):
         raise NothingEnclosed(
-            f"{path}: the walls on {walls} enclose no floor; draw its outline on a layer FLOOR, "
+            f"{path}: {_enclose_nothing(sheet)}; draw its outline on a layer FLOOR, "
             "close the walls, or say which layer holds more of them (--layer NAME=walls)"
         )
     return made
+
+
+def _encloses_nothing(made: Derived) -> bool:
+    """True if walls enclose no floor, or only a corner between a few of them."""
+    if not any(stroke.role == "floor" for stroke in made.strokes):
+        return True
+    shown = made.shown
+    is_corner = sum(room.area for room in shown.rooms) < _CORNER_M2
+    return is_corner and (shown.closed_over > WIDEST_GAP or shown.stray > MOST_STRAY)
+
+
+def _enclose_nothing(sheet: DxfSheet) -> str:
+    walls = _listed(sorted({stroke.layer for stroke in sheet.strokes if stroke.role == "walls"}))
+    return f"the walls on {walls} enclose no floor"
+
+
+_CORNER_M2 = 5.0
+"""Least area in m² of a floor whose walls are open, or lie mostly elsewhere."""
 
 
 @instance_cached
@@ -229,9 +253,13 @@ LARGEST_FLOOR = 2000.0
 def _no_walls(sheet: DxfSheet, tried: WallLayers | None = None) -> str:
     """Message for a drawing without any known layer, with the remedy."""
     layers = sorted({shape.layer for shape in sheet.shapes}, key=str.casefold)
-    why = (
-        f"no closed outline on layer FLOOR, and no layer that shows walls; layers present: {_listed(layers)}"
+    has_walls = any(stroke.role == "walls" for stroke in sheet.strokes)
+    missing = (
+        _enclose_nothing(sheet)
+        if has_walls
+        else "no closed outline on layer FLOOR, and no layer that shows walls"
     )
+    why = f"{missing}; layers present: {_listed(layers)}"
     if tried is None or not tried.layers:
         return f"{why}; say which one holds the walls, such as {layer_option('NAME', 'walls')}"
     if tried.units:

@@ -53,9 +53,9 @@ _LIKE_FLOOR = 0.9
 _ROWS = 0.95
 """Rooms that all have the same area, up to this fraction, are rows of a table."""
 _FLOOR_M2 = (5.0, 50_000.0)
-_WIDEST_GAP = 1.6
+WIDEST_GAP = 1.6
 """Outer walls with a wider gap, in metres, may be those of several drawings."""
-_MOST_STRAY = 0.3
+MOST_STRAY = 0.3
 """Walls of which more than this fraction lies off the floor are other lines too."""
 UNTOLD = ("other", "rooms")
 """Roles whose lines may be walls in a drawing without a layer of walls …"""
@@ -82,6 +82,8 @@ class WallLayers:
     evidence: tuple[str, ...] = ()
     count: int = 0
     """Doors, passages, names and areas that are evidence."""
+    is_doubted: bool = False
+    """True if the floor is no storey, or written areas are false."""
     area: float = 0.0
     refusal: str = ""
     """Reason why these layers give no floor."""
@@ -127,11 +129,28 @@ def wall_layers(
     *,
     source: Path,
     roles: tuple[str, ...] = UNTOLD,
+    more_than: tuple[str, ...] = (),
 ) -> WallLayers | None:
-    """Return the layers of these roles that most probably hold the walls; None if none has lines."""
+    """Return the layers of these roles that most probably hold the walls.
+
+    None if none has lines, or none of them has a role that is not in `more_than`.
+    """
     seen = layers_of(drawing, options, source=source)
+    if not any(shape.role in roles and shape.role not in more_than for shape in seen.shapes):
+        return None
     candidates = _candidates([shape for shape in seen.shapes if shape.role in roles])
-    return _best([_trial(drawing, options, names, derive, source) for names in candidates])
+    named = frozenset(shape.layer for shape in seen.shapes if shape.role == "walls")
+    trials = [_trial(drawing, options, names, derive, source) for names in candidates]
+    return _best([_with_names(trial, named) for trial in trials])
+
+
+def _with_names(trial: WallLayers, named: frozenset[str]) -> WallLayers:
+    """The trial, with the names of its layers as evidence if all layers of walls are among them."""
+    if not named or trial.refusal or not named <= set(trial.layers):
+        return trial
+    says = f"{', '.join(sorted(named))} {'are' if len(named) > 1 else 'is'} named as walls"
+    weight = trial.weight + (not trial.is_doubted)
+    return replace(trial, weight=weight, evidence=(*trial.evidence, says))
 
 
 def with_layers(options: FloorOptions, found: WallLayers) -> FloorOptions:
@@ -221,6 +240,7 @@ def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLay
     return replace(
         found,
         weight=min(weight, ENOUGH - 1) if is_doubted else weight,
+        is_doubted=is_doubted,
         evidence=tuple(text for _, text in told),
         count=seen.true + seen.named + shown.doors + shown.passages,
     )
@@ -229,7 +249,7 @@ def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLay
 def _is_no_storey(made: Derived, words: Sequence[Word]) -> bool:
     """Return True if a title names a view that is no storey, or other lines lie among the walls."""
     shown = made.shown
-    if shown.closed_over > _WIDEST_GAP or shown.stray > _MOST_STRAY:
+    if shown.closed_over > WIDEST_GAP or shown.stray > MOST_STRAY:
         return True
     return any(_NO_PLAN.search(word.text) for word in words)
 

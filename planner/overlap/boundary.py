@@ -152,7 +152,7 @@ def shown_by(
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[face[first]]
     piece = (np.hypot(*(boundary.b - boundary.a).T) / boundary.pieces)[face[first]]
     row = np.repeat(np.arange(len(xy)), [len(run[0]) for run in runs])
-    low, high = _measured(boundary, face[first], xy[row], step=_step_of(settings))
+    low, high = _measured(boundary, face[first], xy[row], step=ray_step(settings))
     begin = np.maximum((first - start) * piece, low)
     end = np.minimum((last + 1 - start) * piece, high)
     some = end > begin
@@ -166,7 +166,7 @@ def shown_by(
     )
 
 
-def _step_of(settings: Settings) -> float:
+def ray_step(settings: Settings) -> float:
     """Radians between neighbouring rays."""
     return math.radians(settings.angular_step or USUAL_STEP_DEG)
 

@@ -23,7 +23,7 @@ from stopgo.batches.work import PlanOutcome, PlanTask, work
 
 TRIES = 2
 TICK_S = 0.5
-PLANS_EACH = 16
+PLANS_EACH = 5
 """Plans of one process; its memory grows by some megabytes with each."""
 
 

@@ -37,10 +37,8 @@ WorkersOption = Annotated[int, typer.Option(help="Plans at the same time on this
 SchedulerOption = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Plan on the workers of this dask scheduler.")
 ]
-WhyOption = Annotated[
-    str | None, typer.Option(metavar="ENTRY", help="Print what changed in an entry, and leave.")
-]
-GcOption = Annotated[bool, typer.Option("--gc", help="Remove old results from the store, and leave.")]
+WhyOption = Annotated[str | None, typer.Option(metavar="ENTRY", help="Only print the changes of an entry.")]
+GcOption = Annotated[bool, typer.Option("--gc", help="Only remove old results from the store.")]
 AgeOption = Annotated[
     str | None,
     typer.Option(metavar="TIME", help="With --gc: also results not used for 12h, 30d, 2w."),
@@ -52,7 +50,7 @@ SizeOption = Annotated[
 
 SinceOption = Annotated[
     str | None,
-    typer.Option(metavar="DAY|last", help="Scan what was finished since; last: since a floor's last run."),
+    typer.Option(metavar="DAY|last", help="Only elements finished after DAY; last: a floor's last run."),
 ]
 RunsOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Recordings of earlier runs.")]
 DayOption = Annotated[
@@ -72,7 +70,7 @@ def batch_command(
     file: FileArgument,
     out: OutOption = Path(),
     *,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the entries, and leave.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list the entries.")] = False,
     why: WhyOption = None,
     store: StoreOption = None,
     workers: WorkersOption = 2,

@@ -51,7 +51,7 @@ StepOption = Annotated[
     ),
 ]
 NoiseOption = Annotated[
-    float, typer.Option(min=0.0, max=100.0, rich_help_panel="Simulation", help="Of a distance, mm rms.")
+    float, typer.Option(min=0.0, max=100.0, rich_help_panel="Simulation", help="Noise of a distance, mm rms.")
 ]
 HeightOption = Annotated[
     float | None,
@@ -99,7 +99,7 @@ WithoutPosesOption = Annotated[
     ),
 ]
 SeedOption = Annotated[
-    int, typer.Option(min=0, rich_help_panel="Simulation", help="Of noise and pose errors.")
+    int, typer.Option(min=0, rich_help_panel="Simulation", help="Seed of noise and pose errors.")
 ]
 SolidsOption = Annotated[
     SolidsOfProof,

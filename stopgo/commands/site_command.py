@@ -1,4 +1,4 @@
-"""`stopgo site`: one page in a browser, to plan, push, watch, stop and review by."""
+"""`stopgo site`: one page in a browser, to plan, push, watch, stop and review."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def site(
     certificate: Certificate = None,
     certificate_key: CertificateKey = None,
 ) -> None:
-    """Serve one page to plan, push, watch, stop and review by, until Ctrl-C.
+    """Serve one page to plan, push, watch, stop and review, until Ctrl-C.
 
     It prints the address of the page with a token that admits one browser. The robots go on when this
     command ends. Started again, it continues with the same browsers, and shows what they missed.

@@ -1,1 +1,1 @@
-"""The site: one web application to plan, push, watch, stop and review by, composed of all parts."""
+"""The site: one web application to plan, push, watch, stop and review."""

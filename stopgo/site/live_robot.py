@@ -1,12 +1,11 @@
 """One robot as pages show it: its state with its age, events, path and coverage, from any kind of link.
 
-Data. Poses go from the link's thread to the feed at once. Everything else goes through the robot's own
-thread, which follows run after run as `stopgo watch` does, and records each in the folder.
+Data. Poses and events go from the link's threads to the feed at once. Everything else goes through the
+robot's own thread, which follows run after run as `stopgo watch` does, and records each in the folder.
 
 Invariants:
 - A state on the feed is the newest by the robot's sealed sequence; its age is never understated.
-- Events of the present run have a key each, so that no page misses one; a new run replaces them all.
-- The path has a bounded number of points; its spacing grows with its length.
+- What was reported live is read again from the robot's journal, so that nothing is missing (`ShownRun`).
 """
 
 from __future__ import annotations
@@ -16,9 +15,8 @@ import queue
 import threading
 import time
 import uuid
-from collections import deque
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from typing import Any
 
 import msgspec
@@ -53,60 +51,15 @@ from stopgo.mission.run.events import (
     Skipped,
     StateReport,
     Unconfirmed,
+    event_of,
 )
 from stopgo.mission.run.health_text import charge_text
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.known_missions import KnownMission, KnownMissions
-
-SPACING_M = 0.1
-"""Smallest distance between two points of the drawn path."""
-CHUNK = 50
-MOST_CHUNKS = 100
-"""Chunks of the path at most; then every second point is left out."""
-MOST_EVENTS = 5000
+from stopgo.site.shown_run import ShownRun
 
 OpenRecording = Callable[[str, str, KnownMission | None], AbstractContextManager[RunCollector]]
 """Opens the collector of a run, by robot, run id and mission."""
-
-
-class PagePath:
-    """Points of a run's path at some distance from each other, in chunks on the feed."""
-
-    def __init__(self, feed: EventFeed, robot: str) -> None:
-        self._feed = feed
-        self._robot = robot
-        self.begin("")
-
-    def begin(self, run_id: str) -> None:
-        """Begin the path of a run."""
-        self._run_id = run_id
-        self._spacing = SPACING_M
-        self._chunks: list[list[list[float]]] = [[]]
-        self._feed.forget("path", self._robot)
-
-    def add(self, x: float, y: float) -> None:
-        """Add a position, if it is far enough from the last."""
-        last = self._chunks[-1][-1] if self._chunks[-1] else None
-        if last is not None and math.dist(last, (x, y)) < self._spacing:
-            return
-        if len(self._chunks[-1]) >= CHUNK:
-            self._chunks.append([list(self._chunks[-1][-1])])
-        self._chunks[-1].append([round(x, 2), round(y, 2)])
-        if len(self._chunks) > MOST_CHUNKS:
-            self._thin()
-        self._tell(len(self._chunks) - 1)
-
-    def _thin(self) -> None:
-        points = [point for chunk in self._chunks for point in chunk][::2]
-        self._spacing *= 2
-        self._chunks = [points[k : k + CHUNK + 1] for k in range(0, len(points), CHUNK)]
-        self._feed.forget("path", self._robot)
-        for number in range(len(self._chunks)):
-            self._tell(number)
-
-    def _tell(self, number: int) -> None:
-        value = {"run": self._run_id, "spacing": self._spacing, "xy": self._chunks[number]}
-        self._feed.tell(("path", self._robot, str(number)), value)
 
 
 class LiveRobot:
@@ -128,16 +81,17 @@ class LiveRobot:
         self._feed = feed
         self._missions = missions
         self._recorder = recorder
-        self._path = PagePath(feed, self.name)
+        self._shown = ShownRun(feed, self.name)
         self._true_at = time.monotonic()
         """Time at which the newest state was true, at the latest known."""
         self._token = uuid.uuid4().hex[:12]
         self._trouble: tuple[str, ...] = ("not_found",)
+        self._reason = ""
         self._offset: tuple[str, float] = ("", -math.inf)
         """Boot, and lower bound of this clock minus the robot's, seconds."""
         self._stops: dict[str, str] = {}
-        self._events: deque[int] = deque()
         self._run_id = ""
+        """Run that is followed and recorded."""
         self._open = ExitStack()
         self._collector: RunCollector | None = None
         self._recorded: set[tuple[str | None, int | None]] = set()
@@ -159,6 +113,7 @@ class LiveRobot:
         self._tell_state(time.monotonic())
         received = subscribe(link, keys)
         link.hear(keys.pose, lambda key, payload: self._hear_pose(payload))
+        link.hear(keys.event, lambda key, payload: self._hear_event(payload))
         link.announce(keys.watcher(self._token))
         watched = WatchedLink(self._keep)
         while not stopped.is_set():
@@ -239,6 +194,11 @@ class LiveRobot:
         self._feed.tell(("pose", self.name), pose | {"speed": round(report.speed, 3)})
         self.on_change()
 
+    def _hear_event(self, payload: bytes) -> None:
+        """Show an event at once, before it is read from the robot's journal; called by the link's threads."""
+        with suppress(msgspec.DecodeError):
+            self._shown.take_live(event_of(payload), self.pose)
+
     def _tell_state(self, at_s: float) -> None:
         state, lease = self.state, self.station.lease
         value: dict[str, Any] = {} if state is None else msgspec.to_builtins(state)
@@ -254,6 +214,7 @@ class LiveRobot:
 
     def show_trouble(self, trouble: str) -> None:
         """Show why nothing is received; from another thread."""
+        self._reason = trouble
         if trouble:
             self._set_trouble((trouble,))
 
@@ -292,11 +253,11 @@ class LiveRobot:
         """Show and record one report of the run."""
         self._begin_run(report)
         if isinstance(report, Silence):
-            self._set_trouble(("silent",))
+            self._set_trouble((self._reason or "silent",))
         elif isinstance(report, ReportsMissing):
             self._set_trouble(report.topics)
         elif isinstance(report, PoseReport):
-            self._path.add(report.pose.x, report.pose.y)
+            self._shown.add_pose(report)
         elif not isinstance(report, StateReport | PosesMissing | LoggedReport):
             self._tell_event(report)
         self._record(report)
@@ -307,10 +268,7 @@ class LiveRobot:
             return
         self._close_recording()
         self._run_id, self._stops = run_id, {}
-        self._events.clear()
-        self._feed.forget("event", self.name)
-        self._path.begin(run_id)
-        self._feed.tell(("run", self.name), {"run": run_id})
+        self._shown.begin(run_id)
         try:
             self._collector = self._open.enter_context(self._recorder(self.name, run_id, self._known()))
         except InputError as error:
@@ -319,14 +277,7 @@ class LiveRobot:
             self._feed.tell(("recording", self.name), {"run": run_id, "trouble": ""})
 
     def _tell_event(self, event: Any) -> None:
-        value = msgspec.to_builtins(event)
-        pose = self.pose
-        near = pose is not None and abs(pose.robot_ns - event.robot_ns) < 2e9
-        value["at"] = [round(pose.pose.x, 2), round(pose.pose.y, 2)] if near and pose is not None else None
-        self._feed.tell(("event", self.name, str(event.number)), value)
-        self._events.append(event.number)
-        if len(self._events) > MOST_EVENTS:
-            self._feed.forget("event", self.name, str(self._events.popleft()))
+        self._shown.take(event, self.pose)
         if isinstance(event, Scanned | Unconfirmed | Skipped):
             self._stops[event.stop] = "skipped" if isinstance(event, Skipped) else "done"
             self._tell_coverage()

@@ -49,7 +49,7 @@ def test_what_fits_into_no_shift_is_left_and_named() -> None:
     assert [step.job.name for step in plan.steps[0]] == ["short"]
 
 
-def test_the_way_back_belongs_to_the_shift() -> None:
+def test_the_return_belongs_to_the_shift() -> None:
     assert planned([job("a", 3.0)], [DayRobot("r1", 4 * HOUR, "depot")]).left == ()
     assert len(planned([job("a", 3.01)], [DayRobot("r1", 4 * HOUR, "depot")]).left) == 1
 
@@ -98,7 +98,7 @@ def _length(order: Sequence[DayJob], robot: DayRobot) -> float:
 
 
 @pytest.mark.parametrize("text", ["from,to,minutes\na,b", "a,b,x", "a,b,-1", "a,b,nan", "a,b,1e9"])
-def test_a_wrong_way_is_named_with_its_line(tmp_path: Path, text: str) -> None:
+def test_a_wrong_transfer_is_named_with_its_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "transfers.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=r"transfers.csv: line \d"):

@@ -40,7 +40,7 @@ class Lane:
 
 
 class Proxy:
-    """Carries everything between its own port and the robot's, as slowly and unreliably as it is told."""
+    """Carries everything between its own port and the robot's, as slowly and unreliably as it is set."""
 
     def __init__(self, target: int, *, bits_per_s: float | None = None, delay_s: float = 0.0) -> None:
         self._target = target
@@ -71,7 +71,7 @@ class Proxy:
             _end(line)
 
     def swallow(self, silent: bool) -> None:
-        """While true nothing is carried, and neither end is told (a blackhole)."""
+        """While true nothing is carried, and neither end is informed (a blackhole)."""
         (self._carries.clear if silent else self._carries.set)()
 
     def _accept(self) -> None:

@@ -80,7 +80,9 @@ def test_an_option_takes_the_place_of_robot_and_vehicle_alike(monkeypatch: pytes
         ("[robot]", "robot = {}"),
     ],
 )
-def test_a_bad_file_is_told_in_one_line(content: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_file_is_reported_in_one_line(
+    content: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     Path("stopgo.toml").write_text(content)
     assert main(["pause"]) == 2
     told = capsys.readouterr().err
@@ -90,13 +92,13 @@ def test_a_bad_file_is_told_in_one_line(content: str, said: str, capsys: pytest.
     assert "WRONG  profile  stopgo.toml: " in capsys.readouterr().out
 
 
-def test_an_order_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_command_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
     Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
     assert main(["pause", "--timeout", "0.1"]) == 2
     assert "tcp/127.0.0.1:1: robot r7 not found" in capsys.readouterr().err
 
 
-def test_doctor_tells_of_everything_and_ends_with_1_if_something_is_wrong(
+def test_doctor_reports_everything_and_ends_with_1_if_something_is_wrong(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["doctor"]) == 0
@@ -124,7 +126,7 @@ def test_doctor_tells_of_everything_and_ends_with_1_if_something_is_wrong(
         ('robot = "r1"\nmavlink = "udpout:127.0.0.1:14550"', "robot and mavlink are both preset"),
     ],
 )
-def test_doctor_finds_wrong_what_every_order_would_refuse(
+def test_doctor_finds_wrong_what_every_command_would_refuse(
     preset: str, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("stopgo.toml").write_text(preset)
@@ -148,7 +150,7 @@ def test_doctor_compares_the_clocks() -> None:
     assert "NTP" in late["clock"].action
 
 
-def test_doctor_tells_what_a_robot_can_and_what_it_lacks() -> None:
+def test_doctor_reports_what_a_robot_can_and_what_it_lacks() -> None:
     info = Field().station().info()
 
     def can(*capabilities: str) -> str:

@@ -50,7 +50,7 @@ def in_simulated_time(folder: Path) -> None:
 
 
 def with_a_process(folder: Path) -> None:
-    """A robot that drives while its disk is filled is paused and aborted, and tells of it later."""
+    """A robot that drives while its disk is filled is paused and aborted, and reports it later."""
     ballast = folder / "ballast"
     with (
         robot_process("r1", folder / "state") as endpoint,

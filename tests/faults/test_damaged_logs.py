@@ -18,8 +18,8 @@ from stopgo.recordings.replay.replaying import replay
 from tests.faults.sizes import FULL
 from tests.recordings.replay.driving import Odd, driven, logged, wandering
 from tests.recordings.truth import formats
+from tests.recordings.truth.disturbances import Sensed
 from tests.recordings.truth.formats import Writer
-from tests.recordings.truth.senses import Sensed
 
 LOGS = Path(__file__).parents[3] / "shared" / "data" / "logs"
 REAL = (

@@ -23,7 +23,7 @@ VERBS = ("start", "pause", "resume", "skip", "retry", "abort", "home", "explode"
 
 
 class Zeros(bytes):
-    """Many zero bytes, told in few words when a test fails."""
+    """Many zero bytes, reported in few words when a test fails."""
 
     def __new__(cls, length: int) -> Zeros:
         return super().__new__(cls, length)
@@ -100,7 +100,7 @@ def test_no_payload_on_any_key_brings_the_robot_down() -> None:
     station.push(MISSION)
 
     @settings(
-        max_examples=size(short=200, full=30_000),
+        max_examples=size(short=80, full=30_000),
         deadline=None,
         derandomize=True,
         database=None,

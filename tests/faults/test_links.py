@@ -59,7 +59,7 @@ def check_whole(reports: list[Report]) -> None:
 
 @pytest.mark.parametrize("seconds", [1.0, 5.0])
 def test_a_blackhole_while_watching_loses_no_event(tmp_path: Path, seconds: float) -> None:
-    """5 s is longer than the lease, so the transport is closed and opened anew; 1 s is not."""
+    """5 s is longer than the lease, so the transport is closed and opened again; 1 s is not."""
     with line(tmp_path, speed_up=40) as proxy, connect(proxy.endpoint, robot="r1") as station:
 
         def blackhole() -> None:
@@ -97,7 +97,7 @@ def test_a_push_over_a_slow_line_that_is_cut_goes_on_where_it_was(tmp_path: Path
         assert station.mission(mission.id, 1) == mission
 
 
-def test_an_order_into_a_blackhole_is_unknown_and_comes_to_nothing_when_it_is_late(tmp_path: Path) -> None:
+def test_a_command_into_a_blackhole_is_unknown_and_comes_to_nothing_when_it_is_late(tmp_path: Path) -> None:
     with line(tmp_path) as proxy, connect(proxy.endpoint, robot="r1", timeout_s=30.0) as station:
         station.push(corridor())
         station.timeout_s = 1.5

@@ -1,4 +1,4 @@
-"""Sight along long walls, told millions of times: one pair told wrongly would be a false claim."""
+"""Sight along long walls, decided millions of times: one wrong pair would be a false claim."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests.faults.sizes import size
 from tests.planner.long_walls import RANGES, told
 
 
-def test_no_pair_of_place_and_unit_is_told_wrongly(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_pair_of_place_and_unit_is_reported_wrongly(monkeypatch: pytest.MonkeyPatch) -> None:
     seeds = range(1000, 1000 + size(short=1, full=40))
     places = size(short=20, full=60)
     found = [

@@ -1,6 +1,6 @@
 """A router that drops, holds back, replays, swaps and changes messages, and lets others answer.
 
-Whatever it does, nothing but denial of service comes of it: what a station is told, the robot has said, for
+Whatever it does, nothing but denial of service comes of it: what a station receives, the robot has said, for
 this question or lately; what a station has given up is never done later; nothing is done twice.
 """
 
@@ -145,7 +145,7 @@ def impostor(field: GuardedField, name: str) -> None:
 
 
 class Trial:
-    """A station that tries to run a mission, and what it was told by whom."""
+    """A station that tries to run a mission, and what it received from whom."""
 
     def __init__(self, site: Path, seed: int) -> None:
         self.chance = random.Random(seed)
@@ -161,7 +161,7 @@ class Trial:
         self.station.link.hear(self.field.keys.state, self.hear)
 
     def tell(self) -> None:
-        """The robot tells its state, as it does every second."""
+        """The robot reports its state, as it does every second."""
         state = self.state()
         self.said[state.boot_id, state.seq] = self.field.steady_ns()
         self.field.link.publisher(self.field.keys.state)(encode(state))

@@ -16,7 +16,7 @@ from stopgo.recordings.replay.standstills import find_standstills
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 
-RUNS = size(short=4, full=240)
+RUNS = size(short=2, full=240)
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def run_of(seed: int) -> Run:
 
 
 def truth_of(run: Run, match: Match) -> int | None:
-    """At which stop the robot really was during a halt; -1 where it did not halt at all."""
+    """At which stop the robot really was during a standstill; -1 where it was not stationary at all."""
     middle = ((match.standstill.begin_ns + match.standstill.end_ns) / 2 - BEGIN_NS) / 1e9
     seconds = (middle - run.senses.clock_offset_s) / (1 + run.senses.clock_drift)
     for halt in run.drive.halts:
@@ -71,7 +71,7 @@ def counts_of(run: Run, matches: tuple[Match, ...]) -> Counter[str]:
     return found
 
 
-def test_halts_are_matched_right_and_never_falsely() -> None:
+def test_standstills_are_matched_right_and_never_falsely() -> None:
     total: Counter[str] = Counter()
     for seed in range(RUNS):
         run = run_of(seed)
@@ -90,7 +90,7 @@ def test_offsets_without_noise_are_true_to_a_centimetre() -> None:
 
 
 def test_a_fit_to_the_stops_is_right_or_refused() -> None:
-    """Laid by its halts alone, from any frame: no halt is then called another stop's."""
+    """Laid by its standstills alone, from any frame: no standstill is then called another stop's."""
     total: Counter[str] = Counter()
     for seed in range(RUNS):
         run = run_of(seed)

@@ -53,10 +53,10 @@ def rows(monkeypatch: pytest.MonkeyPatch) -> Rows:
 
 
 @pytest.mark.parametrize("stops", range(3, 3 + size(short=1, full=3)))
-def test_a_run_through_the_gateway_is_told_as_the_vehicle_drove_it(
+def test_a_run_through_the_gateway_is_reported_as_the_vehicle_drove_it(
     tmp_path: Path, rows: Rows, stops: int
 ) -> None:
-    """Of the first stop's scans one fails, the second stop is skipped, and somebody halts the vehicle."""
+    """Of the first stop's scans one fails, the second stop is skipped, and somebody stops the vehicle."""
     mission = site_mission(stops=stops)
     faults = VehicleFaults((VehicleFault("scanner", 1),))
     with (

@@ -1,6 +1,6 @@
-"""Runs with everything going wrong, as `review` and `watch` tell them: each figure is the simulator's.
+"""Runs with everything going wrong, as `review` and `watch` report them: each figure is the simulator's.
 
-Terminal, JSON and page are read as they are shown, and compared with what a witness beside the robot saw.
+Terminal, JSON and page are read as they are shown, and compared with what a witness next to the robot saw.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from tests.mission.comparing.test_compare import planned
 from tests.recordings.replay.driving import wandering
 from tests.recordings.replay.witnessed import Troubles, Witness, run_of, tell, troubles_of
 
-SEEDS = range(size(short=2, full=100))
+SEEDS = range(size(short=1, full=100))
 NS = 2e-9
 UM = 1e-6
 ROUNDED = 0.0501
@@ -132,7 +132,7 @@ def _sight(mission: Mission, seed: int) -> Sight:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_review_and_watch_tell_the_truth_of_each_figure(
+def test_review_and_watch_report_the_truth_of_each_figure(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reading, "fatal_faults", lambda paths: {})  # what is recorded here needs no other

@@ -115,7 +115,7 @@ def test_a_robot_clock_that_was_set_back_does_not_turn_time_around() -> None:
 
 
 def test_a_station_whose_clock_is_wrong_is_obeyed_all_the_same() -> None:
-    """Orders are dated by the robot's clock as `info` tells it; the station's own date is nowhere in them."""
+    """Commands have the date of the robot's clock, as `info` reports it, and never the station's."""
     field = Field()
     station = field.station()
     station.push(corridor())

@@ -44,7 +44,7 @@ def test_a_run_that_cannot_be_read_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize("name", ["plan-2026-11-24", "plan-0.2.0"])
-def test_a_plan_of_a_former_version_tells_its_coverage(
+def test_a_plan_of_a_former_version_reports_its_coverage(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plan = unpacked(f"{name}.rrd", tmp_path)

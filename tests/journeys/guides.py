@@ -65,7 +65,7 @@ def _in_block(kind: str, text: str) -> Iterator[str]:
 
 
 @dataclass
-class Place:
+class GuideFolder:
     """A folder with the files of a guide, and robots and vehicles that its commands reach."""
 
     folder: Path
@@ -132,10 +132,10 @@ def _ctrl_c(*_: Any) -> NoReturn:
 
 
 @contextmanager
-def place(folder: Path) -> Iterator[Place]:
+def place(folder: Path) -> Iterator[GuideFolder]:
     """The folder as working folder and home, in time of its own."""
     with stepped_into(), chdir(folder), pytest.MonkeyPatch.context() as patch, ExitStack() as ends:
-        made = Place(folder, patch, ends)
+        made = GuideFolder(folder, patch, ends)
         for name in ("HOME", "XDG_STATE_HOME"):
             patch.setenv(name, str(folder))
         made.words = {"~/": f"{folder}/"}

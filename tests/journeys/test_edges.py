@@ -108,7 +108,7 @@ def test_the_front_door_of_one_command_offers_what_the_whole_one_does() -> None:
 
 
 @pytest.mark.parametrize("command", [name for name in names() if name not in NEED_NOTHING])
-def test_a_command_that_is_told_nothing_says_what_it_needs(
+def test_a_command_without_options_says_what_it_needs(
     command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([command]) == 2
@@ -148,7 +148,7 @@ def test_print_config_answers_in_json_as_in_toml(capsys: pytest.CaptureFixture[s
     assert {table: {k: v for k, v in of.items() if v is not None} for table, of in told.items()} == toml
 
 
-def test_a_name_longer_than_any_is_told_by_its_beginning(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_name_longer_than_any_is_reported_by_its_beginning(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "x" * 5000]) == 2
     line = capsys.readouterr().err
     assert line.startswith(f"stopgo: {'x' * 80}…")

@@ -21,7 +21,7 @@ from stopgo.planner.floors.ifc import loading
 from tests.batches.inline_engine import InlineEngine
 from tests.bridge.guarded import keys_of_site
 from tests.called import stopgo
-from tests.journeys.guides import PAGES, ROOT, VEHICLE, Place, blocks_of, commands_of, place
+from tests.journeys.guides import PAGES, ROOT, VEHICLE, GuideFolder, blocks_of, commands_of, place
 from tests.planner.floors.ifc.conftest import _in_process
 from tests.planner.floors.ifc.house import House
 from tests.planner.floors.ifc.house import two_rooms as house_of_two_rooms
@@ -47,6 +47,8 @@ ELSEWHERE = {
     r"stopgo conform station": "tests a third-party station: tests/bridge/conform/test_conform_station.py",
     r"stopgo site .*--listen": "needs an address of a local network: tests/site/test_web_server.py",
     r"python docs/query_runs.py": "tests/recordings/test_query.py runs it",
+    r"(sudo apt|python3 -m venv|source) ": "prepares a computer with ROS 2",
+    r"~/stopgo/bin/stopgo robot": "needs ROS 2: tests/ros2, in make ros2",
     r"cat ": "prints a file of the guide",
 }
 """Commands that do not run here, and the reason."""
@@ -72,7 +74,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def guide(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Place]:
+def guide(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[GuideFolder]:
     """A folder with the files that the guides name, outside of which no command writes."""
     shutil.copytree(files, tmp_path, dirs_exist_ok=True)
     shutil.copytree(files / "plan", tmp_path / "out")
@@ -86,7 +88,7 @@ def guide(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
         yield made
 
 
-def with_models(guide: Place) -> None:
+def with_models(guide: GuideFolder) -> None:
     """A model of two storeys whose parts were built one after another, and a robot's map."""
     house = house_of_two_rooms_on_time()
     level = house.storey("Level 1", 3.3)
@@ -106,7 +108,7 @@ def _room(house: House, level: object, z: float) -> None:
     house.box("IfcSpace", "upper room", (0.2, 0.2, z, 6.2, 4.2, z + 2.7), level)
 
 
-def with_keys(guide: Place) -> None:
+def with_keys(guide: GuideFolder) -> None:
     """Keys of a robot and its operators, and a robot to reach."""
     keys_of_site(guide.folder / "keys")
     shutil.copytree(guide.folder / "keys" / "r1", guide.folder / "etc")
@@ -114,13 +116,13 @@ def with_keys(guide: Place) -> None:
     (guide.folder / "robots.toml").write_text('robots = ["r1", "r2", "r3"]\n')
 
 
-def with_robot(guide: Place) -> None:
+def with_robot(guide: GuideFolder) -> None:
     """A robot with keys, and one without."""
     with_keys(guide)
     assert guide.run("stopgo robot --name r1 --state r1.state --speed-up 20").returncode == 0
 
 
-def with_vehicle(guide: Place, *, has_origin: bool = True) -> None:
+def with_vehicle(guide: GuideFolder, *, has_origin: bool = True) -> None:
     """A simulated rover at the start of the mission."""
     mission = read(guide.folder / "mission.json")
     at = Pose(x=mission.start.x, y=mission.start.y, heading=mission.start.heading)
@@ -129,13 +131,13 @@ def with_vehicle(guide: Place, *, has_origin: bool = True) -> None:
     guide.ends.enter_context(vehicle_on(VEHICLE, setup))
 
 
-def with_gateway(guide: Place) -> None:
+def with_gateway(guide: GuideFolder) -> None:
     with_keys(guide)
     with_vehicle(guide)
     guide.words["mavlink:serial:/dev/ttyAMA0:921600"] = "mavlink:udpout:127.0.0.1:14550"
 
 
-def with_vehicles(guide: Place) -> None:
+def with_vehicles(guide: GuideFolder) -> None:
     """A robot, and the guide's roster of vehicles."""
     with_robot(guide)
     with_vehicle(guide)
@@ -145,15 +147,15 @@ def with_vehicles(guide: Place) -> None:
     (guide.folder / "rover.key").chmod(0o600)
 
 
-def with_radio(guide: Place) -> None:
+def with_radio(guide: GuideFolder) -> None:
     guide.words["serial:/dev/ttyAMA1:57600"] = "udpin:127.0.0.1:14551"
 
 
-def with_parameters(guide: Place) -> None:
+def with_parameters(guide: GuideFolder) -> None:
     (guide.folder / "plan.toml").write_text("[robot]\nspeed = 0.4\n")
 
 
-def with_plugins(guide: Place) -> None:
+def with_plugins(guide: GuideFolder) -> None:
     """The modules of the guide, in the working folder."""
     lab, robot, *_ = blocks_of("how-to/plugins.md", "python")
     (guide.folder / "my_lab.py").write_text(lab, encoding="utf-8")
@@ -162,7 +164,7 @@ def with_plugins(guide: Place) -> None:
     guide.ends.callback(lambda: [sys.modules.pop(name, None) for name in ("my_lab", "my_robot")])
 
 
-def with_campus(guide: Place) -> None:
+def with_campus(guide: GuideFolder) -> None:
     """The guide's two files in one, with the floors and paths that they name."""
     batch, day = blocks_of("how-to/campus.md", "toml")
     (guide.folder / "plans.toml").write_text(f"{batch}\n{day}", encoding="utf-8")
@@ -178,14 +180,14 @@ def house_of_two_rooms_on_time() -> House:
     return scheduled(house_of_two_rooms(), WORK | {"middle": ("2024-05-06", "2024-05-17")})
 
 
-def with_runs(guide: Place) -> None:
+def with_runs(guide: GuideFolder) -> None:
     """The recording of a run of the plan."""
     write_field(guide.folder / "field.rrd", read(guide.folder / "mission.json"))
     for name in ("plan.rrd", "field.rrd"):
         shutil.copy(guide.folder / name, guide.folder / "recordings")
 
 
-def with_log(guide: Place) -> None:
+def with_log(guide: GuideFolder) -> None:
     """The log of a robot that has driven a mission on the sample floor."""
     shutil.copy(ROOT / "recordings" / "samples" / "office.dxf", guide.folder)
     assert guide.run("stopgo plan office.dxf -o plan --coverage 0.3").returncode == 0
@@ -194,16 +196,17 @@ def with_log(guide: Place) -> None:
     write_bag(guide.folder / "field.bag", odometry_rows(poses, ros2=False, step_ns=4 * 10**8))
 
 
-PREPARED: dict[str, Callable[[Place], None]] = {
+PREPARED: dict[str, Callable[[GuideFolder], None]] = {
     "floors": with_models, "conform": with_robot, "deployment": with_keys, "gateway": with_gateway,
     "replay": with_log, "push-to-autopilot": lambda guide: with_vehicle(guide, has_origin=False),
     "run-on-autopilot": with_vehicle, "tunnel": with_radio, "plugins": with_plugins, "campus": with_campus,
-    "review": with_runs, "exports": with_parameters, "README": with_robot, "site": with_vehicles,
+    "review": with_runs, "exports": with_parameters, "nav2": with_robot, "README": with_robot,
+    "site": with_vehicles,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands_of(page)], ids=lambda page: page.stem)
-def test_the_commands_of_a_guide_run_as_they_are_written(page: Path, guide: Place) -> None:
+def test_the_commands_of_a_guide_run_as_they_are_written(page: Path, guide: GuideFolder) -> None:
     PREPARED.get(page.stem, lambda guide: None)(guide)
     for command in commands_of(page):
         if any(re.match(pattern, command) for pattern in ELSEWHERE):

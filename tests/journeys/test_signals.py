@@ -1,4 +1,4 @@
-"""A command that is asked to end leaves by its own way out, and one that nobody reads ends silently."""
+"""A command that is asked to end leaves by its own exit, and one that nobody reads ends silently."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_signal_closes_what_is_open(number: signal.Signals) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "closed\n", "")
 
 
-def test_a_second_ctrl_c_on_the_way_out_leaves_no_traceback() -> None:
+def test_a_second_ctrl_c_during_the_exit_leaves_no_traceback() -> None:
     done = process("try:\n    hit()\nfinally:\n    hit()")
     assert (done.returncode, done.stderr) == (130, "stopgo: stopped by Ctrl-C\n")
 
@@ -119,7 +119,7 @@ def test_a_closed_pipe_ends_a_command_silently() -> None:
     assert told.returncode == 141
 
 
-def test_a_broken_pipe_that_is_not_the_output_is_told() -> None:
+def test_a_broken_pipe_that_is_not_the_output_is_reported() -> None:
     done = process("raise BrokenPipeError(32, 'Broken pipe')")
     assert (done.returncode, done.stderr) == (2, "stopgo: output: Broken pipe\n")
 

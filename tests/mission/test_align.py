@@ -65,7 +65,7 @@ def test_a_point_that_was_noted_wrongly_has_the_largest_residual() -> None:
         ([(0, 0), (8, 0), (8, 6)], [(0, 0), (-8, 0), (-8, 6)], "the map is mirrored"),
     ],
 )
-def test_what_tells_no_turn_is_refused(
+def test_what_shows_no_turn_is_refused(
     first: list[tuple[float, float]], second: list[tuple[float, float]], said: str
 ) -> None:
     with pytest.raises(InputError, match=said):

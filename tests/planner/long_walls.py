@@ -19,7 +19,7 @@ BEYOND = 1.0
 
 
 class Observed(NamedTuple):
-    """Pairs of place and unit that were looked at, and how many of all pairs were told wrongly."""
+    """Pairs of place and unit that were looked at, and how many of all pairs were wrong."""
 
     pairs: int
     by_compiled: int
@@ -27,7 +27,7 @@ class Observed(NamedTuple):
 
 
 def told(seed: int, *, reach: float, places: int, monkeypatch: pytest.MonkeyPatch) -> Observed:
-    """Let both kernels tell what is seen on one floor, and hold them against exact sight lines."""
+    """Let both kernels compute what is seen on one floor, and hold them against exact sight lines."""
     world = long_walls(seed, reach=reach, places=places)
     truth = world.by_force(reach)
     wrong = [int((world.by_kernel(reach) != truth).sum())]
@@ -57,7 +57,7 @@ def long_walls(seed: int, *, reach: float, places: int) -> World:
 
 
 def _wall(random: np.random.Generator, turn: float, *, across: float) -> shapely.LineString:
-    """A wall whose direction is `turn`, to within 1°; its middle lies `across` metres beside the origin."""
+    """A wall whose direction is `turn`, to within 1°; its middle lies `across` metres off the origin."""
     half = 10 ** random.uniform(1, 3) / 2
     angle = turn + random.uniform(-1, 1) * math.radians(1)
     along = np.array([math.cos(angle), math.sin(angle)])

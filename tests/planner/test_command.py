@@ -174,7 +174,7 @@ def test_planning_again_gives_the_same_mission(run: Callable[..., Run], floor: P
     assert (tmp_path / "two" / "mission.json").read_bytes() == before
 
 
-def test_a_narrow_door_is_told_of_and_strict_says_no(run: Callable[..., Run], tmp_path: Path) -> None:
+def test_a_narrow_door_is_reported_and_strict_says_no(run: Callable[..., Run], tmp_path: Path) -> None:
     narrow = drawn(tmp_path / "narrow.dxf", door=0.6)
     code, out, _ = run("plan", narrow, "-o", tmp_path / "out", "--json")
     told = json.loads(out)
@@ -201,7 +201,7 @@ def test_all_parts_are_planned_into_files_of_their_own(run: Callable[..., Run], 
 SECOND = {"mission-2.json", "plan-2.rrd", "plan-2.svg", "coverage-2.json"}
 
 
-def test_what_another_plan_left_of_a_second_part_is_renamed_and_told(
+def test_what_another_plan_left_of_a_second_part_is_renamed_and_reported(
     run: Callable[..., Run], tmp_path: Path
 ) -> None:
     narrow, out = drawn(tmp_path / "narrow.dxf", door=0.6), tmp_path / "out"
@@ -273,7 +273,7 @@ ODD: dict[str, Draw] = {
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_an_odd_drawing_is_planned(run: Callable[..., Run], name: str, tmp_path: Path) -> None:
+def test_an_anomalous_drawing_is_planned(run: Callable[..., Run], name: str, tmp_path: Path) -> None:
     code, out, error = run("plan", drawn(tmp_path / "odd.dxf", ODD[name]), "-o", tmp_path / "out", "--json")
     assert (code, error) == (0, "")
     told = json.loads(out)

@@ -131,7 +131,7 @@ def closet(depth: float) -> tuple[Element, ...]:
     )
 
 
-def test_a_small_room_beside_a_large_one_gets_a_candidate() -> None:
+def test_a_small_room_next_to_a_large_one_gets_a_candidate() -> None:
     floor = two_rooms(0.9)
     cell = (
         wall("a", box(6.4, 0, 6.5, 1.5)),
@@ -200,7 +200,7 @@ def test_nothing_is_left_out_of_a_connected_floor() -> None:
     assert told_of(two_rooms(0.9)) == {}
 
 
-def test_a_room_behind_a_narrow_door_is_told_of_with_the_door() -> None:
+def test_a_room_behind_a_narrow_door_is_reported_with_the_door() -> None:
     told = told_of(two_rooms(0.6))
     assert len(told) == 1
     (why,) = told.values()
@@ -237,7 +237,7 @@ def test_a_gap_that_ends_within_the_floor_is_named() -> None:
     assert "a gap of 0.060 m in the floor at (4.03," in next(iter(why.values()))
 
 
-def test_a_strip_between_two_gaps_is_told_with_one_of_them() -> None:
+def test_a_strip_between_two_gaps_is_reported_with_one_of_them() -> None:
     strip = (box(0, 0, 4, 4), box(4.1, 0, 4.7, 4), box(4.8, 0, 8, 4))
     floor = floor_of(
         *strip,
@@ -250,7 +250,7 @@ def test_a_strip_between_two_gaps_is_told_with_one_of_them() -> None:
     )
 
 
-def test_each_of_three_slabs_is_told_with_its_gap() -> None:
+def test_each_of_three_slabs_is_reported_with_its_gap() -> None:
     three = (box(0, 0, 4, 4), box(4.1, 0, 7, 4), box(7.2, 0, 9, 4))
     told = told_of(floor_of(*three, elements=(shell(0, 0, 9, 4),)))
     assert "a gap of 0.100 m in the floor at (4.05," in told["floor 2"]
@@ -263,7 +263,7 @@ def test_a_wall_between_slabs_is_no_gap() -> None:
     assert "gap" not in next(iter(told.values()))
 
 
-def test_a_room_too_small_for_d_sec_is_told_of() -> None:
+def test_a_room_too_small_for_d_sec_is_reported() -> None:
     cell = (
         wall("a", box(6.4, 0, 6.5, 1.2)),
         wall("b", box(6.5, 1.2, 7.1, 1.3)),
@@ -297,7 +297,7 @@ def test_floor_in_no_room_is_planned_as_a_room_without_a_name(kind: str) -> None
     assert {stop.x < 4 for stop in mission.stops} == {True, False}
 
 
-def test_floor_in_no_room_behind_a_narrow_door_is_told_of_with_the_door() -> None:
+def test_floor_in_no_room_behind_a_narrow_door_is_reported_with_the_door() -> None:
     floor = two_rooms(0.6)
     told = told_of(replace(floor, rooms=floor.rooms[:1]))
     assert told["unnamed 1"].startswith("in another part of the floor (door d: 0.600 m clear")
@@ -309,7 +309,7 @@ def test_a_start_as_near_to_a_wall_as_the_robot_fits_is_taken() -> None:
 
 
 @pytest.mark.parametrize("degrees", [0.0, 7.0, 17.0, 45.0])
-def test_every_candidate_on_a_floor_edge_has_a_way(degrees: float) -> None:
+def test_every_candidate_on_a_floor_edge_has_a_path(degrees: float) -> None:
     floor = moved(floor_of(box(0, 0, 8, 4), elements=(column("c", 4, 2, 0.6),)), turned(degrees))
     check_candidates(candidates(navigable(floor, Settings(edge=0.0))))
 

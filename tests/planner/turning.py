@@ -128,7 +128,7 @@ class MovableDrawing:
 
     @cached_property
     def positions(self) -> FloatArray:
-        """Points (n, 2) beside candidates of the drawing as it was drawn, from all over it.
+        """Points (n, 2) near candidates of the drawing as it was drawn, from all over it.
 
         Candidates themselves stand in line with walls, and what is edge-on is seen or not as rounding has it.
         """

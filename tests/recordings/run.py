@@ -1,4 +1,4 @@
-"""A run as a robot would tell it: every report of a mission driven as planned, 3 cm to the left."""
+"""A run as a robot would report it: every report of a mission driven as planned, 3 cm to the left."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ OFFSET = 0.03
 
 
 def reports(mission: Mission, *, run: str = RUN) -> Iterator[StateReport | PoseReport | AnyEvent]:
-    """Everything the robot tells, in order; poses are those of the planned drive."""
+    """Everything the robot reports, in order; poses are those of the planned drive."""
     teller = _Teller(mission, run)
     drive = planned_drive(mission)
     poses = list(zip(drive.seconds, drive.poses, strict=True))

@@ -21,7 +21,7 @@ from tests.recordings import world
 from tests.recordings.reading import cells, static
 
 
-def test_candidates_stops_and_coverage_agree_wherever_they_are_told(tmp_path: Path) -> None:
+def test_candidates_stops_and_coverage_agree_wherever_they_are_reported(tmp_path: Path) -> None:
     nouns = world.nouns_at()
     route, mission = nouns[5], nouns[-1]
     figures = figures_of(route)

@@ -36,7 +36,7 @@ def example() -> ModuleType:
 
 @pytest.mark.rerun_threads
 @pytest.mark.filterwarnings("ignore")
-def test_the_example_tells_every_run_and_stop(
+def test_the_example_reports_every_run_and_stop(
     folder: Path, mission: Mission, capsys: pytest.CaptureFixture[str]
 ) -> None:
     example().main(folder)

@@ -93,6 +93,15 @@ class Site:
             time.sleep(0.1)
         return state
 
+    def other_node(self, module: str) -> str:
+        """Run another ROS node to its end; what it prints."""
+        ended = subprocess.run(
+            [str(self.environment["STOPGO_ROS2_PYTHON"]), "-m", module],
+            env=self.environment, cwd=HERE.parents[1], capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert ended.returncode == 0, ended.stderr
+        return ended.stdout
+
     def reviewed(self) -> dict[str, list[dict[str, Any]]]:
         """The report on the run, once it has ended."""
         recording = str(self.folder / "field.rrd")
@@ -153,12 +162,14 @@ def test_a_killed_agent_takes_up_its_run_and_another_clients_goal_holds_it(tmp_p
         robot.wait()
         site.robot()
         assert site.until(lambda state: "state" in state)["state"] == "PAUSED"
+        seen = json.loads(site.other_node("tests.ros2.run_observer"))
+        assert (seen["state"]["state"], seen["state"]["done"]) == ("PAUSED", ["s1"])
+        assert seen["plan"][-1] == [0.0, 0.0]
+        assert (seen["frame"], seen["stops"], seen["diagnostics"]) == ("map", ["s1", "s2", "s3"], "PAUSED")
+        assert seen["resume"] == "resume is not taken from ROS; set commands = true in ros2.toml"
+        assert "PAUSED" in seen["pause"]
         assert site.stopgo("resume").returncode == 0
-        foreign = subprocess.run(
-            [str(site.environment["STOPGO_ROS2_PYTHON"]), "-m", "tests.ros2.foreign_client"],
-            env=site.environment, cwd=HERE.parents[1], capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert foreign.returncode == 0, foreign.stderr
+        site.other_node("tests.ros2.foreign_client")
         site.until(lambda state: state.get("state") == "HELD")
         assert site.stopgo("retry").returncode == 0
         assert site.until(lambda state: state.get("state") == "FINISHED")["done"] == ["s1", "s2", "s3"]

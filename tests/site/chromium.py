@@ -132,7 +132,9 @@ class Tab:
 class Browser:
     """A browser that is running."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, profile: str) -> None:
+        self.profile = profile
+        """Folder of its profile, which the command lines of its processes name."""
         self._base = f"http://127.0.0.1:{port}"
 
     def tab(self, address: str = "about:blank") -> Tab:
@@ -157,7 +159,8 @@ def browser(language: str = "en") -> Iterator[Browser]:
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         try:
-            yield Browser(_port(Path(profile) / "DevToolsActivePort", lambda: process.poll() is None))
+            port = _port(Path(profile) / "DevToolsActivePort", lambda: process.poll() is None)
+            yield Browser(port, profile)
         finally:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()

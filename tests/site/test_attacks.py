@@ -24,14 +24,14 @@ def parts(tmp_path: Path) -> SiteParts:
     return parts_of(tmp_path)
 
 
-def test_the_own_page_may_order(parts: SiteParts) -> None:
+def test_the_own_page_may_send_commands(parts: SiteParts) -> None:
     assert Page(parts).post("/api/stop", STOP).status_code == 200
 
 
 @pytest.mark.parametrize(
     "origin", ["https://evil.example", "null", "http://127.0.0.1:9999", "http://localhost:9999", None]
 )
-def test_a_foreign_page_in_the_same_browser_orders_nothing(parts: SiteParts, origin: str | None) -> None:
+def test_a_foreign_page_in_the_same_browser_commands_nothing(parts: SiteParts, origin: str | None) -> None:
     """Another port of this machine is foreign, too: the cookie goes there, so it does not count alone."""
     answer = Page(parts).post("/api/stop", STOP, Origin=origin)
     assert answer.status_code == 403
@@ -55,7 +55,7 @@ def test_a_foreign_form_cannot_be_sent(parts: SiteParts) -> None:
         assert answer.status_code == 415
 
 
-def test_a_stolen_cookie_orders_nothing(parts: SiteParts) -> None:
+def test_a_stolen_cookie_commands_nothing(parts: SiteParts) -> None:
     """A server on another port of this machine may see the cookie; the page's key it never sees."""
     page = Page(parts)
     for key in ("", "x", "0" * 43):
@@ -165,7 +165,7 @@ def test_nothing_changes_by_get(parts: SiteParts) -> None:
     assert all("GET" not in (one.methods or ()) for one in routes if one.path in posts)
 
 
-def test_a_viewers_page_orders_nothing(parts: SiteParts) -> None:
+def test_a_viewers_page_commands_nothing(parts: SiteParts) -> None:
     page = Page(parts, role="viewer")
     assert page.get("/api/me").json()["role"] == "viewer"
     for path in ("/api/stop", "/api/invitations", "/api/robots/r1/orders", "/api/robots/r1/push"):
@@ -192,7 +192,7 @@ def test_every_answer_has_the_headers_of_safety(parts: SiteParts) -> None:
     assert all(word in made for word in ("httponly", "samesite=strict", "path=/"))
 
 
-def test_an_unknown_robot_gets_no_order(parts: SiteParts) -> None:
+def test_an_unknown_robot_gets_no_command(parts: SiteParts) -> None:
     answer = Page(parts).post("/api/robots/r9/orders", {"id": "1", "verb": "start"})
     assert (answer.status_code, answer.json()["error"]) == (400, "robot 'r9': not on this site")
     assert isinstance(parts.orders, RobotOrders)

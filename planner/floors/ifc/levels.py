@@ -28,6 +28,9 @@ LIKE_LEVEL = 0.3
 OPEN_ABOVE = 3.0
 """Height that is taken above the topmost floor."""
 
+_OF_ROOMS = ("walls", "doors", "windows", "spaces", "stairs", "slabs")
+"""Roles of what makes the rooms of a storey."""
+
 
 @dataclass(frozen=True)
 class Level:
@@ -40,8 +43,8 @@ class Level:
     """Of the next floor above."""
     storey: str | None = None
     """GlobalId; None where the user names a level and not a storey."""
-    contained: int = 0
-    """Products that the model places in it."""
+    contained: tuple[int, int] = (0, 0)
+    """Products that the model places in it: what makes rooms, and all."""
     also: tuple[str, ...] = ()
     """Names of the storeys merged into it: they choose it as well."""
     merged: tuple[str, ...] = ()
@@ -57,7 +60,7 @@ def levels_of(model: Model) -> tuple[Level, ...]:
     """Every storey with its floor's level, from below; storeys of one floor are merged."""
     surfaces = surfaces_of(model)
     found = [_level(storey, surfaces, model) for storey in model.described.storeys]
-    found.sort(key=lambda level: (level.z, -level.contained, level.name, level.storey or ""))
+    found.sort(key=lambda level: (level.z, _fullest_first(level), level.name, level.storey or ""))
     return tuple(_with_names(_with_ceilings(_merged(found))))
 
 
@@ -76,8 +79,9 @@ def walked_on(model: Model) -> list[Surface]:
 
 
 def _level(storey: Storey, surfaces: tuple[FloatArray, FloatArray], model: Model) -> Level:
-    z = floor_near(storey.elevation, surfaces)
-    contained = sum(product.storey == storey.global_id for product in model.described.products)
+    z = round(floor_near(storey.elevation, surfaces), 6) + 0.0  # no minus zero
+    own = [item.role for item in model.described.products if item.storey == storey.global_id]
+    contained = (sum(role in _OF_ROOMS for role in own), len(own))
     moved = z - storey.elevation
     notes = (f"its slab lies {moved:+.2f} m from the storey's level",) if abs(moved) > SAME else ()
     return Level(legible(storey.name), z, np.inf, storey.global_id, contained, notes=notes)
@@ -101,7 +105,7 @@ def _merged(levels: Iterable[Level]) -> list[Level]:
     kept: list[Level] = []
     for level in levels:
         if kept and level.z - kept[-1].z < SAME:
-            main, other = sorted((kept[-1], level), key=lambda item: -item.contained)
+            main, other = sorted((kept[-1], level), key=_fullest_first)
             note = f"storey '{other.name}' is the same floor"
             also = (*main.also, *other.also, *filter(None, (other.name,)))
             merged = (*main.merged, *other.merged, *filter(None, (other.storey,)))
@@ -109,6 +113,11 @@ def _merged(levels: Iterable[Level]) -> list[Level]:
         else:
             kept.append(level)
     return kept
+
+
+def _fullest_first(level: Level) -> tuple[int, int]:
+    """Sort key: the storey that most rooms are made of, before those of rafters and of slabs' edges."""
+    return -level.contained[0], -level.contained[1]
 
 
 def _with_names(levels: list[Level]) -> list[Level]:

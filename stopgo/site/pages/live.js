@@ -79,8 +79,25 @@ async function drawFloor(view) {
   const [done, skipped] = [new Set(coverage?.done ?? []), new Set(coverage?.skipped ?? [])];
   fill(view.layers.targets, targetPaths(drawing, done, skipped));
   const state = get("robot", focus) ?? {};
-  fill(view.layers.stops, drawing.stops.map((stop) => stopMark(drawing, stop, stopState(stop, state, done, skipped), view.size)));
+  drawStops(view, drawing, (stop) => stopState(stop, state, done, skipped));
   drawShares(view, coverage?.coverage, done, skipped, drawing);
+}
+
+// Only marks of stops whose state has changed are made again: a mission may have hundreds.
+function drawStops(view, drawing, stateOf) {
+  if (view.markedFor !== view.shown) {
+    view.markedFor = view.shown;
+    view.stops = new Map();
+    fill(view.layers.stops);
+  }
+  for (const stop of drawing.stops) {
+    const [state, before] = [stateOf(stop), view.stops.get(stop.id)];
+    if (before?.state === state) continue;
+    const mark = stopMark(drawing, stop, state, view.size);
+    if (before) before.mark.replaceWith(mark);
+    else view.layers.stops.append(mark);
+    view.stops.set(stop.id, { state, mark });
+  }
 }
 
 function stopState(stop, state, done, skipped) {

@@ -118,7 +118,7 @@ def test_what_is_fetched_opens_as_a_file(suffix: str, run: Run, mission: Mission
 @pytest.mark.parametrize(
     ("profile", "radius"), [("ardupilot", "WP_RADIUS 0.02 m"), ("px4", "NAV_ACC_RAD 0.5 m")]
 )
-def test_a_push_tells_first_what_the_vehicle_makes_of_the_tolerances(
+def test_a_push_reports_first_what_the_vehicle_makes_of_the_tolerances(
     run: Run, profile: str, radius: str
 ) -> None:
     with vehicle(profile) as url:
@@ -182,7 +182,7 @@ def test_a_lost_last_ack_is_no_failure(run: Run, mission: Mission) -> None:
         assert run("push", "MISSION", "--mavlink", str(url))[0] == 0
 
 
-def test_a_restart_during_the_upload_is_told(run: Run, mission: Mission) -> None:
+def test_a_restart_during_the_upload_is_reported(run: Run, mission: Mission) -> None:
     with at_site(mission, "ardupilot", "reboot-upload@5") as url:
         with reached(url, vehicle=1) as peer, peer.waiting("ATTITUDE") as waiting:
             while waiting.get(10.0).time_boot_ms < 3000:  # longer than it is away
@@ -251,7 +251,7 @@ class Stalls(Scripted):
 
 
 @pytest.mark.real_time
-def test_ctrl_c_cancels_and_tells_what_is_on_the_vehicle(tmp_path: Path, mission: Mission) -> None:
+def test_ctrl_c_cancels_and_reports_what_is_on_the_vehicle(tmp_path: Path, mission: Mission) -> None:
     write(with_digest(mission), tmp_path / "mission.json")
     with Stalls(held(stops(3))) as stalling:
         command = [

@@ -106,7 +106,7 @@ def test_whole_numbers_of_px4_stand_in_the_float_byte_by_byte() -> None:
         (0b0001_1000, False),
     ],
 )
-def test_an_estimator_has_a_place_to_tell(flags: int, knows: bool) -> None:
+def test_an_estimator_has_a_position_to_report(flags: int, knows: bool) -> None:
     assert has_position(flags) is knows
 
 
@@ -144,7 +144,7 @@ def test_an_origin_that_is_of_no_use_to_the_vehicle_is_wrong(capsys: pytest.Capt
     assert told["origin"]["do"].startswith("restart it")
 
 
-def test_nobody_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nobody_there_is_reported_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "--mavlink", f"udpout:127.0.0.1:{free_port()}", "--timeout", "0.3"]) == 1
     assert "no vehicle within 0.3 s" in capsys.readouterr().out
     assert main(["doctor", "--mavlink", "nonsense"]) == 2
@@ -199,7 +199,7 @@ def test_it_prints_what_the_vehicle_can_do(
     assert [words for words in expected if words not in "\n".join(can)] == []
 
 
-def test_a_vehicle_without_script_engine_or_timeout_is_told_so() -> None:
+def test_a_vehicle_without_script_engine_or_timeout_is_reported_so() -> None:
     assert script_check(ARDUPILOT, {"SCR_ENABLE": 0.0}).action == "for it set SCR_ENABLE to 1, and restart"
     assert "is not reported" in script_check(ARDUPILOT, {}).result
     assert "for 3 s, which is fixed" in alone_text(ARDUPILOT, {})

@@ -125,12 +125,12 @@ def test_ctrl_c_in_watch_leaves_the_vehicle_alone(vehicle: Vehicle) -> None:
     assert vehicle.run("watch").returncode == 1
 
 
-def test_options_of_the_other_way_are_refused(vehicle: Vehicle) -> None:
+def test_options_of_the_other_link_are_refused(vehicle: Vehicle) -> None:
     for verb, *options in (("start", "--robot", "r1"), ("watch", "--site", "hall"), ("pause", "--keys", "k")):
         told = vehicle.run(verb, *options)
         assert told.returncode == 2 and "has no meaning with --mavlink" in told.stderr
 
 
-def test_an_unsigned_way_out_of_this_machine_is_refused(tmp_path: Path) -> None:
+def test_an_unsigned_link_out_of_this_machine_is_refused(tmp_path: Path) -> None:
     told = stopgo("start", "--mavlink", "udpout:192.0.2.1:14550", "--state", str(tmp_path))
     assert told.returncode == 2 and "--signing-key" in told.stderr

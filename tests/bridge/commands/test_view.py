@@ -1,4 +1,4 @@
-"""Watching with the viewer: it opens once, on what is being recorded, or the reason is told."""
+"""Watching with the viewer: it opens once, on what is being recorded, or the reason is reported."""
 
 from __future__ import annotations
 

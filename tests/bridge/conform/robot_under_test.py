@@ -29,7 +29,7 @@ from tests.bridge.world import EXACT
 
 
 class RobotUnderTest:
-    """A whole robot on a memory link, which can be started anew; subclasses are broken on purpose."""
+    """A whole robot on a memory link, which can be started again; subclasses are broken on purpose."""
 
     controller: type[Controller] = Controller
     agent: type[Agent] = Agent

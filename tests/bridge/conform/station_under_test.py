@@ -24,7 +24,7 @@ KEYS = KeyExpressions("r1")
 
 
 class StationUnderTest:
-    """Our own station, told what to do as by a command; subclasses are broken on purpose."""
+    """Our own station, which acts as by a command; subclasses are broken on purpose."""
 
     station: type[Station] = Station
 

@@ -371,7 +371,7 @@ def test_a_robot_that_signs_or_judges_wrongly_is_found(
     assert why in found.reason
 
 
-def test_a_robot_that_stops_answering_is_told_as_gone_and_left_alone() -> None:
+def test_a_robot_that_stops_answering_is_reported_as_gone_and_left_alone() -> None:
     robot = RobotUnderTest()
     with booted(robot):
         bench = robot.bench()

@@ -151,7 +151,7 @@ def closed(line: socket.socket) -> bool:
         return True
 
 
-def test_a_holder_is_admitted_and_large_data_goes_both_ways(robot: Robot) -> None:
+def test_a_holder_is_admitted_and_large_data_goes_in_both_directions(robot: Robot) -> None:
     with robot.reached() as line:
         sent = bytes(range(256)) * (BYTES // 256)
         sending = threading.Thread(target=line.sendall, args=(sent,))
@@ -415,7 +415,7 @@ def robot_of(site: Path, state: Path) -> Iterator[tuple[Field, str]]:
             yield field, endpoint
 
 
-def test_a_stop_of_a_new_station_is_answered_beside_floods(site: Path, tmp_path: Path) -> None:
+def test_a_stop_of_a_new_station_is_answered_during_floods(site: Path, tmp_path: Path) -> None:
     """More connections than there may be, from as many addresses: silent, or stopped in their handshake."""
     with ExitStack() as opened:
         _, endpoint = opened.enter_context(robot_of(site, tmp_path))

@@ -38,7 +38,7 @@ def test_a_certificate_names_its_holder_and_its_role_apart(site: Path) -> None:
     assert (keys.holder.role, keys.holder.name) == ("robot", "r1")
 
 
-def test_keys_of_an_older_kind_are_refused_with_the_way_out_and_can_be_renewed(
+def test_keys_of_an_older_kind_are_refused_with_the_remedy_and_can_be_renewed(
     site: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = authority._subject
@@ -56,7 +56,7 @@ def test_keys_of_an_older_kind_are_refused_with_the_way_out_and_can_be_renewed(
     assert read_keys(site / "r9", now=now_utc()).holder.name == "r9"
 
 
-def test_new_keys_beside_old_ones_until_those_are_revoked(site: Path) -> None:
+def test_new_keys_next_to_old_ones_until_those_are_revoked(site: Path) -> None:
     robot = Certificates(read_keys(site / "r1", now=now_utc()), now_utc)
     before = read_keys(site / "alice", now=now_utc())
     rotate(site, "alice", now=now_utc())
@@ -112,7 +112,7 @@ def test_what_is_revoked_stays_so_after_a_restart_with_an_older_list(site: Path,
         read_keys(site / "r1", now=now_utc(), state=state)
 
 
-def test_a_kept_list_that_is_damaged_is_told_and_another_authoritys_is_not_looked_at(
+def test_a_kept_list_that_is_damaged_is_reported_and_another_authoritys_is_not_looked_at(
     site: Path, tmp_path: Path
 ) -> None:
     keys, state = read_keys(site / "r1", now=now_utc()), tmp_path / "state"
@@ -212,7 +212,7 @@ def test_the_commands_make_list_renew_and_revoke_keys(
     assert "not of robot r1" in capsys.readouterr().err
 
 
-def test_a_wrong_authority_and_a_wrong_address_are_told_from_a_robot_that_is_off(
+def test_a_wrong_authority_and_a_wrong_address_are_distinguished_from_a_robot_that_is_off(
     site: Path, tmp_path: Path
 ) -> None:
     init_site(tmp_path / "other", now=now_utc())

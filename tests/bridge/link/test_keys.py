@@ -49,7 +49,7 @@ def certificates(site: Path, *, now: datetime = NOW) -> Certificates:
     return Certificates(read_keys(site / "site" / "r1", now=NOW), lambda: now)
 
 
-def test_a_certificate_tells_who_holds_it(site: Path) -> None:
+def test_a_certificate_reports_who_holds_it(site: Path) -> None:
     holder, _ = certificates(site).holder(read_keys(site / "site" / "alice", now=NOW).der)
     assert (holder.role, holder.name) == ("station", "alice")
 
@@ -84,7 +84,7 @@ def test_an_expired_certificate_is_not_trusted(site: Path) -> None:
         )
 
 
-def test_only_stations_order_and_only_under_their_own_name(site: Path) -> None:
+def test_only_stations_command_and_only_under_their_own_name(site: Path) -> None:
     def request(who: str) -> Request:
         holder, _ = certificates(site).holder(read_keys(site / "site" / who, now=NOW).der)
         return Request("k", b"m", holder=holder)
@@ -260,7 +260,7 @@ def left_when_the_robots_ends(site: Path, folder: Path, lasts: int) -> bool:
         end_robot(robot)
 
 
-def test_a_viewer_that_orders_is_refused_and_a_forged_name_is_not_believed(
+def test_a_viewer_that_commands_is_refused_and_a_forged_name_is_not_believed(
     site: Path, tmp_path: Path
 ) -> None:
     keys = KeyExpressions("r1")
@@ -282,7 +282,7 @@ def test_a_viewer_that_orders_is_refused_and_a_forged_name_is_not_believed(
     assert "signed by bob, not by alice" in msgspec.json.decode(forged, type=Reply).messages[0]
 
 
-def test_behind_a_router_signatures_tell_who_orders(site: Path, tmp_path: Path) -> None:
+def test_behind_a_router_signatures_report_who_commands(site: Path, tmp_path: Path) -> None:
     """The router's link is let in whole; a viewer's order comes through it, and is not trusted."""
     endpoint = f"tls/127.0.0.1:{free_port()}"
     issue(site / "site", "router", "router", now=NOW)

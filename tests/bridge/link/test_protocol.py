@@ -1,4 +1,4 @@
-"""docs/reference/protocol.md tells people what the code says to machines."""
+"""docs/reference/protocol.md says to people what the code says to machines."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_every_state_is_explained(state: str) -> None:
     assert f"`{state}`" in TEXT
 
 
-def test_a_robot_that_tells_of_no_capability_has_none() -> None:
+def test_a_robot_that_reports_no_capability_has_none() -> None:
     """As every robot before there were any."""
     told = json.loads(encode(Field().station().info()))
     del told["capabilities"]

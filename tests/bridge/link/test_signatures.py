@@ -104,7 +104,7 @@ def told(field: GuardedField, key: str, number: int) -> list[bytes]:
     return heard
 
 
-def test_what_a_robot_tells_is_heard_once_and_in_order(site: Path) -> None:
+def test_what_a_robot_reports_is_received_once_and_in_order(site: Path) -> None:
     field = ready(site)
     assert told(field, field.keys.state, 3) == [b"state 0", b"state 1", b"state 2"]
     kept: list[SignedMessage] = []
@@ -117,7 +117,7 @@ def test_what_a_robot_tells_is_heard_once_and_in_order(site: Path) -> None:
     assert told(field, field.keys.state, 3) == [b"state 0", b"state 1", b"state 2"]
 
 
-def test_what_a_robot_told_long_ago_or_before_its_reboot_is_not_heard(site: Path) -> None:
+def test_what_a_robot_reported_long_ago_or_before_its_reboot_is_not_accepted(site: Path) -> None:
     field = ready(site)
     station = field.guarded_station()
     heard: list[bytes] = []
@@ -142,7 +142,7 @@ def test_what_a_robot_told_long_ago_or_before_its_reboot_is_not_heard(site: Path
     assert heard == [b"now", b"anew"]
 
 
-def test_an_impostor_is_not_heard(site: Path) -> None:
+def test_an_impostor_is_ignored(site: Path) -> None:
     field = ready(site)
     station = field.guarded_station()
     heard: list[bytes] = []
@@ -198,7 +198,7 @@ def test_a_robot_hears_only_stations_and_only_at_once(site: Path) -> None:
 
 
 def test_an_attachment_is_small() -> None:
-    """Beside a pose of some 250 bytes, fifty times a second."""
+    """In addition to a pose of some 250 bytes, fifty times a second."""
     attachment = SignatureAttachment(signature=b"x" * 64, boot_id="0123456789ab", number=10**6, at_ns=10**15)
     assert len(msgspec.json.encode(attachment)) < 200
 
@@ -218,7 +218,7 @@ def held_back(field: GuardedField) -> list[SignedMessage]:
 
 
 @pytest.mark.parametrize("later_s", [0.6, 41.0])
-def test_an_order_that_a_station_has_given_up_is_never_carried_out(site: Path, later_s: float) -> None:
+def test_a_command_that_a_station_has_given_up_is_never_carried_out(site: Path, later_s: float) -> None:
     """Not a moment later, not after a reboot, and whatever the date is then."""
     field = ready(site)
     kept = held_back(field)

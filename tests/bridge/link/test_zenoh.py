@@ -185,7 +185,7 @@ def test_another_commander_needs_to_take_over(tmp_path: Path) -> None:
 
 
 def test_the_first_pose_of_a_run_is_where_the_robot_was_put(tmp_path: Path) -> None:
-    """Its mission puts a robot that stands nowhere yet at its start; no pose of before is told of the run."""
+    """Its mission puts a robot that stands nowhere yet at its start; the run gets no pose of before."""
     start = msgspec.structs.replace(corridor().start, x=1.0)
     first = msgspec.structs.replace(corridor().stops[0], approach=((1.0, 0.0), (2.0, 0.0)))
     mission = with_digest(msgspec.structs.replace(corridor(), start=start, stops=(first,), return_=None))

@@ -1,4 +1,4 @@
-"""A vehicle of a few lines: does to the book what it is asked, but for what a test replaces.
+"""A vehicle of a few lines: answers by the book, except for what a test replaces.
 
 It speaks through our own wire, so that a test is about the uploader; MAVSDK is the stranger in other tests.
 """
@@ -158,7 +158,7 @@ class Scripted:
 
     @property
     def awaited(self) -> int:
-        """Number of the item that is asked for."""
+        """Number of the item that the vehicle requests."""
         assert self.receiving is not None
         return self.receiving.index(None)
 

@@ -14,7 +14,7 @@ START = RunCommand(cmd_id="once", verb="start", commander="alice", issued_ns=1, 
 RUN = Run(state="RUNNING", run_id="r")
 
 
-def test_the_same_order_gets_the_same_answer() -> None:
+def test_the_same_command_gets_the_same_answer() -> None:
     journal = memory_journal()
     assert answered(journal, START, RUN) is None
     answer = answer_to(START, None, RUN)
@@ -23,7 +23,7 @@ def test_the_same_order_gets_the_same_answer() -> None:
 
 
 @pytest.mark.parametrize("other", [{"verb": "abort"}, {"commander": "bob"}, {"from_here": True}])
-def test_an_order_that_differs_in_anything_is_refused_under_a_used_id(other: dict[str, object]) -> None:
+def test_a_command_that_differs_in_anything_is_refused_under_a_used_id(other: dict[str, object]) -> None:
     journal = memory_journal()
     remember_answer(journal, START, answer_to(START, None, RUN))
     again = answered(journal, msgspec.structs.replace(START, **other), RUN)

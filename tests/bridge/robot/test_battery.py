@@ -1,4 +1,4 @@
-"""A mission is taken and started only if the battery lasts, where the robot can tell."""
+"""A mission is taken and started only if the battery lasts, where the robot can report."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_a_battery_that_lasts_exactly_is_enough() -> None:
     assert missing(0.65, TOTAL_S / 0.5 * 0.999) != ""
 
 
-def test_a_robot_that_cannot_tell_takes_every_mission() -> None:
+def test_a_robot_that_cannot_report_takes_every_mission() -> None:
     assert missing(0.0, None) == ""
 
 

@@ -32,7 +32,7 @@ def test_a_free_robot_is_anyones() -> None:
     assert claim(None, "bob") == Lease(commander="bob", fence=1, until_ns=round(LEASE_S * 1e9))
 
 
-def test_an_order_renews_the_lease_and_keeps_its_number() -> None:
+def test_a_command_renews_the_lease_and_keeps_its_number() -> None:
     assert claim(ALICE, "alice", now_s=5) == Lease(
         commander="alice", fence=3, until_ns=round((5 + LEASE_S) * 1e9)
     )
@@ -45,7 +45,7 @@ def test_another_is_denied_until_the_lease_has_run_out() -> None:
     assert claim(ALICE, "bob", now_s=10) == Lease(commander="bob", fence=4, until_ns=round(70e9))
 
 
-def test_taking_over_raises_the_fence_and_older_orders_stay_outside() -> None:
+def test_taking_over_raises_the_fence_and_older_commands_stay_outside() -> None:
     taken = claim(ALICE, "bob", take_over=True)
     assert isinstance(taken, Lease)
     assert (taken.commander, taken.fence) == ("bob", 4)
@@ -99,7 +99,7 @@ def test_a_push_needs_the_lease_too() -> None:
     assert station.push(corridor(revision=2), take_over=True).revision == 2
 
 
-def test_an_order_is_carried_out_once_though_it_comes_three_times_and_over_a_reboot() -> None:
+def test_a_command_is_carried_out_once_though_it_comes_three_times_and_over_a_reboot() -> None:
     field = Field()
     field.station().push(corridor())
     start = field.command("start")
@@ -120,13 +120,13 @@ def test_an_id_used_for_another_order_is_refused() -> None:
 
 
 @pytest.mark.parametrize("valid_for_s", [0.0, -1.0, 61.0, 1e300])
-def test_an_order_may_not_be_valid_for_ever(valid_for_s: float) -> None:
+def test_a_command_may_not_be_valid_for_ever(valid_for_s: float) -> None:
     field = Field()
     field.station().push(corridor())
     assert field.order("start", valid_for_s=valid_for_s).reason == "expired"
 
 
-def test_a_station_sends_orders_for_the_robot_as_it_saw_it() -> None:
+def test_a_station_sends_commands_for_the_robot_as_it_saw_it() -> None:
     field = Field()
     station = field.station()
     station.push(corridor())
@@ -160,7 +160,7 @@ class Mute:
 
 
 @pytest.mark.parametrize(("verb", "state"), [("pause", "PAUSED"), ("abort", "ABORTED")])
-def test_a_stop_needs_nothing_that_the_robot_tells(verb: Verb, state: str) -> None:
+def test_a_stop_needs_nothing_that_the_robot_reports(verb: Verb, state: str) -> None:
     field = Field()
     station = field.station()
     station.push(corridor())
@@ -184,7 +184,7 @@ def test_a_stop_that_comes_very_late_still_stops() -> None:
     assert field.controller.execute(late).state == "PAUSED"
 
 
-def test_a_state_is_small_whatever_the_mission_and_status_tells_every_stop() -> None:
+def test_a_state_is_small_whatever_the_mission_and_status_reports_every_stop() -> None:
     field = Field()
     station = field.station()
     names = tuple(f"s{number}" for number in range(1, 61))
@@ -197,7 +197,7 @@ def test_a_state_is_small_whatever_the_mission_and_status_tells_every_stop() -> 
 
 
 def watched(field: Field, who: str, *, seconds: float) -> None:
-    """The robot works, and somebody tells it every 5 s that they watch."""
+    """The robot works, and somebody watches it, and says so every 5 s."""
     station = field.station(commander=who)
     for _ in range(round(seconds / 5)):
         field.clock.wait(5.0)
@@ -236,7 +236,7 @@ def test_watching_writes_the_lease_down_twice_a_minute() -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_what_a_robot_has_done_and_cannot_be_told_is_unknown_not_unsent(
+def test_what_a_robot_has_done_and_cannot_be_reported_is_unknown_not_unsent(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with open("/dev/full", "w", encoding="utf-8") as full:
@@ -278,7 +278,7 @@ def test_a_stop_does_not_wait_until_it_is_decided_whether_a_robot_may_start(
     assert [answer.verb for answer in answers] == ["abort", "start"]
 
 
-def test_an_order_that_was_weighed_before_the_run_changed_is_weighed_anew(
+def test_a_command_that_was_weighed_before_the_run_changed_is_weighed_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     field, given = Field(), iter(range(2))

@@ -230,7 +230,7 @@ def test_home_while_paused_drives_home() -> None:
     assert abs(field.base.pose().x) < 1e-6
 
 
-def test_a_paused_way_home_is_gone_on_with() -> None:
+def test_a_paused_return_home_is_continued() -> None:
     field = started(corridor())
     field.clock.at(80.0, lambda: field.order("home"))
     field.clock.at(83.0, lambda: field.order("pause"))
@@ -243,7 +243,7 @@ def test_a_paused_way_home_is_gone_on_with() -> None:
     assert abs(field.base.pose().x) < 1e-6
 
 
-def test_a_skip_does_not_turn_a_robot_round_that_is_on_its_way_home() -> None:
+def test_a_skip_does_not_turn_a_robot_round_that_is_on_its_return_home() -> None:
     field = started(corridor(), Fault("blocked", 2))
     field.work_until(lambda run: run.done == ("s1",))
     field.order("home")
@@ -255,7 +255,7 @@ def test_a_skip_does_not_turn_a_robot_round_that_is_on_its_way_home() -> None:
     assert (field.controller.run.state, field.controller.run.done) == ("ABORTED", ("s1",))
 
 
-def test_a_way_home_that_was_paused_ends_for_the_reason_it_began() -> None:
+def test_a_return_home_that_was_paused_ends_for_the_reason_it_began() -> None:
     field = started(corridor())
     field.work_until(lambda run: run.done == ("s1",))
     field.order("home")
@@ -299,7 +299,7 @@ def full_disk(moment: str) -> None:
     raise sqlite3.OperationalError("database or disk is full")
 
 
-def test_a_full_disk_refuses_orders_and_stops_the_robot_until_there_is_room() -> None:
+def test_a_full_disk_refuses_commands_and_stops_the_robot_until_there_is_room() -> None:
     field = started(corridor())
 
     def fill() -> None:

@@ -191,7 +191,7 @@ def test_a_state_that_only_a_newer_stopgo_knows_is_refused_in_one_line(tmp_path:
         Field(journal=journal)
 
 
-def test_an_event_of_a_newer_stopgo_is_told_by_its_kind() -> None:
+def test_an_event_of_a_newer_stopgo_is_reported_by_its_kind() -> None:
     journal = memory_journal()
     journal.append(started())
     body = journal.bodies()[0].replace(b'"Started"', b'"Recharged"')
@@ -258,7 +258,7 @@ def test_a_push_that_would_take_the_space_kept_for_stops_is_rejected(
 
 
 @pytest.mark.parametrize("left", [0, 4096])
-def test_space_that_a_killed_robot_began_to_keep_is_kept_anew(tmp_path: Path, left: int) -> None:
+def test_space_that_a_killed_robot_began_to_keep_is_kept_again(tmp_path: Path, left: int) -> None:
     reserve = tmp_path / "reserve"
     reserve.write_bytes(bytes(left))
     with open_journal(tmp_path, "r1"):

@@ -35,7 +35,7 @@ def test_a_quarter_turn_on_paper() -> None:
 
 
 @pytest.mark.parametrize("own", [QUARTER, None])
-def test_a_mission_is_driven_on_the_map_and_told_in_its_own_frame(own: Transform | None) -> None:
+def test_a_mission_is_driven_on_the_map_and_reported_in_its_own_frame(own: Transform | None) -> None:
     """The robot's own transform counts before the mission's."""
     other = Transform(x=-3.0, y=0.0, heading=1.0)
     mission = with_digest(

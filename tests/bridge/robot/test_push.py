@@ -166,7 +166,7 @@ def test_nonsense_is_answered_as_malformed() -> None:
 
 @pytest.mark.parametrize("step", ["mission/x/begin", "mission/x/commit", "cmd/pause", "keep"])
 @pytest.mark.parametrize("odd", [b"[" * 20_000, b'"\xff\xfe"'])
-def test_what_is_odd_where_it_would_be_passed_over_is_malformed(step: str, odd: bytes) -> None:
+def test_what_is_anomalous_where_it_would_be_passed_over_is_malformed(step: str, odd: bytes) -> None:
     field = Field()
     station = field.station()
     reply = station.link.ask(f"{field.keys.root}/{step}", b'{"later": ' + odd, timeout_s=1.0)
@@ -237,7 +237,7 @@ def test_a_mission_is_weighed_again_if_the_run_went_on_meanwhile(monkeypatch: py
     assert field.controller.run.state == "READY"
 
 
-def test_what_is_wrong_with_a_stop_is_told_with_its_place() -> None:
+def test_what_is_wrong_with_a_stop_is_reported_with_its_place() -> None:
     document = msgspec.to_builtins(corridor(stops=2))
     document["stops"][1]["x"] = "far"
     with pytest.raises(msgspec.ValidationError, match=r"\$\.stops\[1\]\.x"):

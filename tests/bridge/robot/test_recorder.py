@@ -122,7 +122,7 @@ def test_an_entry_that_was_cut_anywhere_is_taken_off_and_the_others_stay(tmp_pat
         assert again.page("run").newest == 2
 
 
-def test_a_bit_that_flips_anywhere_is_never_told_as_a_pose(tmp_path: Path) -> None:
+def test_a_bit_that_flips_anywhere_is_never_reported_as_a_pose(tmp_path: Path) -> None:
     recorder = RunRecorder(tmp_path)
     idle(recorder)
     for seq in (1, 2, 3):
@@ -153,7 +153,7 @@ def test_what_lies_between_a_damaged_entrys_neighbours_is_missing(tmp_path: Path
     assert [(gap.robot_ns, gap.until_ns) for gap in gaps(page)] == [(ns(1), ns(3))]
 
 
-def test_the_oldest_finished_run_makes_room_and_is_told_to_have(tmp_path: Path) -> None:
+def test_the_oldest_finished_run_makes_room_and_is_reported_to_have(tmp_path: Path) -> None:
     recorder = RunRecorder(tmp_path, limit_bytes=3000)
     idle(recorder)
     for run_id in ("one", "two", "three"):
@@ -180,7 +180,7 @@ def test_a_run_that_reaches_the_limit_alone_goes_on_without_a_record(tmp_path: P
 
 
 @pytest.mark.parametrize("kind", ["announced", "met"])
-def test_a_full_disk_leaves_a_gap_that_is_told_and_the_record_goes_on(tmp_path: Path, kind: str) -> None:
+def test_a_full_disk_leaves_a_gap_that_is_reported_and_the_record_goes_on(tmp_path: Path, kind: str) -> None:
     short = [""]
     recorder = RunRecorder(tmp_path, room=lambda size: short[0])
     idle(recorder)
@@ -227,7 +227,7 @@ def test_health_is_written_down_when_it_changes(tmp_path: Path) -> None:
     }
 
 
-def test_what_follows_without_a_record_is_told_with_the_number_of_poses_that_are_kept() -> None:
+def test_what_follows_without_a_record_is_reported_with_the_number_of_poses_that_are_kept() -> None:
     assert f"{POSES_KEPT} poses" in WITHOUT[RECORD]
 
 

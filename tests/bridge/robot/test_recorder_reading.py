@@ -1,4 +1,4 @@
-"""Stations read records of past runs beside a run; neither they nor what lies in the folder can stop it."""
+"""Stations read records of past runs during a run; neither they nor what lies in the folder can stop it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LAST_NET_S = 60.0
 
 @pytest.fixture
 def recorder(tmp_path: Path) -> Iterator[RunRecorder]:
-    """With a run that is over, and one that is under way."""
+    """With a run that is over, and one that is in progress."""
     recorder = RunRecorder(tmp_path)
     idle(recorder)
     drive(recorder, 1, 2, run_id="past")
@@ -85,7 +85,7 @@ def test_files_of_others_in_the_folder_are_passed_over(recorder: RunRecorder, tm
     assert [run.run_id for run in recorder.index().runs] == ["past", "run", "next"]
 
 
-def test_a_record_that_cannot_be_read_is_told_as_missing(recorder: RunRecorder, tmp_path: Path) -> None:
+def test_a_record_that_cannot_be_read_is_reported_as_missing(recorder: RunRecorder, tmp_path: Path) -> None:
     (tmp_path / "000001-past.record").unlink()
     (tmp_path / "000001-past.record").mkdir()
     page = recorder.answer(Request("key", b"", {"run": "past"}))

@@ -14,7 +14,7 @@ from stopgo.mission.errors import NegativeResult
 from tests.bridge.world import Field, corridor
 
 
-def test_a_refused_order_is_told_with_who_and_why() -> None:
+def test_a_refused_command_is_reported_with_who_and_why() -> None:
     field, said = Field(), list[str]()
     field.station().push(corridor())
     field.link.close()
@@ -32,7 +32,7 @@ def test_a_refused_order_is_told_with_who_and_why() -> None:
     assert "refused start by bob: not_the_commander" in said[1]
 
 
-def test_the_same_refusal_is_told_once_a_minute() -> None:
+def test_the_same_refusal_is_reported_once_a_minute() -> None:
     said, now = list[str](), [datetime(2026, 5, 1, 8, 0, 0)]
     log = RefusalLog(said.append, lambda: now[0])
     for _ in range(120):

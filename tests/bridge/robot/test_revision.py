@@ -54,7 +54,7 @@ def test_the_stop_that_is_worked_on_is_finished_as_the_old_revision_says() -> No
     assert scans == pytest.approx([67.0, 67.0 + 12.0, 67.0 + 24.0])  # 5 s of way, 2 s to settle, 60 s or 5 s
 
 
-def test_a_revision_pushed_while_a_scan_is_under_way_does_not_disturb_it() -> None:
+def test_a_revision_pushed_while_a_scan_is_in_progress_does_not_disturb_it() -> None:
     field = running()
     field.clock.at(30.0, lambda: field.station().push(LONGER))
     field.work()
@@ -114,7 +114,7 @@ def moved(index: int, **details: Any) -> Mission:
         (changed(frame=TURNED), "frame"),
     ],
 )  # fmt: skip
-def test_a_revision_that_changes_the_way_so_far_is_refused(revision: Mission, why: str) -> None:
+def test_a_revision_that_changes_the_path_so_far_is_refused(revision: Mission, why: str) -> None:
     field = running()
     with pytest.raises(NegativeResult, match=f"way_differs: revision 2: .*{why}"):
         field.station().push(revision)
@@ -132,7 +132,7 @@ def test_a_robot_may_refuse_every_revision_during_a_run() -> None:
     assert field.controller.run.state == "READY"
 
 
-def test_a_robot_on_its_way_home_takes_no_revision() -> None:
+def test_a_robot_on_its_return_home_takes_no_revision() -> None:
     field = running()
     field.controller.step()
     field.order("home")

@@ -105,7 +105,7 @@ def test_home_drives_back_over_the_driven_legs_and_ends_aborted() -> None:
     assert math.hypot(field.base.pose().x, field.base.pose().y) < 1e-6
 
 
-def test_a_mission_that_was_run_starts_again_only_when_told_so() -> None:
+def test_a_mission_that_was_run_starts_again_only_on_request() -> None:
     field = loaded()
     first = field.order("start")
     field.work()

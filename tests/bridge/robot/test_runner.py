@@ -13,7 +13,7 @@ from tests.bridge.world import Field, corridor
 
 
 def test_a_state_claims_no_event_that_it_does_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An order that comes while a state is told is in the next one."""
+    """An order that comes while a state is reported is in the next one."""
     field = Field()
     station = field.station()
     station.push(corridor())
@@ -48,8 +48,8 @@ def test_a_controller_whose_work_ends_by_an_error_stands_still(monkeypatch: pyte
     assert stopped == ["stop"]
 
 
-def test_what_has_ended_an_agents_work_is_told_to_whoever_asks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A vehicle's agent is in the station's own process: nobody else would tell."""
+def test_what_has_ended_an_agents_work_is_reported_to_whoever_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A vehicle's agent is in the station's own process: nobody else would report."""
     field, board = Field(), Switchboard()
 
     def broken() -> None:

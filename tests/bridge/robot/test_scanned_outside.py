@@ -30,7 +30,7 @@ def field() -> Field:
     return made
 
 
-def test_the_robot_tells_it_in_its_state(field: Field) -> None:
+def test_the_robot_reports_it_in_its_state(field: Field) -> None:
     state = field.report()
     assert (state.done, state.outside, state.outside_count) == (("s1", "s2", "s3"), ("s2",), 1)
     assert "3 done (1 scanned outside tolerance: s2);" in state_line(state)
@@ -41,7 +41,7 @@ def test_the_robot_tells_it_in_its_state(field: Field) -> None:
 
 
 @pytest.mark.parametrize("run_id", [None, "past"])
-def test_watch_tells_it_at_once_and_at_the_end_and_by_its_exit_code(
+def test_watch_reports_it_at_once_and_at_the_end_and_by_its_exit_code(
     field: Field, run_id: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     said: list[str] = []
@@ -56,7 +56,7 @@ def test_watch_tells_it_at_once_and_at_the_end_and_by_its_exit_code(
     assert f"s2 was scanned {BESIDE}." in capsys.readouterr().out
 
 
-def test_a_program_that_watches_is_told(field: Field) -> None:
+def test_a_program_that_watches_is_informed(field: Field) -> None:
     told: list[dict[str, Any]] = []
     objects = EventObjects(told.append)
     objects.mission(corridor())
@@ -81,7 +81,7 @@ def test_every_stop_scanned_outside_is_named_however_many_a_state_lists() -> Non
     )
 
 
-def test_a_stop_scanned_within_its_tolerance_is_told_as_before() -> None:
+def test_a_stop_scanned_within_its_tolerance_is_reported_as_before() -> None:
     field = Field()
     field.station().push(corridor())
     field.order("start")

@@ -77,7 +77,7 @@ NAMES = {"the commander": "alice", "another station": "bob", "a viewer": "vera",
 
 
 def act(station: Station, what: str) -> None:
-    """Do it twice, for the first answer tells a station the robot's boot; refusals are no matter here."""
+    """Do it twice, for the first answer gives a station the robot's boot; refusals are no matter here."""
     for _ in range(2):
         with suppress(NegativeResult):
             ACTS[what](station)
@@ -138,7 +138,7 @@ def test_a_commander_who_watches_is_in_contact_between_two_questions_and_not_aft
     assert silence(field) == pytest.approx(7.0)
 
 
-def test_a_token_counts_no_longer_than_its_time_though_nobody_tells_its_end(site: Path) -> None:
+def test_a_token_counts_no_longer_than_its_time_though_nobody_reports_its_end(site: Path) -> None:
     field = GuardedField(site)
     station = field.guarded_station()
     running(field, station)

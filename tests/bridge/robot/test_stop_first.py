@@ -289,7 +289,9 @@ def test_an_internal_error_stops_the_base_and_ends_the_controller(monkeypatch: p
         field.controller.serve()
 
 
-def test_a_thread_that_dies_stops_the_base_before_anybody_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thread_that_dies_stops_the_base_before_anybody_is_informed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     field, calls = Field(), list[str]()
 
     def broken() -> None:
@@ -350,7 +352,7 @@ def test_a_base_that_does_not_stop_ends_the_program_for_every_stop(
         field.controller.serve()
 
 
-def test_an_error_is_told_though_the_base_does_not_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_is_reported_though_the_base_does_not_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     """A robot whose thread has died must not look alive."""
     field, told = Field(), list[Exception]()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,16 @@ def test_a_mistake_is_one_line_with_what_was_found(tmp_path: Path, text: str, wo
         read_ros_settings(path)
     assert words in str(told.value)
     assert "\n" not in str(told.value)
+
+
+def test_the_files_of_the_guide_are_read(tmp_path: Path) -> None:
+    guide = Path(__file__).parents[3] / "docs" / "how-to" / "nav2.md"
+    files = re.findall(r"^```toml\n(.*?)^```", guide.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    for number, text in enumerate(files):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(text)
+        read_ros_settings(path)
+    assert len(files) == 2
 
 
 def test_a_request_gets_values_of_the_scan_with_their_types() -> None:

@@ -1,6 +1,6 @@
 """A robot with Nav2 and a scanner in simulated time, without ROS: what the servers do, and what goes wrong.
 
-The world knows the robot's true motion. tf and odometry are told from it, with the faults of the trial.
+The world knows the robot's true motion. tf and odometry are reported from it, with the faults of the trial.
 """
 
 from __future__ import annotations

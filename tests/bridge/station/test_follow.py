@@ -1,4 +1,4 @@
-"""A station that follows a run tells each pose once and in order, whatever it has missed."""
+"""A station that follows a run reports each pose once and in order, whatever it has missed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.bridge.world import Field, corridor
 
 
 class Trail:
-    """A robot's end of `poses`, in memory: what it would tell of one boot."""
+    """A robot's end of `poses`, in memory: what it would report one boot."""
 
     def __init__(self, board: Switchboard, *, boot_id: str, poses: int) -> None:
         self.keys = KeyExpressions("r1")
@@ -41,7 +41,7 @@ def followed(board: Switchboard) -> PoseHistory:
     return path
 
 
-def test_poses_that_were_missed_are_asked_for_in_pages_and_told_in_order() -> None:
+def test_poses_that_were_missed_are_asked_for_in_pages_and_reported_in_order() -> None:
     board = Switchboard()
     robot, path = Trail(board, boot_id="b", poses=120), followed(board)
     told = [*path.take(robot.pose(1)), *path.take(robot.pose(120))]
@@ -52,7 +52,7 @@ def test_poses_that_were_missed_are_asked_for_in_pages_and_told_in_order() -> No
     assert [pose.seq for pose in path.take(robot.pose(121))] == [121]
 
 
-def test_poses_are_counted_anew_after_a_reboot() -> None:
+def test_poses_are_counted_again_after_a_reboot() -> None:
     board = Switchboard()
     path = followed(board)
     assert [pose.seq for pose in path.take(Trail(board, boot_id="b", poses=1).pose(1))] == [1]
@@ -62,7 +62,7 @@ def test_poses_are_counted_anew_after_a_reboot() -> None:
     assert not path.behind
 
 
-def test_poses_of_another_run_are_not_told() -> None:
+def test_poses_of_another_run_are_not_reported() -> None:
     board = Switchboard()
     robot, path = Trail(board, boot_id="b", poses=0), followed(board)
     assert list(path.take(robot.pose(7, run_id="other"))) == []
@@ -79,7 +79,7 @@ def test_poses_that_nobody_answers_for_are_not_asked_for_again_at_once() -> None
     assert not path.behind
 
 
-def test_health_that_is_heard_before_its_run_is_told_with_the_run_and_once() -> None:
+def test_health_that_is_received_before_its_run_is_reported_with_the_run_and_once() -> None:
     field = Field()
     field.station().push(corridor())
     field.order("start")

@@ -1,4 +1,4 @@
-"""A router that drops, delays, repeats or reorders one topic: the gap is told within two seconds."""
+"""A router that drops, delays, repeats or reorders one topic: the gap is reported within two seconds."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_old_states_are_not_shown_as_new_ones(kind: str, monkeypatch: pytest.Mon
 def test_whatever_becomes_of_one_topic_nothing_old_is_shown_as_new(
     kind: str, topic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Events are told once and in order, states never go back, and none says RUNNING after the abort."""
+    """Events are reported once and in order, states never go back, and none says RUNNING after the abort."""
     watched = Watched(monkeypatch)
     router = {
         "drop": dropping(topic),
@@ -211,7 +211,7 @@ def test_a_whole_link_reports_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
     assert gaps(watched.reports(30.0)) == []
 
 
-def test_a_gap_that_ends_is_told_and_a_silent_link_is_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_gap_that_ends_is_reported_and_a_silent_link_is_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
     watched = Watched(monkeypatch)
     watched.at(3.0, lambda: setattr(watched.router, "meddle", dropping("tel/pose")))
     watched.at(8.0, lambda: setattr(watched.router, "meddle", lambda message: (message,)))
@@ -226,7 +226,7 @@ def test_a_gap_that_ends_is_told_and_a_silent_link_is_no_gap(monkeypatch: pytest
 def test_no_screen_says_running_after_an_abort_whose_log_is_denied(
     display: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The run is over and its events never come: the outcome is unknown, and the reason is told."""
+    """The run is over and its events never come: the outcome is unknown, and the reason is reported."""
     watched = Watched(monkeypatch)
     watched.at(3.0, lambda: setattr(watched.router, "meddle", dropping("/log")))
     watched.at(5.0, lambda: watched.field.order("abort"))

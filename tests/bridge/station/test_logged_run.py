@@ -86,7 +86,7 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
     robot.recorder.close()
 
 
-def test_health_is_told_once_whether_it_was_heard_or_is_read_later(robot: Robot) -> None:
+def test_health_is_reported_once_whether_it_was_received_or_is_read_later(robot: Robot) -> None:
     pressed = [False]
     robot.recorder.health = lambda: BaseHealth(emergency_stop=pressed[0])
     robot.drive(range(1, 21), heard=True)
@@ -149,7 +149,7 @@ def test_a_line_that_is_cut_again_while_it_catches_up_goes_on_where_it_was(robot
     assert robot.poses == [pose(seq) for seq in range(1, FAR + 35)]
 
 
-def test_what_a_killed_robot_had_not_written_is_told_as_missing(robot: Robot) -> None:
+def test_what_a_killed_robot_had_not_written_is_reported_as_missing(robot: Robot) -> None:
     robot.drive(range(1, 106), heard=False)
     robot.boot()
     robot.drive(range(200, 300), heard=True, boot_id="c")
@@ -159,7 +159,7 @@ def test_what_a_killed_robot_had_not_written_is_told_as_missing(robot: Robot) ->
     assert [(gap.robot_ns, gap.until_ns, gap.reason) for gap in robot.gaps] == [(ns(100), ns(200), RESTARTED)]
 
 
-def test_what_a_full_disk_had_no_room_for_is_told_as_missing(robot: Robot) -> None:
+def test_what_a_full_disk_had_no_room_for_is_reported_as_missing(robot: Robot) -> None:
     robot.drive(range(1, 101), heard=True)
     robot.catch_up()
     robot.short = "make room"

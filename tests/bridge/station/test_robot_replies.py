@@ -1,4 +1,4 @@
-"""A robot that answers nonsense, or tells of more than it gives, ends a command with one line and in time."""
+"""A robot that answers nonsense, or reports more than it gives, ends a command with one line and in time."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_time_that_no_recording_holds_is_unknown(wrong: dict[str, object]) -> 
 
 
 @pytest.mark.parametrize("kind", ["pose", "state", "health"])
-def test_a_robot_is_not_heard_with_a_time_that_no_recording_holds(kind: str) -> None:
+def test_a_report_is_not_accepted_with_a_time_that_no_recording_holds(kind: str) -> None:
     field = Field()
     station = field.station()
     station.push(corridor())
@@ -93,7 +93,7 @@ def test_a_robot_is_not_heard_with_a_time_that_no_recording_holds(kind: str) -> 
     assert all(getattr(report, "robot_ns", 0) < 2**63 for report in [first, *reports])
 
 
-def test_a_record_that_tells_of_more_than_it_gives_is_not_read_for_ever() -> None:
+def test_a_record_that_reports_more_than_it_gives_is_not_read_for_ever() -> None:
     page = RecordPage(run_id="run", since=0, entries=(), newest=10**12)
     with pytest.raises(OutcomeUnknown, match="announces 1000000000000 entries of the run, returns 0"):
         list(read_run((liar := lying(encode(page))).link, liar.keys, "run", patience_s=0.0))

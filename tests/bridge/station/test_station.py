@@ -73,7 +73,7 @@ def deaf(field: Field, time: StoppedTime, word: str) -> tuple[Station, DeafLink]
     return Station(link, field.keys, commander="test", timeout_s=5.0), link
 
 
-def test_an_order_that_is_not_answered_is_unknown_when_its_time_is_up(time: StoppedTime) -> None:
+def test_a_command_that_is_not_answered_is_unknown_when_its_time_is_up(time: StoppedTime) -> None:
     station, link = deaf(Field(), time, "/cmd/")
     began = time.now
     with pytest.raises(OutcomeUnknown, match=r"its outcome is unknown.* It has expired"):
@@ -82,7 +82,7 @@ def test_an_order_that_is_not_answered_is_unknown_when_its_time_is_up(time: Stop
     assert link.asked.count("sx/1/r1/cmd/start") > 1
 
 
-def test_an_order_to_a_robot_that_does_not_tell_its_state_was_not_sent(time: StoppedTime) -> None:
+def test_a_command_to_a_robot_that_does_not_report_its_state_was_not_sent(time: StoppedTime) -> None:
     station, link = deaf(Field(), time, "/info")
     began = time.now
     with pytest.raises(RobotUnreachable, match="start was not sent"):
@@ -91,7 +91,7 @@ def test_an_order_to_a_robot_that_does_not_tell_its_state_was_not_sent(time: Sto
     assert set(link.asked) == {"sx/1/r1/info"}
 
 
-def test_what_the_state_took_is_gone_for_the_order(time: StoppedTime) -> None:
+def test_what_the_state_took_is_gone_for_the_command(time: StoppedTime) -> None:
     station, link = deaf(Field(), time, "/cmd/")
     answered = link.ask_all
 
@@ -118,7 +118,7 @@ def test_a_push_goes_on_for_as_long_as_its_pieces_are_answered(time: StoppedTime
     assert not any(key.endswith("/chunk/0") for key in link.asked[sent:])
 
 
-def test_an_order_may_be_waited_for_longer_than_it_may_be_valid() -> None:
+def test_a_command_may_be_waited_for_longer_than_it_may_be_valid() -> None:
     field = Field()
     field.station().push(corridor())
     station = Station(field.board.link(), field.keys, commander="test", timeout_s=300.0)
@@ -179,7 +179,7 @@ def test_what_is_large_is_asked_for_so_that_it_gives_way() -> None:
 
 
 def test_a_stop_is_sent_before_the_robot_was_found() -> None:
-    """Finding it takes a round trip; a pause needs nothing of what that tells."""
+    """Finding it takes a round trip; a pause needs nothing of what that reports."""
     field = Field()
     field.station().push(corridor())
     field.order("start")

@@ -115,7 +115,7 @@ def test_the_table_is_drawn_in_place() -> None:
     assert written[1].count("\n") == height
 
 
-def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
+def test_lines_report_events_and_silence_but_not_every_pose() -> None:
     said: list[str] = []
     lines = EventLines(said.append)
     field = Field()
@@ -127,7 +127,7 @@ def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
     assert len(said) == len(field.journal.events())
 
 
-def test_lines_tell_a_lost_link_once_and_its_return_once() -> None:
+def test_lines_report_a_lost_link_once_and_its_return_once() -> None:
     said: list[str] = []
     lines = EventLines(said.append)
     for seconds in (1.0, 2.0, 3.0, 4.0, 5.0, 29.0):
@@ -147,7 +147,7 @@ def held(reason: str) -> Held:
     )  # fmt: skip
 
 
-def test_a_held_robot_is_told_with_what_it_waits_for() -> None:
+def test_a_held_robot_is_reported_with_what_it_waits_for() -> None:
     said: list[str] = []
     EventLines(said.append).show(held("the way is blocked"))
     assert said[0].endswith("the way is blocked")
@@ -186,7 +186,7 @@ def test_a_duration_reads_as_a_clock() -> None:
     assert clock(3725.9) == "1:02:05"
 
 
-def test_what_was_missed_while_the_link_was_cut_is_told_once_and_in_order_and_again_of_the_past_run(
+def test_what_was_missed_while_the_link_was_cut_is_reported_once_and_in_order_and_again_of_the_past_run(
     tmp_path: Path,
 ) -> None:
     board = Switchboard()

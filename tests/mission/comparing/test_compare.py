@@ -37,7 +37,7 @@ from stopgo.mission.stages import Route
 from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.figures import Figures, worst_first
 from stopgo.mission.stages.sight import Sight, sight_of
-from tests.mission.comparing.told import SCAN, at, told
+from tests.mission.comparing.reports import SCAN, at, told
 from tests.mission.worlds import square_tour
 from tests.recordings import world
 
@@ -206,7 +206,7 @@ def test_late_is_the_first_arrival_and_tries_are_counted() -> None:
     assert item.reason == ""
 
 
-def test_a_skip_after_a_failure_tells_both_reasons() -> None:
+def test_a_skip_after_a_failure_reports_both_reasons() -> None:
     mission = square_tour()
     log = told(
         mission,
@@ -240,7 +240,7 @@ def test_the_states_of_a_run_follow_one_another_without_a_gap() -> None:
     assert compared.seconds_in("PAUSED", "HELD") == 45.0
 
 
-def test_what_is_told_is_what_was_computed() -> None:
+def test_what_is_reported_is_what_was_computed() -> None:
     skipped = run(
         *visit("S1", 0, 1, 1), (Skipped, 65.0, {"stop": "S2", "reason": "skip\x1b[31m"}), (Finished, 70.0, {})
     )

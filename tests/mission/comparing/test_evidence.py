@@ -1,4 +1,4 @@
-"""Yes and no only from evidence; else it cannot be told, with the stop and what is missing."""
+"""Yes and no only from evidence; else undecided, with the stop and what is missing."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from stopgo.mission.comparing.comparison_text import comparison_table
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.run.events import Aborted, Arrived, Finished, Held, Resumed, Skipped, Unconfirmed
 from stopgo.mission.run.run_log import RunLog
-from tests.mission.comparing.test_beside import line
+from tests.mission.comparing.reports import at, told
 from tests.mission.comparing.test_compare import START, planned, visit
-from tests.mission.comparing.told import at, told
+from tests.mission.comparing.test_path_deviation import line
 from tests.mission.worlds import square_tour
 
 BLOCKED = {"reason": "the path to S2 is blocked at (4.00, 1.50): a pallet"}
@@ -55,7 +55,7 @@ def test_an_abort_while_the_path_was_blocked_says_so() -> None:
 
 @pytest.mark.parametrize(("x", "answer"), [(4.04, "yes"), (0.5, "unknown")])
 def test_a_pose_in_an_event_is_compared_with_the_poses_sent(x: float, answer: str) -> None:
-    """S1 is told at (4, 0); the poses that the robot sent meanwhile say another place."""
+    """S1 is reported at (4, 0); the poses that the robot sent meanwhile say another place."""
     events = (*visit("S1", 0, 4, 0), *visit("S2", 70, 4, 3), END)
     run = compared(*events, poses=line(0, (x, 0), (x, 0), 64))
     assert judge(run).answer == answer

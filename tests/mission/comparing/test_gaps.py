@@ -1,4 +1,4 @@
-"""Gaps in the poses of a run: told with their length and place, and never counted as driven."""
+"""Gaps in the poses of a run: reported with their length and place, and never counted as driven."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from stopgo.mission.run.boots import UNKNOWN, joined_boots
 from stopgo.mission.run.events import Arrived, Finished, Scanned, Started
 from stopgo.mission.run.pose_gaps import gap_limit_ns, gaps_after
 from stopgo.mission.run.run_log import Track
-from tests.mission.comparing.test_beside import hook, line
-from tests.mission.comparing.told import SCAN, at, told
+from tests.mission.comparing.reports import SCAN, at, told
+from tests.mission.comparing.test_path_deviation import hook, line
 
 NS = 10**9
 
@@ -64,7 +64,7 @@ def unseen() -> Comparison:
     return compare(log, [mission])
 
 
-def test_what_was_not_seen_is_told_and_not_counted() -> None:
+def test_what_was_not_seen_is_reported_and_not_counted() -> None:
     run = unseen()
     (gap,) = run.sighted.gaps
     assert (gap.begin_s, gap.end_s, gap.begin, gap.end) == (102.0, 159.0, (10.0, 0.03), (2.0, 1.0))
@@ -118,7 +118,7 @@ def test_poses_of_two_boots_are_neither_mixed_nor_joined() -> None:
     assert same.poses is before
 
 
-def test_an_old_recording_that_cannot_tell_two_boots_apart_has_no_path() -> None:
+def test_an_old_recording_that_cannot_distinguish_two_boots_has_no_path() -> None:
     mission = hook()
     early = {"stop": "S1", "pose": at(5, 0), "deviation_m": 0, "boot_id": "c"}
     poses = line(0, (0, 0), (10, 0))

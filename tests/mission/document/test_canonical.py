@@ -1,4 +1,4 @@
-"""The canonical form under a mission's digest is the one that docs/reference/mission-json.md tells."""
+"""The canonical form under a mission's digest is the one that docs/reference/mission-json.md reports."""
 
 from __future__ import annotations
 

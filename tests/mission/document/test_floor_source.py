@@ -42,7 +42,7 @@ def test_the_order_of_options_says_nothing() -> None:
     assert id_of(options={"a": 1, "b": 2}) == id_of(options={"b": 2, "a": 1})
 
 
-def test_the_choice_is_told_in_words() -> None:
+def test_the_choice_is_reported_in_words() -> None:
     source = FloorSource("model.ifc", DIGEST, storey="EG", date="2024-05-01")
     assert source.title == "storey EG, date 2024-05-01"
     assert not FloorSource("plain.dxf", DIGEST).title

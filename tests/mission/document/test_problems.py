@@ -1,4 +1,4 @@
-"""A mission that makes no sense is told so, with the JSON path of each problem."""
+"""A mission that makes no sense is reported so, with the JSON path of each problem."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_sound_mission_has_no_problems(mission: Mission) -> None:
     assert problems_of(mission) == ()
 
 
-def test_two_stops_of_one_name_are_told() -> None:
+def test_two_stops_of_one_name_are_reported() -> None:
     (problem,) = problems_of(with_stop(1, id="S1"))
     assert str(problem) == "$.stops[1].id: is 'S1', already used by $.stops[0]"
 
@@ -71,7 +71,7 @@ def test_a_millimetre_is_the_same_place() -> None:
         ({"approach": ()}, "$.stops[0].approach"),
     ],
 )
-def test_a_senseless_stop_is_told(changes: dict[str, Any], path: str) -> None:
+def test_a_senseless_stop_is_reported(changes: dict[str, Any], path: str) -> None:
     assert paths(with_stop(0, **changes)) == [path]
 
 
@@ -79,13 +79,13 @@ def test_a_full_turn_of_heading_is_allowed() -> None:
     assert paths(with_stop(0, heading=-math.tau)) == []
 
 
-def test_numbers_that_are_none_are_told() -> None:
+def test_numbers_that_are_none_are_reported() -> None:
     """Missions made in memory never passed the reader, which refuses NaN."""
     broken = with_stop(0, x=math.nan, approach=((0.0, 0.0), (math.nan, 0.0)))
     assert {"$.stops[0]", "$.stops[0].approach[1]"} <= set(paths(broken))
 
 
-def test_a_waypoint_that_no_robot_drives_to_is_told() -> None:
+def test_a_waypoint_that_no_robot_drives_to_is_reported() -> None:
     (problem,) = problems_of(with_stop(1, approach=((4.0, 0.0), (1e6, 0.0), (4.0, 3.0))))
     assert str(problem) == (
         "$.stops[1].approach[1]: (1000000.000, 0.000) is 1000.0 km from the start; the limit is 20 km"

@@ -94,7 +94,7 @@ def test_every_stop_is_listed_once_with_its_room_sheet_and_a_box_to_tick() -> No
     assert listed.content.count("<rect") == len(room_mission().stops)
 
 
-def test_rooms_left_out_are_told() -> None:
+def test_rooms_left_out_are_reported() -> None:
     pages, _ = sheets()
     assert "Lager (9.0 m²): door-7 is 0.60 m wide" in words(pages[-1])
 

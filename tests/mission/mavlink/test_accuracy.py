@@ -11,12 +11,12 @@ from tests.bridge.mavlink.driving.world import cornered_mission
 
 
 def test_it_stops_within_its_radius_or_where_it_has_rolled_to() -> None:
-    """The Rover of the log stood 218 mm beside its stops at 0.8 m/s, with a radius of 20 mm."""
+    """The Rover of the log stood 218 mm off its stops at 0.8 m/s, with a radius of 20 mm."""
     assert stops_within(radius=0.02, speed=0.8) == pytest.approx(0.24)
     assert stops_within(radius=0.5, speed=0.8) == 0.5
 
 
-def test_what_is_asked_and_cannot_be_is_told_with_two_ways_out() -> None:
+def test_what_is_asked_and_cannot_be_is_reported_with_two_remedies() -> None:
     mission = cornered_mission()
     assert accuracy_warning(mission, AUTOPILOTS["px4"], {"NAV_ACC_RAD": 0.5}) == (
         "this vehicle stops within 0.50 m in AUTO (NAV_ACC_RAD 0.5 m, 0.5 m/s),"
@@ -30,7 +30,7 @@ def test_what_is_asked_and_cannot_be_is_told_with_two_ways_out() -> None:
     assert "set WP_RADIUS" not in accuracy_warning(mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.02})
 
 
-def test_of_stops_that_ask_for_no_more_nothing_is_told() -> None:
+def test_of_stops_that_ask_for_no_more_nothing_is_reported() -> None:
     mission = cornered_mission(tolerance_m=0.3)
     assert accuracy_warning(mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.1}) == ""
     slow = msgspec.structs.replace(mission.robot, speed=0.15)

@@ -14,7 +14,7 @@ URL = f"scan-1.e57?size=1600&points=100&sha256={SHA}"
 
 
 @pytest.mark.parametrize("url", [URL, URL.replace(SHA, SHA.upper())])
-def test_a_scan_is_the_file_that_is_told_in_full(url: str) -> None:
+def test_a_scan_is_the_file_that_is_reported_in_full(url: str) -> None:
     assert read_file_url(url) == ScanResult(file="scan-1.e57", size=1600, points=100, sha256=SHA)
 
 

@@ -33,7 +33,7 @@ def test_of_equally_few_corners_those_nearest_to_the_leg_stay():
     assert corners(leg, within=0.2) == ((0, 0), (2, 0), (2.2, 2))
 
 
-def test_a_way_there_and_back_is_not_shortened():
+def test_a_path_there_and_back_is_not_shortened():
     assert corners([(0, 0), (5, 0), (1, 0)], within=0.02) == ((0, 0), (5, 0), (1, 0))
 
 

@@ -41,5 +41,5 @@ def test_an_origin_two_centimetres_off_is_the_same_and_counted() -> None:
         (VehicleOrigin(lat=0.0, lon=0.0, alt=0.0), "more than a kilometre"),
     ],
 )
-def test_another_origin_is_told_with_its_distance(origin: VehicleOrigin, away: str) -> None:
+def test_another_origin_is_reported_with_its_distance(origin: VehicleOrigin, away: str) -> None:
     assert f"is {away} from the mission's (47.4000000, 8.5000000)" in apart(SITE, origin)

@@ -53,12 +53,12 @@ def one_changed(item: Item, field: str) -> Item:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_lost_item_is_told_by_count(name):
+def test_a_lost_item_is_reported_by_count(name):
     sent = translate(square_tour(), name)
     assert differences(sent, read_back(sent)[:-1]) == ("the vehicle holds 9 items, 10 were sent",)
 
 
-def test_the_line_tells_sent_predicted_and_read():
+def test_the_line_reports_sent_predicted_and_read():
     sent = translate(square_tour())
     read = read_back(sent)
     read[2] = replace(read[2], x=515_000_007)

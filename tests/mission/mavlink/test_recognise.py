@@ -106,7 +106,7 @@ def test_every_manner_of_writing_is_recognised(name, trigger, settle):
     assert (visit.settle_s, visit.scan_s) == (2.0, 60.0)
 
 
-def test_without_triggers_the_missions_stops_are_told_by_their_order():
+def test_without_triggers_the_missions_stops_are_reported_by_their_order():
     mission = mission_of(stop("S7", (0.0, 0.0), (1.0, 0.0)), stop("S12", (1.0, 0.0), (2.0, 0.0)))
     sent = translate(mission, trigger="none")
     assert stops_of(sent.items, mission) == (None, *["S7"] * 3, *["S12"] * 3)

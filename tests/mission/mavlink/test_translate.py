@@ -137,7 +137,7 @@ def test_four_metres_east_by_ardupilots_scale():
     assert item.y == 75_000_000 + round(4 / (step * math.cos(math.radians(51.5))))
 
 
-def test_ardupilot_is_told_to_stop_at_every_waypoint_and_nothing_that_it_drops():
+def test_ardupilot_gets_the_command_to_stop_at_every_waypoint_and_nothing_that_it_drops():
     for item in translate(corner_tour()).items:
         if item.command == Command.NAV_WAYPOINT:
             assert item.params == (1.0, 0.0, 0.0, 0.0)

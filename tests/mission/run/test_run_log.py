@@ -70,7 +70,7 @@ def test_a_run_lasts_from_its_start_to_its_end_whatever_else_was_logged() -> Non
     assert run.seconds(poses.ns).tolist() == [-2.0, 17.0]
 
 
-def test_a_foreign_log_lasts_as_long_as_it_tells() -> None:
+def test_a_foreign_log_lasts_as_long_as_it_reports() -> None:
     poses = Track.of([5 * SECOND, 9 * SECOND], np.zeros((2, 2)), np.zeros(2))
     run = RunLog("rover", None, None, None, SOURCE, poses, alignment=Alignment("first pose at the start"))
     assert (run.duration_s, run.ended, run.revisions) == (4.0, False, ())

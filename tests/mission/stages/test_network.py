@@ -53,7 +53,7 @@ def test_a_pair_of_no_two_stops_is_a_problem(wrong: tuple[str, str]) -> None:
     assert problems_of(msgspec.structs.replace(a_mission(), network=pairs))
 
 
-def test_skipping_a_stop_in_between_is_told() -> None:
+def test_skipping_a_stop_in_between_is_reported() -> None:
     tour = a_mission()
     names = stop_names(3)
     stops = tuple(msgspec.structs.replace(tour.stops[0], id=name) for name in names)

@@ -59,7 +59,7 @@ def test_a_room_beyond_the_floor_counts_no_floor() -> None:
     assert figures.reached_m2 == pytest.approx(2 * 3.9 * 4)
 
 
-def test_a_leg_over_lines_that_were_not_read_is_told_first() -> None:
+def test_a_leg_over_lines_that_were_not_read_is_reported_first() -> None:
     floor = with_lines(two_rooms(0.9), [(4.0, 0.0), (4.0, 4.0)])
     first = figures_of(floor, Settings(range=3, coverage=1.0)).findings[0]
     assert first.code == "leg_over_ignored"
@@ -69,7 +69,7 @@ def test_a_leg_over_lines_that_were_not_read_is_told_first() -> None:
     assert first.at[0] == pytest.approx(4.0)
 
 
-def test_a_line_that_only_the_robots_edge_would_touch_is_told() -> None:
+def test_a_line_that_only_the_robots_edge_would_touch_is_reported() -> None:
     """The robot is 0.35 m wide to each side; both legs run through the door's middle at y = 2."""
     for y, touched in ((2.34, True), (2.5, False)):
         floor = with_lines(two_rooms(0.9), [(3.95, y), (4.05, y)])
@@ -77,7 +77,7 @@ def test_a_line_that_only_the_robots_edge_would_touch_is_told() -> None:
         assert figures.crosses_ignored == touched, y
 
 
-def test_lines_beside_every_leg_are_not_told() -> None:
+def test_lines_next_to_every_leg_are_not_reported() -> None:
     floor = with_lines(two_rooms(0.9), [(0.05, 0.05), (0.3, 0.05)])
     assert "leg_over_ignored" not in codes(figures_of(floor))
 
@@ -104,7 +104,7 @@ def test_walls_on_an_unknown_layer_are_missing_though_they_stand_in_the_way() ->
     assert {item.code for item in figures_of(floor).grave} == {"walls_missing", "scans_apart"}
 
 
-def test_layers_that_are_not_read_are_named_beside_missing_walls() -> None:
+def test_layers_that_are_not_read_are_named_next_to_missing_walls() -> None:
     floor = with_lines(rooms_without_walls(), [(0.0, 0.01), (8.0, 0.01)], layer="A-WALL")
     grave = [item.message for item in figures_of(floor).grave if item.code == "walls_missing"]
     assert "--layer A-WALL=walls" in grave[0]
@@ -118,7 +118,7 @@ def test_one_room_without_walls_among_many_is_doubtful_only() -> None:
     assert "walls_missing" not in codes(figures_of(floor))
 
 
-def test_a_wall_far_from_the_floor_is_told_with_its_distance() -> None:
+def test_a_wall_far_from_the_floor_is_reported_with_its_distance() -> None:
     floor = hall(6, 4, wall("stray", box(506.2, 0, 507, 1)))
     found = [item for item in figures_of(floor).findings if item.code == "stray_element"]
     assert [item.element for item in found] == ["stray"]
@@ -126,7 +126,7 @@ def test_a_wall_far_from_the_floor_is_told_with_its_distance() -> None:
 
 
 @pytest.mark.parametrize(("gap", "told"), [(0.0, False), (0.05, True), (0.25, True), (0.9, False)])
-def test_a_gap_between_walls_drawn_as_lines_is_told(gap: float, told: bool) -> None:
+def test_a_gap_between_walls_drawn_as_lines_is_reported(gap: float, told: bool) -> None:
     """A partition drawn as a line that ends `gap` before the wall; 0.9 m is a doorway, not a slip."""
     line = element("partition", "walls", lines=[[(3.0, 0.0), (3.0, 4.0 - gap)]])
     floor = hall(6, 4, line, rooms=())
@@ -136,7 +136,7 @@ def test_a_gap_between_walls_drawn_as_lines_is_told(gap: float, told: bool) -> N
         assert f"{100 * gap:.1f} cm" in found[0].message
 
 
-def test_a_part_that_is_cut_off_is_told_where_there_are_no_rooms() -> None:
+def test_a_part_that_is_cut_off_is_reported_where_there_are_no_rooms() -> None:
     floor = floor_of(
         box(0, 0, 12, 4), elements=(shell(0, 0, 12, 4), wall("cut", box(8, 0, 8.2, 4)), column("c", 2, 2))
     )
@@ -151,7 +151,7 @@ def test_both_parts_are_reached_when_both_are_planned(tmp_path: Path) -> None:
     assert main(["plan", str(path), "-o", str(tmp_path / "all"), "--strict", "--all-parts"]) == 0
 
 
-def test_a_room_too_tight_is_told_which_d_sec_would_do() -> None:
+def test_a_room_too_tight_is_reported_which_d_sec_would_do() -> None:
     """A closet of 1.2 × 1.2 m has a place 0.6 m from its walls, none 0.7 m from them."""
     floor = two_rooms(0.9)
     cell = (
@@ -167,7 +167,7 @@ def test_a_room_too_tight_is_told_which_d_sec_would_do() -> None:
     assert figures_of(floor, Settings(d_sec=0.6)).unreached == ()
 
 
-def test_findings_beside_a_leg_come_before_others_of_their_rank() -> None:
+def test_findings_next_to_a_leg_come_before_others_of_their_rank() -> None:
     figures = figures_of(
         with_lines(two_rooms(0.9), [(4.0, 0.0), (4.0, 4.0)]), Settings(range=3, coverage=1.0)
     )
@@ -212,7 +212,7 @@ def test_a_plan_over_glass_ends_with_exit_1_until_it_is_said_what_it_is(tmp_path
     assert main(["plan", str(path), *out, "--layer", "GLASS=glass"]) == 2
 
 
-def test_check_tells_of_lines_that_were_not_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_reports_lines_that_were_not_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = drawn(tmp_path, cut=False, glass=True)
     main(["plan", str(path), "-o", str(tmp_path), "--no-register"])
     capsys.readouterr()
@@ -220,7 +220,7 @@ def test_check_tells_of_lines_that_were_not_read(tmp_path: Path, capsys: pytest.
     assert "GLASS" in capsys.readouterr().out
 
 
-def test_findings_are_told_when_no_plan_can_be_made(
+def test_findings_are_reported_when_no_plan_can_be_made(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = drawn(tmp_path, walls="X1")

@@ -170,8 +170,8 @@ def test_the_order_of_elements_changes_nothing() -> None:
         pytest.param(Polygon.of([(0, 0), (4, 0), (4, 4), (2, 4), (2, 4.0001), (0, 4)]), id="a hair"),
     ],
 )
-def test_odd_rooms_do_no_harm(outline: Polygon) -> None:
-    """The odd room stands beside a good one, so that there is something to plan."""
+def test_anomalous_rooms_do_no_harm(outline: Polygon) -> None:
+    """The anomalous room is next to a good one, so that there is something to plan."""
     beside = box(50, 0, 62, 9)
     floor = floor_of(
         outline,

@@ -58,7 +58,7 @@ WORLDS: dict[str, tuple[FloorPlan, Settings]] = {
 
 
 def counted(mission: Mission, nouns: dict[type, Any]) -> tuple[Recount, list[str]]:
-    """The recount on the floor it was planned on, and what it tells."""
+    """The recount on the floor it was planned on, and what it reports."""
     found = recount(mission, nouns[NavigableSpace])
     coverage = msgspec.json.decode(coverage_json(nouns[Route], mission), type=Coverage)
     return found, [str(problem) for problem in overclaims(mission, found, coverage)]
@@ -96,7 +96,7 @@ def test_sight_that_reaches_too_far_is_found_out(monkeypatch: pytest.MonkeyPatch
     }
 
 
-def test_both_figures_are_told() -> None:
+def test_both_figures_are_reported() -> None:
     mission, nouns = planned(HALL)
     first = mission.stops[0]
     more = change(first.sees, units=first.sees.units + 1, new_units=first.sees.new_units + 1)
@@ -109,7 +109,7 @@ def test_both_figures_are_told() -> None:
     ]
 
 
-def test_less_than_the_coverage_asked_for_is_told_with_its_share() -> None:
+def test_less_than_the_coverage_asked_for_is_reported_with_its_share() -> None:
     mission, nouns = planned(HALL, Settings(coverage=0.5, room_coverage=0, kind_coverage=0, range=3))
     space = nouns[NavigableSpace]
     asked = replace(space, settings=replace(space.settings, coverage=1.0))
@@ -144,7 +144,7 @@ def test_candidates_of_another_program_are_not_loaded() -> None:
 
 @pytest.fixture
 def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
-    """A planned mission; its floor and its coverage lie beside it."""
+    """A planned mission; its floor and its coverage lie next to it."""
     assert main(["plan", str(drawn(tmp_path / "floor.dxf")), "-o", str(tmp_path)]) == 0
     capsys.readouterr()
     return tmp_path / "mission.json"
@@ -154,7 +154,7 @@ def check(mission: Path, *options: str) -> int:
     return main(["check", str(mission), "--floor", str(mission.with_name("floor.dxf")), *options])
 
 
-def test_check_tells_the_coverage_it_counted(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_reports_the_coverage_it_counted(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     coverage = json.loads(made.with_name("coverage.json").read_text())["total"]
     assert check(made, "--coverage-file", str(made.with_name("coverage.json"))) == 0
     last = capsys.readouterr().out.splitlines()[-1]
@@ -197,7 +197,7 @@ def test_coverage_is_checked_on_a_floor_only(made: Path, capsys: pytest.CaptureF
     assert "give it with --floor" in capsys.readouterr().err
 
 
-def test_without_the_extra_the_digest_is_checked_and_the_rest_is_told(made: Path) -> None:
+def test_without_the_extra_the_digest_is_checked_and_the_rest_is_reported(made: Path) -> None:
     front_door = "from stopgo.command_line import main\nsys.exit(main(sys.argv[1:]))"
     floor = made.with_name("floor.dxf")
     done = without_extras(front_door, "check", str(made), "--floor", str(floor))

@@ -76,7 +76,7 @@ def test_a_stop_keeps_d_sec_from_elements_exactly() -> None:
     ]
 
 
-def test_a_way_keeps_the_robots_radius_from_elements_exactly() -> None:
+def test_a_path_keeps_the_robots_radius_from_elements_exactly() -> None:
     floor = hall(6, 4, column("pillar", 3, 2, side=0.4))
     assert told(floor, driven((1.0, 1.0), (1.0, 1.45), (5.0, 1.45), (5.0, 1.0))) == []
     (problem,) = told(floor, driven((1.0, 1.0), (1.0, 1.451), (5.0, 1.451), (5.0, 1.0)))
@@ -93,7 +93,7 @@ def test_the_robot_that_is_sent_decides_if_it_is_the_wider_one() -> None:
     assert [problem.partition(":")[0] for problem in told(floor, wide)] == ["$.stops[0].approach[2]"]
 
 
-def test_a_door_too_narrow_is_no_way() -> None:
+def test_a_door_too_narrow_is_not_driven_through() -> None:
     (problem,) = told(two_rooms(0.69), driven((2.0, 2.0), (6.0, 2.0)))
     assert problem.startswith(
         "$.stops[0].approach[1]: the segment from (2.000, 2.000) to (6.000, 2.000) is 0.000 m"
@@ -101,7 +101,7 @@ def test_a_door_too_narrow_is_no_way() -> None:
     assert "from door d (0.690 m clear, less than door_access 0.700 m)" in problem
 
 
-def test_a_way_off_the_floor_is_told() -> None:
+def test_a_path_off_the_floor_is_reported() -> None:
     (stop, leg) = told(hall(6, 4), driven((3.0, 2.0), (3.0, 9.0)))
     assert stop == "$.stops[0]: s1 at (3.000, 9.000) is off the floor: (3.000, 9.000) lies 5.000 m outside it"
     assert leg.startswith(
@@ -118,7 +118,7 @@ def test_a_floor_edge_and_a_hole_are_kept_away_from() -> None:
     assert "is off the floor: " in leg
 
 
-def test_a_place_deep_within_an_element_is_told() -> None:
+def test_a_place_deep_within_an_element_is_reported() -> None:
     floor = floor_of(box(0, 0, 20, 10), elements=(element("core", "walls", box(5, 0, 15, 10)),))
     assert told(floor, driven((10.0, 5.0))) == [
         "$.stops[0]: s1 at (10.000, 5.000) lies within core",
@@ -140,7 +140,7 @@ def test_circles_to_avoid_are_avoided() -> None:
     assert told(hall(6, 4), driven((1.0, 2.0), (1.9, 2.0)), settings) == []
 
 
-def test_the_way_back_is_looked_at_too() -> None:
+def test_the_return_is_checked_too() -> None:
     floor = floor_of(box(0, 0, 8, 4), elements=(shell(0, 0, 8, 4), wall("w", box(3, 0, 3.2, 3.0))))
     mission = driven((2.0, 2.0), return_=((2.0, 2.0), (6.0, 2.0)))
     assert [problem.partition(":")[0] for problem in told(floor, mission)] == ["$.return[1]"]
@@ -151,7 +151,7 @@ def test_the_way_back_is_looked_at_too() -> None:
 
 @pytest.fixture
 def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
-    """A planned mission; its floor lies beside it."""
+    """A planned mission; its floor lies next to it."""
     assert main(["plan", str(drawn(tmp_path / "floor.dxf")), "-o", str(tmp_path)]) == 0
     capsys.readouterr()
     return tmp_path / "mission.json"
@@ -167,7 +167,7 @@ def test_check_of_a_plan_on_its_floor_is_in_order(made: Path) -> None:
     assert main(["check", str(made), "--floor", str(made.with_name("floor.dxf"))]) == 0
 
 
-def test_check_tells_of_a_stop_moved_to_a_wall(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_reports_a_stop_moved_to_a_wall(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(with_last(read(made), x=0.5), made)
     assert main(["check", str(made)]) == 0
     capsys.readouterr()
@@ -190,7 +190,7 @@ def test_check_names_the_stops_that_do_not_fit_the_floor(
     assert "is 0.500 m from columns-" in others[0]["message"]
 
 
-def test_check_tells_of_settings_that_are_none_and_of_another_robot(
+def test_check_reports_settings_that_are_none_and_of_another_robot(
     made: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     floor, mission = made.with_name("floor.dxf"), read(made)

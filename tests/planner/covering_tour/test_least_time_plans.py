@@ -49,7 +49,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_report_tells_what_was_saved_and_what_no_plan_is_below(written: Path) -> None:
+def test_the_report_reports_what_was_saved_and_what_no_plan_is_below(written: Path) -> None:
     told = json.loads((written / "told.json").read_text())
     time = told["least_time"]
     assert time["bound_s"] < time["total_s"] < time["two_step_s"]
@@ -98,7 +98,7 @@ def test_another_word_is_refused(value: str, capsys: pytest.CaptureFixture[str])
         read_settings(None, {"minimise": value})
 
 
-def test_a_floor_where_nothing_is_to_be_seen_is_told_as_ever(tmp_path: Path) -> None:
+def test_a_floor_where_nothing_is_to_be_seen_is_reported_as_ever(tmp_path: Path) -> None:
     from stopgo.mission.errors import NegativeResult
 
     bare = floor_of(box(0, 0, 6, 4))

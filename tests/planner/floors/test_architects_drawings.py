@@ -1,4 +1,4 @@
-"""Drawings as an architect makes them: what no layer of our names shows is worked out, and told."""
+"""Drawings as an architect makes them: what no layer of our names shows is worked out, and reported."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ def test_a_swing_of_many_small_lines_is_a_swing(tmp_path: Path) -> None:
 
 
 def test_a_leaf_that_stands_open_along_a_wall_opens_no_wall(tmp_path: Path) -> None:
-    """The door leads out of the hall at the end of its wall; open, its leaf lies on the wall beside it."""
+    """The door leads out of the hall at the end of its wall; open, its leaf lies on the wall next to it."""
     drawing = new_drawing()
     model = drawing.modelspace()
     rectangle(model, "FLOORING", 0, 0, 8, 6)
@@ -271,7 +271,7 @@ def test_round_corners_and_quarter_round_walls_are_walls_and_no_doors(tmp_path: 
     assert not floor.openings
 
 
-def test_a_unit_that_is_told_is_taken_and_an_absurd_one_refused(tmp_path: Path) -> None:
+def test_a_unit_that_is_given_is_taken_and_an_absurd_one_refused(tmp_path: Path) -> None:
     drawing = new_drawing(0)
     flat(drawing.modelspace(), unit=100)
     assert read(drawing, tmp_path, units="cm").area == pytest.approx(9.6 * 5.4, abs=1e-3)
@@ -338,7 +338,7 @@ def test_furniture_is_an_obstacle_and_notes_are_nothing(tmp_path: Path) -> None:
 
 
 def test_two_names_in_one_space_part_it_at_its_narrowest(tmp_path: Path) -> None:
-    """A hall of 6 by 4 m and a bay beside it behind a mouth of 2 m, wider than any door."""
+    """A hall of 6 by 4 m and a bay next to it behind a mouth of 2 m, wider than any door."""
     drawing = new_drawing()
     model = drawing.modelspace()
     ring = [(0, 0), (6, 0), (6, 1), (9, 1), (9, 3), (6, 3), (6, 4), (0, 4)]
@@ -428,7 +428,7 @@ def test_a_large_building_has_as_many_niches_as_a_pattern_has_cells(tmp_path: Pa
     assert read(drawing, tmp_path, units="m").area == pytest.approx(3200, rel=1e-3)
 
 
-def test_an_area_beside_a_rooms_name_is_no_second_name(tmp_path: Path) -> None:
+def test_an_area_next_to_a_rooms_name_is_no_second_name(tmp_path: Path) -> None:
     drawing = new_drawing()
     model = drawing.modelspace()
     flat(model)

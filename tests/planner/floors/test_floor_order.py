@@ -77,7 +77,7 @@ def test_the_order_of_entities_does_not_matter(read: Read, seed: int) -> None:
     assert other.findings == plan.findings
 
 
-def test_what_is_drawn_twice_counts_once_and_is_told(read: Read) -> None:
+def test_what_is_drawn_twice_counts_once_and_is_reported(read: Read) -> None:
     once = read(lambda m: [step(m) for step in steps()])
     twice = read(lambda m: [step(m) for step in (*steps(), *reversed(steps()))])
     assert content(twice) == content(once)

@@ -63,7 +63,7 @@ JOINTS = {0.0004: "0.4 mm", 0.004: "4.0 mm", 0.02: "20.0 mm"}
 
 
 def beside(model: Modelspace, joint: float, degrees: float = 0.0) -> None:
-    """A slab of 6 by 8 m beside the floor of 10 by 8 m, all turned round 0, 0."""
+    """A slab of 6 by 8 m next to the floor of 10 by 8 m, all turned round 0, 0."""
     for x0, x1 in ((0.0, 10.0), (10.0 + joint, 16.0 + joint)):
         rectangle(model, "FLOOR", x0, 0, x1, 8)
     turn = Matrix44.z_rotate(math.radians(degrees))
@@ -73,7 +73,7 @@ def beside(model: Modelspace, joint: float, degrees: float = 0.0) -> None:
 
 @pytest.mark.parametrize("degrees", [0.0, 17.0, 45.0, 200.0])
 @pytest.mark.parametrize("joint", JOINTS)
-def test_a_joint_between_slabs_is_closed_and_told(read: Read, joint: float, degrees: float) -> None:
+def test_a_joint_between_slabs_is_closed_and_reported(read: Read, joint: float, degrees: float) -> None:
     plan = read(lambda model: beside(model, joint, degrees), floor=False)
     assert len(plan.outline) == 1
     assert plan.area == pytest.approx((16 + joint) * 8, abs=1e-6)
@@ -84,7 +84,7 @@ def test_a_joint_between_slabs_is_closed_and_told(read: Read, joint: float, degr
 
 @pytest.mark.parametrize("degrees", [0.0, 53.0])
 def test_a_joint_that_widens_is_closed_as_far_as_it_is_one(read: Read, degrees: float) -> None:
-    """From 0.4 mm in the south to 4 mm, and beside another slab to 40 mm in the north."""
+    """From 0.4 mm in the south to 4 mm, and next to another slab to 40 mm in the north."""
 
     def draw(model: Modelspace) -> None:
         for corners in (
@@ -172,7 +172,7 @@ def test_slabs_that_cross_keep_their_corners(read: Read) -> None:
     assert codes(plan) == []
 
 
-def test_lines_turned_by_an_odd_angle_still_meet(read: Read) -> None:
+def test_lines_turned_by_an_unusual_angle_still_meet(read: Read) -> None:
     """Ends on the middle of a slanted line are never exactly on it in floating point."""
 
     def turned(x: float, y: float) -> tuple[float, float]:
@@ -327,7 +327,7 @@ def test_rings_of_one_global_id_are_one_room(read: Read) -> None:
     assert [len(room.polygons) for room in plan.rooms] == [2]
 
 
-def test_rooms_that_overlap_are_parted_and_told(read: Read) -> None:
+def test_rooms_that_overlap_are_parted_and_reported(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         rectangle(model, "ROOMS", 0, 0, 6, 8)
         rectangle(model, "ROOMS", 5, 0, 10, 8)
@@ -346,7 +346,7 @@ def test_rooms_may_be_drawn_as_lines(read: Read) -> None:
     assert [room.area for room in read(draw).rooms] == pytest.approx([32, 48])
 
 
-def test_a_room_off_the_floor_is_told(read: Read) -> None:
+def test_a_room_off_the_floor_is_reported(read: Read) -> None:
     plan = read(lambda m: rectangle(m, "ROOMS", 9, 0, 20, 8))
     assert codes(plan) == ["room_off_floor"]
 
@@ -528,7 +528,7 @@ def test_closed_shapes_of_an_unknown_layer_are_obstacles(read: Read) -> None:
     assert "1 open lines and 1 texts" in plan.findings[0].message
 
 
-def test_frames_around_the_floor_and_shapes_beside_it_are_no_obstacles(read: Read) -> None:
+def test_frames_around_the_floor_and_shapes_next_to_it_are_no_obstacles(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         rectangle(model, "SHEET", -5, -5, 15, 13)
         rectangle(model, "SHEET", 16, -5, 20, 13)
@@ -560,7 +560,7 @@ def test_hidden_layers_count_only_if_their_name_is_known(read: Read, state: str)
     assert codes(plan) == ["hidden_layer"]
 
 
-def test_a_polyline_drawn_as_a_band_is_told(read: Read) -> None:
+def test_a_polyline_drawn_as_a_band_is_reported(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         model.add_lwpolyline([(1, 1), (4, 1)], dxfattribs={"layer": "WALLS", "const_width": 0.24})
 
@@ -569,7 +569,7 @@ def test_a_polyline_drawn_as_a_band_is_told(read: Read) -> None:
     assert "0.24 m wide" in plan.findings[0].message
 
 
-def test_a_clipped_block_is_read_whole_and_told(read: Read) -> None:
+def test_a_clipped_block_is_read_whole_and_reported(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         model.doc.blocks.new("bay").add_line((0, 0), (3, 0))
         insert = model.add_blockref("bay", (2, 2), dxfattribs={"layer": "WALLS"})

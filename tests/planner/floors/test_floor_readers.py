@@ -42,7 +42,7 @@ def test_every_reader_names_options_that_there_are_and_has_both_functions() -> N
         assert callable(reader.load().survey)
 
 
-def test_the_survey_of_a_layered_drawing_tells_its_floor_and_its_layers() -> None:
+def test_the_survey_of_a_layered_drawing_reports_its_floor_and_its_layers() -> None:
     found, floor = survey_floor(OFFICE), read_floor(OFFICE)
     assert found.digest == floor.digest
     (only,) = found.floors
@@ -53,7 +53,7 @@ def test_the_survey_of_a_layered_drawing_tells_its_floor_and_its_layers() -> Non
     assert {layer.role for layer in found.layers} >= {"floor", "rooms", "walls", "doors"}
 
 
-def test_the_command_tells_the_floor_and_every_layer(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_reports_the_floor_and_every_layer(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["floors", str(OFFICE)]) == 0
     text = capsys.readouterr().out
     assert "* floor       office, " in text

@@ -237,7 +237,7 @@ def test_a_block_that_holds_itself_is_not_followed(read: Read) -> None:
     assert len(plan.elements) == 1
 
 
-def test_a_block_that_is_not_there_is_told(read: Read) -> None:
+def test_a_block_that_is_not_there_is_reported(read: Read) -> None:
     plan = read(lambda m: m.add_blockref("site", (5, 5), dxfattribs={"layer": "WALLS"}))
     assert codes(plan) == ["missing_block"]
     assert "site" in plan.findings[0].message
@@ -270,7 +270,7 @@ def test_a_coordinate_too_small_to_divide_by_is_zero(read: Read) -> None:
     assert only(plan).lines[0].tolist() == [[0, 0], [4, 5]]
 
 
-def test_a_solid_body_is_told_to_be_exploded(read: Read) -> None:
+def test_a_solid_body_is_reported_with_explode_as_the_remedy(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         for _ in range(2):
             cube().render_mesh(model, dxfattribs={"layer": "WALLS"})

@@ -129,7 +129,7 @@ def test_the_sides_of_a_room_are_an_area_if_both_have_a_unit() -> None:
     assert not is_only_area("30 m² Lager")
 
 
-def test_written_areas_between_lines_tell_the_unit(tmp_path: Path) -> None:
+def test_written_areas_between_lines_show_the_unit(tmp_path: Path) -> None:
     drawing = ezdxf.new()
     model = drawing.modelspace()
     for x in (0, 400, 900, 1300):
@@ -154,7 +154,7 @@ def test_a_door_swing_has_a_leaf_or_ends_at_jambs_and_a_round_corner_has_neither
     assert swings_of([arc], drawn_leaf=True) == []
 
 
-def test_doors_tell_centimetres_from_millimetres(read: Read) -> None:
+def test_doors_distinguish_centimetres_from_millimetres(read: Read) -> None:
     """3500 units are 3.5 m or 35 m; a door of 90 units is 0.9 m only in centimetres."""
 
     def draw(model: Modelspace) -> None:

@@ -82,7 +82,7 @@ def test_lintels_and_the_ceiling_are_given_too(drawing: Path) -> None:
     assert any("doors 2.1 m, ceiling 3 m" in item.message for item in floor.findings)
 
 
-def test_beams_that_no_ray_reaches_are_told_and_not_counted(
+def test_beams_that_no_ray_reaches_are_reported_and_not_counted(
     drawing: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bare = surface(drawing, "ceiling=2.7", "beams=2.4..2.7")

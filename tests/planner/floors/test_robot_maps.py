@@ -274,7 +274,7 @@ def test_a_faulty_picture_is_refused_in_one_line(tmp_path: Path, image: bytes, s
         read_floor(map_in(tmp_path, two_rooms(), image=image))
 
 
-def test_a_survey_tells_what_is_on_the_map(tmp_path: Path) -> None:
+def test_a_survey_reports_what_is_on_the_map(tmp_path: Path) -> None:
     told = survey_floor(map_in(tmp_path, two_rooms()))
     assert told.kind == "robot map, 228 x 148 cells of 0.05 m"
     assert told.floors[0].elements["rooms"] == 2

@@ -1,4 +1,4 @@
-"""Walls of drawings whose layers tell nothing: read where geometry and texts show them, else asked for."""
+"""Walls of drawings whose layers mean nothing: read where geometry and texts show them, else requested."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_written_areas_that_are_true_show_rooms_of_single_lines(tmp_path: Path) 
     assert "2 written areas are true of the rooms" in told(floor)[0]
 
 
-def test_written_areas_that_are_false_tell_against_walls(tmp_path: Path) -> None:
+def test_written_areas_that_are_false_speak_against_walls(tmp_path: Path) -> None:
     areas = [lambda model: text(model, "12 m²", 1, 1), lambda model: text(model, "11 m2", 6, 1)]
     with pytest.raises(InputError, match="not enough to show that they are walls"):
         read([double_walls, names, *areas], tmp_path)
@@ -94,7 +94,7 @@ def test_rooms_drawn_as_closed_lines_on_their_layer_are_walled(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("title", ["FRONT ELEVATION", "Section A-A", "Ansicht Nord", "Site plan 1:500"])
-def test_a_title_of_another_view_tells_against_walls(title: str, tmp_path: Path) -> None:
+def test_a_title_of_another_view_speaks_against_walls(title: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not enough to show"):
         read([double_walls, swing, names, lambda model: text(model, title, 2, -1)], tmp_path)
 
@@ -110,7 +110,7 @@ def test_rows_of_tables_are_no_walls_with_passages(tmp_path: Path) -> None:
         read([hall], tmp_path)
 
 
-def test_lines_that_lie_about_tell_against_walls(tmp_path: Path) -> None:
+def test_lines_that_lie_about_speak_against_walls(tmp_path: Path) -> None:
     def strays(model: Modelspace) -> None:
         for k in range(9):
             model.add_line((k, -30), (k, 30))
@@ -127,6 +127,23 @@ def test_one_kind_of_evidence_is_not_enough_and_one_option_accepts(draw: list, t
     assert option is not None
     name, _, kind = shlex.split(option[1])[1].partition("=")
     assert read(draw, tmp_path, layers={name.upper(): kind}).area > 50
+
+
+def test_walls_that_were_drawn_on_the_columns_layer_are_found(tmp_path: Path) -> None:
+    floor = read([lambda model: double_walls(model, "COLUMNS"), swing], tmp_path)
+    assert sorted(round(room.area, 1) for room in floor.rooms) == [20.0, 25.0]
+
+
+def test_a_corner_between_walls_is_not_the_floor(tmp_path: Path) -> None:
+    def few(model: Modelspace) -> None:
+        rectangle(model, "WALLS", 1, 4, 2.5, 5)
+        rectangle(model, "WALLS", 4, 0, 4.2, 2)
+        model.add_line((-0.2, -0.2), (9.4, -0.2), dxfattribs={"layer": "WALLS"})
+
+    floor = read([few, lambda model: double_walls(model, "CONCRETE-COLUMN"), swing, names], tmp_path)
+    assert floor.area > 40
+    with pytest.raises(InputError, match="the walls on WALLS enclose no floor"):
+        read([few], tmp_path)
 
 
 def test_the_option_of_a_layer_with_spaces_can_be_pasted(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import ezdxf
 import numpy as np
 from ezdxf.document import Drawing
+from ezdxf.entities import DXFEntity
 from ezdxf.layouts import Modelspace
 
 from stopgo.mission.errors import InputError
@@ -125,17 +126,28 @@ def _areas(drawing: Drawing, pen: _Pen, width: float, depth: float, count: int, 
         text.dxf.height = 0.2 * pen.per_metre
 
 
-def rescaled(path: Path, code: int, kind: str) -> Drawing:
-    """A drawing in metres in another unit; `bare` without header, `no doors` without doors either."""
+def rescaled(path: Path, code: int, kind: str, *, own: int = 6) -> Drawing:
+    """A drawing, whose unit has the code `own`, in another unit.
+
+    Without a header, unless `kind` is `header` or `wrong header`; without doors or dimensions if it says so.
+    """
     drawing = ezdxf.readfile(path)
-    drawing.header["$INSUNITS"] = code if kind == "header" else 0
-    factor = 1.0 / METRES[code][1]
+    headers = {"header": code, "wrong header": CODES[(CODES.index(code) + 1) % len(CODES)]}
+    drawing.header["$INSUNITS"] = headers.get(kind, 0)
+    factor = METRES[own][1] / METRES[code][1]
     for entity in list(drawing.modelspace()):
-        if kind == "no doors" and entity.dxf.layer in ("DOORS", "PASSAGES"):
+        if _is_left_out(entity, kind):
             drawing.modelspace().delete_entity(entity)
         else:
             entity.scale(factor, factor, factor)  # type: ignore[attr-defined]
     return drawing
+
+
+def _is_left_out(entity: DXFEntity, kind: str) -> bool:
+    layer = entity.dxf.layer.upper()
+    if kind == "no doors":
+        return "DOOR" in layer or "PASSAGE" in layer or "PUERTA" in layer
+    return kind == "no dimensions" and entity.dxftype() == "DIMENSION"
 
 
 def verdict(drawing: Drawing, code: int, path: Path) -> str:

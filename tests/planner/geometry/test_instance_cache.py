@@ -14,7 +14,7 @@ from tests.planner.worlds import two_rooms
 from tests.test_house import MODULES
 
 
-def test_it_is_worked_out_once_and_anew_for_a_noun_with_other_values() -> None:
+def test_it_is_worked_out_once_and_again_for_a_noun_with_other_values() -> None:
     space = navigable(two_rooms(0.9), Settings())
     assert reach_of(space) is reach_of(space)
     other = replace(space, settings=Settings(robot_radius=0.2))

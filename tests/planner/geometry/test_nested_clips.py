@@ -30,7 +30,7 @@ def test_a_clip_is_the_part_of_the_shape_in_the_box(side: float) -> None:
 
 
 @pytest.mark.parametrize("box", [(100.0, 100.0, 101.0, 101.0), (60.0, 0.0, 61.0, 4.0)])
-def test_beside_the_shape_a_clip_is_empty(box: tuple[float, ...]) -> None:
+def test_outside_the_shape_a_clip_is_empty(box: tuple[float, ...]) -> None:
     assert NestedClips(_combs(60)).within(np.array(box)).is_empty
 
 

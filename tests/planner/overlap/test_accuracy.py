@@ -1,4 +1,4 @@
-"""Scans as accurate as required: control points, further stops, and what is told where neither suffices."""
+"""Scans as accurate as required: control points, more stops, and what is reported where neither suffices."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_an_accuracy_that_holds_already_costs_nothing() -> None:
     assert len(made(accuracy=2 * worst_mm(loose)).mission.stops) == len(loose.mission.stops)
 
 
-def test_an_accuracy_that_cannot_be_reached_is_told_with_a_position_for_a_control_point() -> None:
+def test_an_accuracy_that_cannot_be_reached_is_reported_with_a_position_for_a_control_point() -> None:
     part = made(accuracy=0.01)
     report = PlanReport(part, {}, {})
     (told,) = [item for item in report.figures.grave if item.code == "accuracy_not_met"]

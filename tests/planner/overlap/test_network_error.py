@@ -33,7 +33,7 @@ def test_a_chain_drifts_by_the_root_of_its_pairs() -> None:
 
 
 def test_a_loop_lowers_the_error() -> None:
-    """Round a loop of four, two pairs in series lie beside two more: 1 mm instead of √2 mm."""
+    """Round a loop of four, two pairs in series lie next to two more: 1 mm instead of √2 mm."""
     errors = errors_of(HERE, [(0, 1), (1, 2), (2, 3), (3, 0)], [ONE] * 4, [0])
     assert errors[2] == pytest.approx(1e-3)
     assert errors[1] == errors[3] == pytest.approx(math.sqrt(3) / 2 * 1e-3)

@@ -49,7 +49,7 @@ def made() -> PlanReport:
     return PlanReport(plan(three_rooms(), ASKED).first, {}, {})
 
 
-def test_the_plan_is_one_network_and_its_pairs_are_counted_anew(made: PlanReport) -> None:
+def test_the_plan_is_one_network_and_its_pairs_are_counted_again(made: PlanReport) -> None:
     network = network_of(made.mission)
     assert network is not None
     assert len(network.pieces) == 1
@@ -76,8 +76,8 @@ def test_without_registration_there_is_no_network_and_not_more_stops(made: PlanR
     assert len(plain.stops) <= len(made.mission.stops)
 
 
-def test_rooms_that_cannot_see_one_another_are_told_with_a_way_out() -> None:
-    """No pair shares 99 % of a scan: every piece is told, with where spheres would join it."""
+def test_rooms_that_cannot_see_one_another_are_reported_with_a_remedy() -> None:
+    """No pair shares 99 % of a scan: every piece is reported, with where spheres would join it."""
     settings = replace(ASKED, doors="closed", overlap=0.99, candidates="grid")
     report = PlanReport(plan(three_rooms(), settings).first, {}, {})
     apart = [item for item in report.figures.grave if item.code == "scans_apart"]
@@ -90,7 +90,7 @@ def test_rooms_that_cannot_see_one_another_are_told_with_a_way_out() -> None:
     assert "COMPONENTS" in report.as_text()
 
 
-def test_a_plan_that_nobody_asked_to_register_tells_into_how_many_pieces_its_scans_fall() -> None:
+def test_a_plan_that_nobody_asked_to_register_reports_into_how_many_pieces_its_scans_fall() -> None:
     report = PlanReport(plan(three_rooms(), replace(LOOSE, range=3.0)).first, {}, {})
     (told,) = [item for item in report.figures.findings if item.code == "scans_not_joined"]
     joined = Network(tuple(stop_names(len(report.mission.stops))), registered_pairs(report.part.route))
@@ -107,7 +107,7 @@ def test_a_plan_whose_scans_join_anyway_says_nothing() -> None:
 
 
 def test_a_further_mission_joins_the_scans_that_were_taken(made: PlanReport) -> None:
-    """All is seen from one place in each outer room but the middle one; its further stops join both."""
+    """One position in each outer room sees all of it; the additional stops of the middle room join both."""
     space = made.part.space
     planned = PlannedFloor(
         space.floor, replace(space.settings, coverage=0.5, room_coverage=0.0), made.mission
@@ -151,7 +151,7 @@ def test_a_mission_of_an_earlier_version_registers_only_if_it_gave_an_overlap(ov
     assert problems == (["$.network"] if overlap else [])
 
 
-def test_a_separate_scan_is_told_with_the_reason_and_a_position_for_a_target() -> None:
+def test_a_separate_scan_is_reported_with_the_reason_and_a_position_for_a_target() -> None:
     """A corridor of 60 m whose ends no stop in its middle sees: its walls hold nothing along it."""
     corridor = floor_of(box(0, 0, 60, 3), elements=(shell(0, 0, 60, 3),))
     asked = Settings(d_sec=0.5, edge=0.0, overlap_range=8.0, range=8.0)

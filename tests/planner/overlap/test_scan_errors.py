@@ -96,7 +96,7 @@ def test_the_ellipse_of_a_covariance_has_its_axes_and_direction() -> None:
     assert np.isinf(found[1]).all()
 
 
-def test_the_mission_carries_what_the_report_tells() -> None:
+def test_the_mission_carries_what_the_report_reports() -> None:
     made = plan(three_rooms(), replace(ASKED, range=3.0)).first
     told = predicted_errors(made.route)
     assert [error.major_m for error in errors_of(made.mission)] == pytest.approx(told.m.tolist(), abs=1e-5)

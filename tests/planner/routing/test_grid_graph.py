@@ -55,7 +55,7 @@ def room_in_room() -> FloorPlan:
 
 
 @pytest.mark.parametrize("floor", [floor_with_things(), two_rooms(0.9), hall(7, 5, column("c", 3, 2))])
-def test_a_way_over_grids_is_in_the_clear_and_never_shorter_than_the_exact_one(floor: FloorPlan) -> None:
+def test_a_path_over_grids_is_in_the_clear_and_never_shorter_than_the_exact_one(floor: FloorPlan) -> None:
     space = navigable(floor, GRID)
     points = np.array([(0.6, 0.6), (3.2, 3.3), (0.6, 3.4), (5.2, 3.3), (5.4, 1.5)])
     exact, ways = paths_between(space, points), grid_paths(space, points)
@@ -72,7 +72,7 @@ def test_a_way_over_grids_is_in_the_clear_and_never_shorter_than_the_exact_one(f
             assert shape.distance(things) >= 0.35 - 1e-6
 
 
-def test_in_an_open_room_a_way_is_straight_and_diagonal_steps() -> None:
+def test_in_an_open_room_a_path_is_straight_and_diagonal_steps() -> None:
     # Nodes stand at whole metres; from (1, 1) to (5, 3) it is two diagonals and two straight steps.
     space = navigable(hall(6, 4), GRID)
     ways = grid_paths(space, np.array([(1.0, 1.0), (5.0, 3.0)]))
@@ -110,7 +110,7 @@ def test_the_grid_is_refined_until_it_is_dense_enough() -> None:
     assert nodes == sorted(set(nodes))
 
 
-def test_where_the_finest_grid_fails_the_message_names_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_the_finest_grid_fails_the_message_names_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     # A passage 3 m deep and 0.9 m wide, drawn as one room's: no node of 1 m stands in it.
     monkeypatch.setattr("stopgo.planner.routing.grid_graph.RESOLUTIONS", RESOLUTIONS[:1])
     space = navigable(two_rooms(0.9, thick=3.0, at=1.7, with_door=False), GRID)

@@ -60,7 +60,7 @@ def shortest(space: NavigableSpace, points: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_ways_are_as_short_as_over_every_corner(seed: int) -> None:
+def test_paths_are_as_short_as_over_every_corner(seed: int) -> None:
     space = replace(navigable(random_floor(seed), SETTINGS), gaps=np.empty((0, 2, 2)))
     points = free_points(space, 6, seed)
     found = paths_between(space, points)
@@ -90,7 +90,7 @@ def test_edges_that_cut_corners_are_not_missed(seed: int, monkeypatch: pytest.Mo
     assert np.array_equal(reduced.lengths, full.lengths)
 
 
-def test_a_way_bends_at_outward_corners_only() -> None:
+def test_a_path_bends_at_outward_corners_only() -> None:
     space = navigable(random_floor(3), SETTINGS)
     points = free_points(space, 6, 1)
     ways = paths_between(space, points)
@@ -104,7 +104,7 @@ def test_an_empty_hall_has_no_corner_to_bend_at() -> None:
     assert len(outward_corners(navigable(hall(6, 4), SETTINGS)).xy) == 0
 
 
-def test_points_in_rooms_that_are_not_connected_have_no_way() -> None:
+def test_points_in_rooms_that_are_not_connected_have_no_path() -> None:
     lengths = paths_between(navigable(two_rooms(0.5), SETTINGS), np.array([(1.0, 1.0), (7.0, 1.0)])).lengths
     assert np.isinf(lengths[0, 1])
 

@@ -63,7 +63,7 @@ def geodesics(floor: FloorPlan, points: np.ndarray, radius: float) -> dict[int, 
 
 
 @pytest.mark.parametrize("seed", some(range(6), every=2))
-def test_a_way_is_as_long_as_the_shortest(seed: int) -> None:
+def test_a_path_is_as_long_as_the_shortest(seed: int) -> None:
     random = np.random.default_rng(seed)
     blocks = [
         wall(f"w{k}", box(x, y, x + w, y + h))
@@ -83,13 +83,13 @@ def test_a_way_is_as_long_as_the_shortest(seed: int) -> None:
         assert np.isclose(np.hypot(*np.diff(line, axis=0).T).sum(), ways.lengths[a, b])
 
 
-def test_a_way_in_the_open_is_straight() -> None:
+def test_a_path_in_the_open_is_straight() -> None:
     ways = paths_between(navigable(hall(6, 4), Settings()), np.array([(1.0, 1.0), (5.0, 3.0)]))
     assert ways.lengths[0, 1] == pytest.approx(np.hypot(4, 2))
     assert len(ways.path(0, 1)) == 2
 
 
-def test_a_way_round_one_corner_is_two_tangents_and_an_arc() -> None:
+def test_a_path_round_one_corner_is_two_tangents_and_an_arc() -> None:
     # Round the corner (3, 2) of a wall: up on its left, then to the right above it.
     floor = hall(6, 6, wall("w", box(3, 0, 6, 2)))
     start, end = np.array([2.0, 0.5]), np.array([5.5, 3.0])
@@ -102,7 +102,7 @@ def test_a_way_round_one_corner_is_two_tangents_and_an_arc() -> None:
     assert true - 1e-9 <= found <= true + 0.02 * RADIUS
 
 
-def test_ways_are_symmetric_and_keep_the_triangle_inequality() -> None:
+def test_paths_are_symmetric_and_keep_the_triangle_inequality() -> None:
     points = np.array([(0.6, 0.6), (3.3, 3.4), (4.6, 2.0), (7.4, 0.5), (7.4, 3.5), (4.6, 0.5)])
     lengths = paths_between(navigable(floor_with_things(), Settings()), points).lengths
     assert np.isfinite(lengths).all()

@@ -34,7 +34,7 @@ def prove(folder: Path, *more: str):
     return stopgo("prove", str(folder / "mission.json"), "--floor", str(folder / "floor.dxf"), *COARSE, *more)
 
 
-def test_a_proof_is_written_read_back_and_told(planned: Path) -> None:
+def test_a_proof_is_written_read_back_and_reported(planned: Path) -> None:
     told = prove(planned, "--json")
     assert [line for line in told.stderr.splitlines() if not line.endswith(": running")] == []
     answer = json.loads(told.stdout)
@@ -51,7 +51,7 @@ def test_a_proof_is_written_read_back_and_told(planned: Path) -> None:
     assert "verification by simulation" in page and mission["digest"] in page
 
 
-def test_a_damaged_coverage_beside_the_mission_is_told(planned: Path, tmp_path: Path) -> None:
+def test_a_damaged_coverage_next_to_the_mission_is_reported(planned: Path, tmp_path: Path) -> None:
     whole = (planned / "coverage.json").read_bytes()
     for name in ("mission.json", "floor.dxf"):
         (tmp_path / name).write_bytes((planned / name).read_bytes())
@@ -84,7 +84,7 @@ def test_another_floor_is_refused(planned: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("library", ["embreex", "small_gicp"])
-def test_a_missing_library_is_told_with_its_extra(
+def test_a_missing_library_is_reported_with_its_extra(
     planned: Path, library: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
@@ -123,7 +123,7 @@ def test_on_a_full_disk_nothing_is_left(planned: Path, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_written_is_told_before_anything_is_done(planned: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported_before_anything_is_done(planned: Path) -> None:
     told = prove(planned, "-o", str(planned / "floor.dxf"))
     assert told.returncode == 2
     assert "floor.dxf" in told.stderr

@@ -156,7 +156,7 @@ def test_stops_in_doorways_count_for_what_they_see() -> None:
 
 
 def fewest_beside(found: Selection, fixed: int) -> int:
-    """Stops needed by trying all sets of candidates beside the doorways."""
+    """Stops needed by trying all sets of candidates next to the doorways."""
     visibility = found.visibility
     doorways = visibility.candidates.doorway_rows.tolist()
     assert len(doorways) == fixed
@@ -172,7 +172,7 @@ def fewest_beside(found: Selection, fixed: int) -> int:
     raise AssertionError("more than three stops beside the doorways")
 
 
-def test_places_beside_the_pattern_may_save_a_stop_and_never_cost_one() -> None:
+def test_positions_off_the_pattern_may_save_a_stop_and_never_cost_one() -> None:
     """From the middle of a hall of 7 × 4 m a scanner of 4 m sees 96 % of it; a grid of 2.5 m misses it."""
     floor = hall(7, 4)
     stops = {}
@@ -183,7 +183,7 @@ def test_places_beside_the_pattern_may_save_a_stop_and_never_cost_one() -> None:
     assert np.array_equal(stops[True].visibility.visible, stops[False].visibility.visible)
 
 
-def test_the_papers_rule_offers_nothing_beside_the_pattern() -> None:
+def test_the_papers_rule_offers_nothing_off_the_pattern() -> None:
     _, nouns = planned(hall(7, 4), Settings(coverage_rule="paper"))
     assert not len(nouns[Selection].candidates.extra_rows)
 

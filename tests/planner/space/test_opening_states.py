@@ -122,7 +122,7 @@ def test_a_bent_corridor_as_wide_as_the_robot_is_driven_through() -> None:
     assert 6.5 < way(hall(8, 4, *walls)) < 8.0
 
 
-def test_a_round_column_beside_a_wall_leaves_what_it_leaves() -> None:
+def test_a_round_column_next_to_a_wall_leaves_what_it_leaves() -> None:
     angles = np.arange(0, 2 * np.pi, np.pi / 16)
 
     def beside(gap: float) -> FloorPlan:
@@ -236,7 +236,7 @@ def test_a_door_to_floor_in_no_room_may_be_blocked() -> None:
     assert "planter" in found.why
 
 
-def test_a_door_beside_a_gap_in_the_same_wall_leaves_the_gap_open() -> None:
+def test_a_door_next_to_a_gap_in_the_same_wall_leaves_the_gap_open() -> None:
     # A narrow door at y = 1 and a plain gap of 0.8 m at y = 3: the robot takes the gap.
     walls = (
         wall("s", box(3.9, 0, 4.1, 0.7)),
@@ -278,7 +278,7 @@ def test_a_railing_drawn_as_a_line_blocks_driving() -> None:
 
 
 def overshooting(clear: float, *, by: float = 0.4) -> FloorPlan:
-    """An open passage whose line runs on along and into the walls beside it."""
+    """An open passage whose line runs on along and into the walls next to it."""
     floor = two_rooms(clear)
     line = door("p", (4, 2 - clear / 2 - by), (4, 2 + clear / 2 + by), kind="passage")
     return replace(floor, openings=(line,))

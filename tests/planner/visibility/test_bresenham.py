@@ -125,7 +125,7 @@ def test_in_a_convex_room_nearly_all_is_seen_straight_on() -> None:
     assert wrong_share(bresenham(found), exact(found)) < 0.1
 
 
-def test_a_beam_behind_a_column_is_hidden_and_beside_it_seen() -> None:
+def test_a_beam_behind_a_column_is_hidden_and_next_to_it_seen() -> None:
     beam = element("beam", "beams", lines=[[(1, 3), (7, 3)]])
     found = placed(hall(8, 6, column("c", 4, 3, 1.0), beam), range=20.0)
     truth, seen = exact(found), bresenham(found)

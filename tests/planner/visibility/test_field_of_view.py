@@ -30,7 +30,7 @@ def test_all_round_there_are_no_headings() -> None:
 
 
 def test_half_the_circle_sees_half_a_square_room() -> None:
-    """From the middle of 4 × 4 m walls, looking right: the right wall, and half of the two beside it."""
+    """From the middle of 4 × 4 m walls, looking right: the right wall, and half of the two next to it."""
     seen = seen_with(hall(4, 4, column("c", 0.4, 3.6, 0.1)), 180, use=((2.0, 2.0),), targets=("walls",))
     found = seen.candidates
     row = int(found.must_rows[0])

@@ -27,7 +27,9 @@ from tests.faults.sizes import FULL
 from tests.planner.worlds import LAYERED, SHARED, box, column, element, hall, planned, two_rooms
 
 FLOOR = hall(7, 5, column("a", 3, 2), element("b", "beams", box(1, 3.4, 6, 3.6)))
-QUALITY = Settings(max_incidence=62, near=1.1, density=4, angular_step=0.07, grid=1.4, refine=False)
+QUALITY = Settings(
+    max_incidence=62, near=1.1, density=4, angular_step=0.07, grid=1.4, refine=False, register=False
+)
 SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
 WITHOUT_LIMITS = {
     "office": "78263333d44e823b",
@@ -103,7 +105,9 @@ def test_more_views_never_take_fewer_stops() -> None:
     for floor in (FLOOR, two_rooms(1.0)):
         stops = []
         for views in (1, 2, 3, 4):
-            settings = Settings(range=4, grid=1.2, views=views, selector="exact", refine=False)
+            settings = Settings(
+                range=4, grid=1.2, views=views, selector="exact", refine=False, register=False
+            )
             found = planned(floor, settings)[1][Selection]
             assert found.bound == len(found.chosen)
             stops.append(found.bound)
@@ -138,7 +142,7 @@ def test_what_a_run_acquires_counts_views_too() -> None:
     assert claimed == nouns[Visibility].seen_from(nouns[Selection].chosen).sum()
 
 
-def test_each_limit_is_told_with_about_what_it_costs() -> None:
+def test_each_limit_is_reported_with_about_what_it_costs() -> None:
     made = plan(FLOOR, replace(QUALITY, views=2)).first
     quality = made.figures.quality
     assert quality is not None
@@ -152,7 +156,7 @@ def test_each_limit_is_told_with_about_what_it_costs() -> None:
     assert plan(FLOOR, Settings()).first.figures.quality is None
 
 
-def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
+def test_what_cannot_be_seen_as_asked_is_reported_and_strict_refuses_it() -> None:
     closet = hall(2.2, 2.2)
     made = plan(closet, Settings(views=9)).first
     assert [item.code for item in made.figures.grave] == ["limits_not_met"]

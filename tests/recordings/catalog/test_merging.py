@@ -35,7 +35,9 @@ def test_it_holds_the_plan_and_every_run_once(merged: Path, sighted: Path, missi
         assert found.contents.rows[entity] == plan[entity]
 
 
-def test_reviewed_alone_it_tells_what_was_acquired(merged: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reviewed_alone_it_reports_what_was_acquired(
+    merged: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["review", str(merged)]) == 1
     out = capsys.readouterr().out
     assert "Not acquired. 57.1 %" in out

@@ -70,7 +70,7 @@ def test_a_run_that_comes_later_is_compared_with_the_plan_that_is_known(folder: 
 @pytest.mark.parametrize(
     "content", [b"", b"{", b'{"version": 99, "files": {}}', b"\xff\xfe", b'{"later": ' + b"[" * 20_000]
 )
-def test_an_index_that_cannot_be_read_is_made_anew(folder: Path, content: bytes) -> None:
+def test_an_index_that_cannot_be_read_is_made_again(folder: Path, content: bytes) -> None:
     whole = index_of(folder)
     (folder / INDEX).write_bytes(content)
     assert index_of(folder) == whole

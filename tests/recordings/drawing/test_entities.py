@@ -21,5 +21,5 @@ def test_no_entity_is_named_twice() -> None:
     assert len(names) == len(set(names))
 
 
-def test_the_candidates_plot_lies_beside_the_other_plots_of_coverage() -> None:
+def test_the_candidates_plot_lies_next_to_the_other_plots_of_coverage() -> None:
     assert entities.CANDIDATE_COVERAGE.startswith(f"{entities.METRIC_COVERAGE}/")

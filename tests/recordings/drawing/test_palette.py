@@ -33,12 +33,12 @@ STATES = ("RUNNING", "PAUSED", "HELD", "HOMING")
 
 @pytest.mark.parametrize("eye", EYES)
 @pytest.mark.parametrize("pair", TOLD_APART)
-def test_what_is_told_apart_by_colour_is_told_apart_by_every_eye(pair: str, eye: str) -> None:
+def test_what_is_distinguished_by_colour_is_distinguished_by_every_eye(pair: str, eye: str) -> None:
     assert distance(*TOLD_APART[pair], eye) >= APART
 
 
 @pytest.mark.parametrize("eye", EYES)
-def test_states_and_runs_are_told_apart_by_every_eye(eye: str) -> None:
+def test_states_and_runs_are_distinguished_by_every_eye(eye: str) -> None:
     states = [palette.STATE_COLOURS[name] for name in STATES]
     for colours in (states, palette.RUNS[:4]):
         assert min(distance(a, b, eye) for a, b in combinations(colours, 2)) >= APART

@@ -45,7 +45,7 @@ def test_a_run_is_read_back_event_by_event(read: Recording, mission: Mission) ->
     assert (log.source.format, len(log.source.digest), log.source.lost) == ("rrd", 64, 0)
 
 
-def test_its_poses_are_as_exact_as_they_were_told(read: Recording, mission: Mission) -> None:
+def test_its_poses_are_as_exact_as_they_were_reported(read: Recording, mission: Mission) -> None:
     poses = [item for item in run.reports(mission) if isinstance(item, PoseReport)]
     (log,) = read.logs
     by_time = {item.robot_ns: item.pose for item in poses}
@@ -86,7 +86,7 @@ def test_how_many_views_are_asked_for_travels(tmp_path: Path) -> None:
     assert back.planned == twice.planned != sight.planned
 
 
-def test_sight_that_does_not_fit_is_told(tmp_path: Path) -> None:
+def test_sight_that_does_not_fit_is_reported(tmp_path: Path) -> None:
     _, sight = planned()
     object.__setattr__(sight, "last", sight.last + 1000)
     with pytest.raises(InputError, match=r"sight\.rrd: visibility of its stops is damaged"):

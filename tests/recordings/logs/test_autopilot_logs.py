@@ -25,7 +25,7 @@ LAT, LON = 470_000_000, 80_000_000
 
 
 def flash_rows(count: int = 100) -> list[tuple[str, tuple]]:
-    """North at 1 m/s, told ten times a second; in AUTO from the beginning, with a mission of one item."""
+    """North at 1 m/s, reported ten times a second; in AUTO from the beginning, with a mission of one item."""
     rows: list[tuple[str, tuple]] = [
         ("ORGN", (0, 0, LAT, LON)),
         ("CMD", (0, 2, 0, 16, 0.0, 0.0, 0.0, 0.0, LAT, LON, 5.0, 0)),
@@ -202,7 +202,7 @@ def test_an_origin_that_is_set_again_applies_from_then_on(tmp_path: Path) -> Non
 
 
 def test_items_that_older_autopilots_log_when_they_begin_them_are_no_upload(tmp_path: Path) -> None:
-    """Before 4.6 the same CMD rows list a mission and tell of each item that is begun."""
+    """Before 4.6 the same CMD rows list a mission and report each item that is begun."""
     rows = flash_rows()
     listed = [
         ("CMD", (0, 3, number, command, 1.0, 0.0, 0.0, 0.0, LAT, LON, 0.0, 3))

@@ -50,7 +50,7 @@ def test_a_clock_that_is_set_in_mid_log_changes_no_verdict(
 
 
 @pytest.mark.parametrize("at", [0, 700, -1])
-def test_one_stamp_far_off_is_left_out_and_told(tmp_path: Path, at: int) -> None:
+def test_one_stamp_far_off_is_left_out_and_reported(tmp_path: Path, at: int) -> None:
     path = table(tmp_path / "a.csv")
     lines = path.read_text().splitlines()
     row = 1 + at if at >= 0 else at

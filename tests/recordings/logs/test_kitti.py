@@ -49,12 +49,12 @@ def test_matrices_of_a_camera_and_with_z_up_are_the_same_drive(
 
 
 @pytest.mark.parametrize("axes", [CAMERA, np.eye(3)])
-def test_without_a_turn_the_flat_side_tells_the_axis(tmp_path: Path, axes: np.ndarray) -> None:
+def test_without_a_turn_the_flat_side_shows_the_axis(tmp_path: Path, axes: np.ndarray) -> None:
     (track,) = read_log(written(tmp_path, matrices(axes, turns=False))).poses
     assert np.allclose(track.xy, XY, atol=1e-6)
 
 
-def test_matrices_that_do_not_tell_the_axis_are_refused(tmp_path: Path) -> None:
+def test_matrices_that_do_not_show_the_axis_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path, np.repeat(np.eye(3, 4)[None], COUNT, 0))
     with pytest.raises(InputError, match="which axis is vertical"):
         read_log(path)
@@ -65,7 +65,7 @@ def test_poses_without_times_are_refused_with_the_file_that_is_missing(tmp_path:
         read_log(written(tmp_path, matrices(CAMERA), None))
 
 
-def test_too_few_times_are_refused_and_more_are_told(tmp_path: Path) -> None:
+def test_too_few_times_are_refused_and_more_are_reported(tmp_path: Path) -> None:
     path = written(tmp_path, matrices(CAMERA), count=COUNT - 1)
     with pytest.raises(InputError, match="49 times for the 50 poses"):
         read_log(path)

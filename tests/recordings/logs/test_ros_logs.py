@@ -105,7 +105,7 @@ def fingerprint(path: Path) -> dict[str, str]:
 
 
 def test_transforms_give_the_robot_in_the_map(tmp_path: Path) -> None:
-    """The map lies 10 m beside the odometry's frame and is turned by 90°; frames have leading slashes."""
+    """The map lies 10 m off the odometry's frame and is turned by 90°; frames have leading slashes."""
     messages = Messages(ros2=True)
     rows = []
     for k in range(10):
@@ -120,7 +120,7 @@ def test_transforms_give_the_robot_in_the_map(tmp_path: Path) -> None:
     assert read_log(tmp_path / "a.mcap", Reading(frame="odom")).poses[0].xy[-1].tolist() == [9.0, 0.0]
 
 
-def test_simulated_stamps_in_a_log_of_wall_time_are_told(tmp_path: Path) -> None:
+def test_simulated_stamps_in_a_log_of_wall_time_are_reported(tmp_path: Path) -> None:
     messages = Messages(ros2=True)
     rows = [
         ("/odom", ODOMETRY, BEGIN_NS + k, messages.odometry(10**9 + k, (0.0, 0.0, 0.0))) for k in range(5)
@@ -130,7 +130,7 @@ def test_simulated_stamps_in_a_log_of_wall_time_are_told(tmp_path: Path) -> None
     assert "simulated time" in log.oddities[0]
 
 
-def test_gaps_jumps_and_poses_that_are_no_numbers_are_told(tmp_path: Path) -> None:
+def test_gaps_jumps_and_poses_that_are_no_numbers_are_reported(tmp_path: Path) -> None:
     poses = [(0.01 * k, 0.0, 0.0) for k in range(30)]
     poses[10] = (float("nan"), 0.0, 0.0)
     poses[20:] = [(5.0 + x, y, heading) for x, y, heading in poses[20:]]

@@ -103,7 +103,7 @@ def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_journal_is_read_with_what_its_writer_had_not_put_away(tmp_path: Path) -> None:
-    """Copied from a robot that was killed: the newest lines are in the file beside it."""
+    """Copied from a robot that was killed: the newest lines are in the file next to it."""
     from stopgo.bridge.robot.journal_file import open_journal
     from stopgo.mission.run.events import Arrived, Pose
 

@@ -1,4 +1,4 @@
-"""Health of a vehicle on the report: at the begin, at each change and at the end, unknown if nobody told."""
+"""Health of a vehicle in the report: at the start, each change and the end; unknown without a report."""
 
 from __future__ import annotations
 

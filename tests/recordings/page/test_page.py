@@ -1,4 +1,4 @@
-"""report.html: one file that needs nothing beside it, holds what was computed, and lets no text act."""
+"""report.html: one file that needs nothing next to it, holds what was computed, and lets no text act."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.page.runs_together import run_names, when_and_who
 from stopgo.recordings.page.words import number, shown
+from tests.mission.comparing.reports import told
 from tests.mission.comparing.test_compare import START, planned, run, visit
-from tests.mission.comparing.told import told
 from tests.recordings.run import BEGAN_NS
 
 NASTY = '<script>alert(1)</script> "&\x1b[31m\x00'
@@ -55,7 +55,7 @@ def skipping() -> ReportSubject:
     return ReportSubject((mission,), (compare(log, [mission], [sight]),), sight)
 
 
-def test_a_run_tells_its_verdict_and_every_figure() -> None:
+def test_a_run_reports_its_verdict_and_every_figure() -> None:
     subject = skipping()
     text = words(report_html(subject))
     assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was required, 78.5 % planned." in text
@@ -65,7 +65,7 @@ def test_a_run_tells_its_verdict_and_every_figure() -> None:
     assert "stationary 0:16 paused 1, held 0" in text
 
 
-def test_a_gap_in_the_poses_is_dashed_and_told() -> None:
+def test_a_gap_in_the_poses_is_dashed_and_reported() -> None:
     mission, sight = planned()
     path = [(k * 0.5, 1, 1) for k in range(20)] + [(40 + k * 0.5, 3.2, 1) for k in range(100)]
     log = told(
@@ -185,7 +185,7 @@ def test_what_was_lost_is_thicker_than_what_was_seen_and_what_is_missing_has_a_s
     assert names == {"S2 skipped"}
 
 
-def test_alignment_and_losses_of_a_log_are_told() -> None:
+def test_alignment_and_losses_of_a_log_are_reported() -> None:
     subject = skipping()
     (comparison,) = subject.comparisons
     fit = Alignment("fitted to 2 stops", 1.0, 2.0, 0.1, residual_rms_m=0.012, residual_max_m=0.02, pairs=2)

@@ -1,4 +1,4 @@
-"""`stopgo review` tells what recordings hold, with the exit codes of every command."""
+"""`stopgo review` reports what recordings hold, with the exit codes of every command."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_both_for_a_person(plan: Path, field: Path, capsys: pytest.CaptureFixtur
     assert "greatest position error 30.0 mm, cross-track error 30.0 mm" in text
 
 
-def test_a_skipped_stop_is_told_with_what_it_cost(
+def test_a_skipped_stop_is_reported_with_what_it_cost(
     sighted: Path, skipping: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of 14 visible units, S2 alone sees 3; 70 % is asked, and 57 % was scanned."""
@@ -83,7 +83,7 @@ def run_without(path: Path, mission: Mission, stop: str) -> Path:
     return path
 
 
-def test_two_runs_are_told_together_and_need_no_follow_up_for_what_one_of_them_did(
+def test_two_runs_are_reported_together_and_need_no_follow_up_for_what_one_of_them_did(
     sighted: Path, mission: Mission, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Without S2, 57 % of the visible is scanned; without S1 less. Together it is the planned 78.5 %."""

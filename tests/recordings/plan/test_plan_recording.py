@@ -54,7 +54,7 @@ def test_nothing_that_changes_is_hidden_by_something_static(plan: Path) -> None:
         assert not fixed & changing, f"{entity}: static {fixed & changing} hides what changes"
 
 
-def test_the_story_is_told_on_one_timeline_each_step_where_the_log_says(plan: Path) -> None:
+def test_the_story_is_reported_on_one_timeline_each_step_where_the_log_says(plan: Path) -> None:
     """Floor, space, candidates, two choices, route; hatches make way for the choices."""
     space = on(plan, entities.DRIVE_AREA, "LineStrips2D:strips", entities.STEP)
     assert [(step, bool(strips)) for step, strips in sorted(space.items())] == [(1, True), (3, False)]
@@ -159,7 +159,7 @@ def test_the_planned_robot_stands_at_its_stops_when_it_scans(plan: Path) -> None
     assert np.allclose(arrived[0], (3.2, 1.0, 0.0), atol=1e-6)
 
 
-def test_findings_and_results_are_told(plan: Path) -> None:
+def test_findings_and_results_are_reported(plan: Path) -> None:
     lines = [value[0] for _, value in cells(plan, entities.LOG_PLAN, "TextLog:text")]
     assert sum("unknown_layer" in line for line in lines) == 1
     assert sum("narrow_door" in line for line in lines) == 1

@@ -1,4 +1,4 @@
-"""Drives a mission on paper, and knows the truth of it: where the robot halted, when, and at which stop."""
+"""Drives a mission on paper, and knows the truth of it: where the robot stopped, when, and at which stop."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BEGIN_NS = 1_700_000_000 * 10**9
 
 @dataclass(frozen=True)
 class Halt:
-    """The truth of one halt: the stop's index (None: at no stop), when, and where."""
+    """The truth of one standstill: the stop's index (None: at no stop), when, and where."""
 
     stop: int | None
     begin_s: float
@@ -76,7 +76,7 @@ class Odd:
 
 
 def driven(mission: Mission, odd: Odd = Odd(), seed: int = 1) -> Drive:
-    """The whole mission, leg by leg; at an extra halt the robot waits in the middle of a leg."""
+    """The whole mission, leg by leg; at an extra standstill the robot waits in the middle of a leg."""
     rng, robot = np.random.default_rng(seed), mission.robot
     drive = Drive(mission.start.x, mission.start.y, mission.start.heading)
     drive.rows.append((0.0, drive.x, drive.y, drive.heading))
@@ -117,7 +117,7 @@ class Senses:
 
 
 def logged(drive: Drive, senses: Senses = Senses(), seed: int = 1) -> Track:
-    """The drive as a robot's log tells it, in the robot's own frame."""
+    """The drive as a robot's log reports it, in the robot's own frame."""
     rng = np.random.default_rng(seed + 10_000)
     rows = np.array(drive.rows)
     xy, heading = _slipped(rows[:, 1:3], rows[:, 3], senses.slip)

@@ -87,7 +87,7 @@ def test_a_top_up_keeps_clear_of_what_the_plan_did_not_know(planned: PlannedFloo
         assert max(abs(item.x - stop.x), abs(item.y - stop.y)) >= 0.2 + 0.69
 
 
-def test_the_command_tells_coverage_and_writes_the_top_up(
+def test_the_command_reports_coverage_and_writes_the_top_up(
     folder: Path, planned: PlannedFloor, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mission = planned.mission

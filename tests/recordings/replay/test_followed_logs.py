@@ -28,7 +28,7 @@ from tests.recordings.replay.auto_vehicle import (
 )
 
 
-def test_a_log_of_auto_tells_its_scans_by_the_camera(tmp_path: Path) -> None:
+def test_a_log_of_auto_reports_its_scans_by_the_camera(tmp_path: Path) -> None:
     """Standstills alone would not show them."""
     plan = mission()
     laid = replayed(logged(tmp_path / "auto.tlog", plan), plan)
@@ -38,8 +38,8 @@ def test_a_log_of_auto_tells_its_scans_by_the_camera(tmp_path: Path) -> None:
     assert {event.file[-4:] for event in laid.run.events if isinstance(event, Scanned)} == {".e57"}
 
 
-def test_stops_scanned_outside_their_tolerance_are_told_and_not_driven_as_planned(tmp_path: Path) -> None:
-    """The vehicle drives as a real one: beside its stops, which it calls reached."""
+def test_stops_scanned_outside_their_tolerance_are_reported_and_not_driven_as_planned(tmp_path: Path) -> None:
+    """The vehicle drives as a real one: off its stops, which it calls reached."""
     narrow, wide = mission(), mission(tolerance_m=0.4)
     path = logged(tmp_path / "auto.tlog", narrow)
     laid = replayed(path, narrow)
@@ -53,7 +53,7 @@ def test_stops_scanned_outside_their_tolerance_are_told_and_not_driven_as_planne
     assert drive_verdict(replayed(path, wide)).exit_code == 0
 
 
-def test_a_scan_that_failed_is_told_and_the_way_goes_on(tmp_path: Path) -> None:
+def test_a_scan_that_failed_is_reported_and_the_drive_goes_on(tmp_path: Path) -> None:
     plan = mission()
     laid = replayed(logged(tmp_path / "auto.tlog", plan, faults=("scanner@2",)), plan)
     assert "Failed S2" in told(laid.run.events)
@@ -102,8 +102,8 @@ def test_a_stop_that_the_station_jumped_over_is_skipped_and_never_visited(tmp_pa
     assert "1 of 3 stops" in drive_verdict(laid).text
 
 
-def test_the_last_stop_skipped_by_order_is_no_visit(tmp_path: Path) -> None:
-    """With a return behind it: the vehicle is sent on while it is under way to the stop."""
+def test_the_last_stop_skipped_by_command_is_no_visit(tmp_path: Path) -> None:
+    """With a return behind it: the vehicle is sent on while it drives to the stop."""
     plan = msgspec.structs.replace(mission(tolerance_m=0.4), return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0)))
     sent = translate(plan, "ardupilot", trigger="auto")
     home = next(place for place, one in enumerate(sent.placed) if one.role == "return") + 1
@@ -217,7 +217,7 @@ def test_the_heartbeat_of_a_camera_is_not_the_vehicles(tmp_path: Path) -> None:
     assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
 
 
-def test_a_passed_stop_that_nothing_places_cannot_be_told(tmp_path: Path) -> None:
+def test_a_passed_stop_that_nothing_places_cannot_be_reported(tmp_path: Path) -> None:
     """The station hears nothing of the vehicle while it is at S2, and next of it on its way to S3."""
     plan = mission(tolerance_m=0.4)
     whole = replayed(logged(tmp_path / "a.tlog", plan), plan)

@@ -10,25 +10,25 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.files.mission_json import write
-from tests.recordings.truth import drives, senses
+from tests.recordings.truth import disturbances, drives
+from tests.recordings.truth.disturbances import Sensed
 from tests.recordings.truth.drives import Mishap, mission_with_return
 from tests.recordings.truth.formats import MAP, VEHICLES, WRITERS, Writer, write_log
-from tests.recordings.truth.senses import Sensed
 
 MISSION = mission_with_return(1)
 
 
 def parts(folder: Path, mishap: Mishap, writer: Writer, *, lost_s: float = 0.0) -> list[str]:
-    """Two logs of one drive, cut between the fourth and fifth halt; the second clock begins anew."""
+    """Two logs of one drive, cut between the fourth and fifth standstill; the second clock begins again."""
     tour = mishap(MISSION, np.random.default_rng(1))
-    whole = senses.sensed(tour)
+    whole = disturbances.sensed(tour)
     cut = (tour.drive.halts[3].end_s + tour.drive.halts[4].begin_s) / 2
     halves = [whole.true_s <= cut, whole.true_s > cut + lost_s]
     paths, options = [], ()
     for number, mask in enumerate(halves):
         poses: Sensed = whole.rows(mask)
         (folder / str(number)).mkdir()
-        poses = senses.replace(poses, ns=poses.ns - poses.ns[0] + whole.ns[0])
+        poses = disturbances.replace(poses, ns=poses.ns - poses.ns[0] + whole.ns[0])
         log = write_log(writer, folder / str(number), MISSION, poses, MAP)
         paths.append(str(log.path))
         options = log.options
@@ -67,9 +67,7 @@ def test_a_robot_that_drove_between_the_logs_may_have_scanned_there(
     assert "7 of 8 stops" in verdict and "restarted" in verdict
 
 
-def test_alone_neither_part_tells_of_the_whole_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_alone_neither_part_reports_the_whole_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = parts(tmp_path, drives.as_planned, VEHICLES[0])
     assert main(["replay", *given]) == 3
     told = json.loads(capsys.readouterr().out)["replays"]

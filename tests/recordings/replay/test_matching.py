@@ -1,4 +1,4 @@
-"""Halts are found in noise, and matched to the stops at which they were."""
+"""Standstills are found in noise, and matched to the stops at which they were."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def readings(matches: tuple[Match, ...]) -> list[tuple[str, int | None]]:
 
 
 @pytest.mark.parametrize("senses", [Senses(), NOISY])
-def test_every_halt_is_found_at_its_place_and_time(senses: Senses) -> None:
+def test_every_standstill_is_found_at_its_place_and_time(senses: Senses) -> None:
     drive = driven(wandering(1), Odd(extra_before=frozenset({3})))
     halts = find_standstills(logged(drive, senses), speed=1.0)
     truth = drive.halts
@@ -37,7 +37,7 @@ def test_every_halt_is_found_at_its_place_and_time(senses: Senses) -> None:
         assert abs((halt.end_ns - BEGIN_NS) / 1e9 - true.end_s) < 0.8
 
 
-def test_turning_on_the_spot_is_no_halt() -> None:
+def test_turning_on_the_spot_is_no_standstill() -> None:
     seconds = np.arange(0, 20, 0.1)
     track = Track.of(seconds * 1e9, np.zeros((200, 2)), 0.5 * seconds)
     assert find_standstills(track) == ()
@@ -45,7 +45,7 @@ def test_turning_on_the_spot_is_no_halt() -> None:
     assert halt.seconds == pytest.approx(19.9, abs=0.3)
 
 
-def test_a_correction_of_the_position_does_not_part_a_halt_and_is_told_as_motion() -> None:
+def test_a_correction_of_the_position_does_not_part_a_standstill_and_is_reported_as_motion() -> None:
     seconds = np.arange(0, 30, 0.1)
     xy = np.zeros((300, 2))
     xy[150:, 0] = 0.12
@@ -55,11 +55,11 @@ def test_a_correction_of_the_position_does_not_part_a_halt_and_is_told_as_motion
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_a_log_of_few_poses_has_no_halt(count: int) -> None:
+def test_a_log_of_few_poses_has_no_standstill(count: int) -> None:
     assert find_standstills(Track.of(np.arange(count) * 1e9, np.zeros((count, 2)), np.zeros(count))) == ()
 
 
-def test_skipped_repeated_and_extra_halts_are_told_apart() -> None:
+def test_skipped_repeated_and_extra_standstills_are_distinguished() -> None:
     odd = Odd(frozenset({2}), frozenset({4}), frozenset({1, 6}))
     drive = driven(wandering(2), odd)
     matches = matched(find_standstills(logged(drive, NOISY), speed=1.0), wandering(2))
@@ -82,7 +82,7 @@ def standing_at(*places: tuple[float, float]) -> Track:
     return Track.of(table[:, 0] * 1e9, table[:, 1:], np.zeros(len(table)))
 
 
-def test_a_halt_beside_a_later_stop_does_not_skip_those_between() -> None:
+def test_a_standstill_next_to_a_later_stop_does_not_skip_those_between() -> None:
     """The way to s2 passes s5, and the robot waited there."""
     mission = mission_of(
         *(stop(f"s{k}", (0.0, 0.0), (4.0 * k, 0.0)) for k in (1, 2, 3, 4)),
@@ -94,12 +94,12 @@ def test_a_halt_beside_a_later_stop_does_not_skip_those_between() -> None:
     ]  # fmt: skip
 
 
-def test_going_back_to_a_stop_is_told_as_that() -> None:
+def test_going_back_to_a_stop_is_reported_as_that() -> None:
     halts = find_standstills(standing_at((4, 0), (8, 0), (4, 0), (12, 0)))
     assert readings(matched(halts, line(4, 8, 12))) == [("visit", 0), ("visit", 1), ("back", 0), ("visit", 2)]
 
 
-def test_halts_between_two_close_stops_are_at_none_of_them() -> None:
+def test_standstills_between_two_close_stops_are_at_none_of_them() -> None:
     """Stops 0.7 m apart: what is 0.35 m from both is not called either."""
     halts = find_standstills(standing_at((3.0, 0), (3.35, 0.1)))
     assert readings(matched(halts, line(3.0, 3.7))) == [("visit", 0), ("extra", None)]
@@ -118,7 +118,7 @@ def test_a_turned_and_shifted_log_is_fitted_to_the_stops() -> None:
 
 @pytest.mark.parametrize("stops", [line(4, 8, 12, 16), line(3, 6)])
 def test_a_fit_that_is_not_the_only_one_is_refused(stops: Mission) -> None:
-    """Three halts on four equal steps may be the first three or the last three; two stops tell nothing."""
+    """Three standstills on four equal steps may be the first or the last three; two stops show nothing."""
     halts = find_standstills(standing_at((4, 0), (8, 0), (12, 0)))
     with pytest.raises(Undecided, match="--map"):
         fitted(halts, stops)

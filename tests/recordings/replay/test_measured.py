@@ -94,7 +94,7 @@ def test_walls_as_planned_are_measured_without_deviation(planned: PlannedFloor) 
         assert rms <= 0.02
 
 
-def test_a_wall_that_stands_elsewhere_is_told_by_its_side(planned: PlannedFloor) -> None:
+def test_a_wall_that_stands_elsewhere_is_reported_by_its_side(planned: PlannedFloor) -> None:
     """All walls 4 cm to the right: the left faces of the room come nearer, the right ones go away."""
     found = measured(planned, placed_sweeps(scanned(planned, off=0.04)), tolerance=0.02)
     means = [mean for _, _, mean, _ in found.deviations]
@@ -182,7 +182,7 @@ def test_missing_clouds_are_a_no(planned: PlannedFloor) -> None:
 
 
 @pytest.mark.parametrize("move", [(0.2, 0.0), (0.2, -0.2), (100.0, 0.0)])
-def test_clouds_that_do_not_lie_on_the_floor_tell_nothing(
+def test_clouds_that_do_not_lie_on_the_floor_report_nothing(
     planned: PlannedFloor, move: tuple[float, float]
 ) -> None:
     points = wall_points(planned)
@@ -207,7 +207,7 @@ def test_a_wall_that_was_never_built_is_named(planned: PlannedFloor) -> None:
     assert any(line.startswith(f"  absent     {least}: no point on 100.0 % of") for line in lines)
 
 
-def test_what_nobody_planned_is_told_with_the_share_of_scans_that_hit_it(planned: PlannedFloor) -> None:
+def test_what_nobody_planned_is_reported_with_the_share_of_scans_that_hit_it(planned: PlannedFloor) -> None:
     heap = np.stack([np.linspace(2.0, 2.4, 50), np.full(50, 1.0)], axis=-1)
     points = wall_points(planned)
     clouds = [points, np.concatenate([points, heap]), points, points]

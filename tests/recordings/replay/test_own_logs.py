@@ -19,7 +19,7 @@ from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.runs.field import FieldRecording
-from tests.mission.comparing.told import SCAN, at, told
+from tests.mission.comparing.reports import SCAN, at, told
 from tests.recordings.replay.driving import wandering
 
 MISSION = wandering(1)
@@ -27,7 +27,7 @@ SKIPPED = MISSION.stops[3].id
 
 
 def run_of(mission: Mission) -> RunLog:
-    """Every stop 12 mm from its stop and scanned, but for one that was skipped."""
+    """Every stop 12 mm from its stop and scanned, except for one that was skipped."""
     events: list[tuple[type, float, dict[str, Any]]] = [(Started, 0.0, {"commander": "me"})]
     for number, stop in enumerate(mission.stops):
         seconds, pose = 60.0 * (number + 1), at(stop.x + 0.012, stop.y, stop.heading)
@@ -59,7 +59,9 @@ def replayed(path: Path) -> Replay:
 
 
 @pytest.mark.parametrize("written", [written_journal, written_recording])
-def test_our_own_logs_are_told_by_their_own_events(tmp_path: Path, written: Callable[[Path], Path]) -> None:
+def test_our_own_logs_are_reported_by_their_own_events(
+    tmp_path: Path, written: Callable[[Path], Path]
+) -> None:
     found = replayed(written(tmp_path))
     outcomes = {item.stop: item.outcome for item in found.comparison.stops}
     assert outcomes.pop(SKIPPED) == "skipped"
@@ -71,7 +73,7 @@ def test_our_own_logs_are_told_by_their_own_events(tmp_path: Path, written: Call
 
 
 @pytest.mark.parametrize("kind", ["journal", "recording"])
-def test_a_run_whose_every_stop_was_skipped_has_no_pose_and_is_told(tmp_path: Path, kind: str) -> None:
+def test_a_run_whose_every_stop_was_skipped_has_no_pose_and_is_reported(tmp_path: Path, kind: str) -> None:
     skips = [(Skipped, 9.0 * n, {"stop": s.id, "reason": "no"}) for n, s in enumerate(MISSION.stops, 1)]
     events = told(MISSION, (Started, 0.0, {"commander": "me"}), *skips, (Finished, 999.0, {})).events
     if kind == "journal":

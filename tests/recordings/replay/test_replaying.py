@@ -1,4 +1,4 @@
-"""A log laid beside its mission: placed as told, every figure that of the drive, another's refused."""
+"""A log compared with its mission: placed as given, every figure that of the drive, another's refused."""
 
 from __future__ import annotations
 
@@ -136,14 +136,14 @@ def test_several_robots_are_not_mixed() -> None:
     assert replay(log, MISSION, Placing(align="first", robot="r2")).placed.source.robot == "r2"
 
 
-def test_a_time_offset_moves_the_run_and_is_told() -> None:
+def test_a_time_offset_moves_the_run_and_is_reported() -> None:
     track = logged(driven(MISSION))
     found = replay(log_of(track), MISSION, Placing(align="first", time_offset_s=-2.5))
     assert found.run.poses.ns[0] == track.ns[0] - 2_500_000_000
     assert "times by -2.500 s" in as_text(found)
 
 
-def test_a_halt_too_short_for_a_scan_is_none() -> None:
+def test_a_standstill_too_short_for_a_scan_is_none() -> None:
     drive = driven(MISSION)
     rows = np.array(drive.rows)
     halt = drive.halts[4]
@@ -156,7 +156,7 @@ def test_a_halt_too_short_for_a_scan_is_none() -> None:
     assert "of 14.0 s" in found.comparison.stops[4].reason
 
 
-def test_a_short_halt_takes_nothing_from_a_long_one_before() -> None:
+def test_a_short_standstill_takes_nothing_from_a_long_one_before() -> None:
     drive = driven(MISSION, Odd(repeated=frozenset({4})))
     rows = np.array(drive.rows)
     again = [halt for halt in drive.halts if halt.stop == 4][1]
@@ -177,7 +177,7 @@ def test_time_lost_is_found_where_it_was() -> None:
     assert worst.seconds == pytest.approx(stood.end_s - stood.begin_s, abs=0.5)
 
 
-def test_text_json_and_csv_tell_the_same() -> None:
+def test_text_json_and_csv_report_the_same() -> None:
     drive = driven(MISSION, Odd(skipped=frozenset({2}), extra_before=frozenset({4}), beside_m=0.02))
     found = replay(log_of(logged(drive)), MISSION, FIRST)
     told = json.loads(json.dumps(as_json(found)))
@@ -264,7 +264,7 @@ def test_bad_options_are_refused_in_one_line(
 
 
 def parked_near(first_stop: tuple[float, float], *, beside_m: float) -> tuple[Drive, Mission]:
-    """A drive that stops beside its first stop, and parks at the start, nearer to the stop than the scan."""
+    """A drive that misses its first stop, and parks at the start, nearer to the stop than the scan."""
     back = ((MISSION.stops[-1].x, MISSION.stops[-1].y), (MISSION.start.x, MISSION.start.y))
     stops = (changed(MISSION.stops[0], x=first_stop[0], y=first_stop[1]), *MISSION.stops[1:])
     first = changed(stops[0], approach=((0.0, 0.0), first_stop))
@@ -283,7 +283,7 @@ def parked_near(first_stop: tuple[float, float], *, beside_m: float) -> tuple[Dr
     return drive, mission
 
 
-def test_the_halt_for_parking_is_not_the_scan_at_a_stop_near_it() -> None:
+def test_the_standstill_for_parking_is_not_the_scan_at_a_stop_near_it() -> None:
     drive, mission = parked_near((0.1, 0.0), beside_m=0.2)
     found = replay(log_of(logged(drive)), mission, Placing(to_map=Transform(x=0.0, y=0.0, heading=0.0)))
     first = found.comparison.stops[0]
@@ -291,7 +291,7 @@ def test_the_halt_for_parking_is_not_the_scan_at_a_stop_near_it() -> None:
     assert (first.arrived_s or 0.0) < 10.0
 
 
-def test_the_halt_with_the_scan_counts_and_not_one_after_it() -> None:
+def test_the_standstill_with_the_scan_counts_and_not_one_after_it() -> None:
     drive = driven(MISSION, Odd(repeated=frozenset({4}), beside_m=0.01))
     first, _ = (halt for halt in drive.halts if halt.stop == 4)
     track = logged(drive)

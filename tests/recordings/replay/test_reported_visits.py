@@ -1,10 +1,10 @@
-"""Visits of a robot's own run are those that it told."""
+"""Visits of a robot's own run are those that it reported."""
 
 from __future__ import annotations
 
 from stopgo.mission.run.events import Arrived, Failed, Homing, Scanned
 from stopgo.recordings.replay.reported_visits import reported_visits
-from tests.mission.comparing.told import SCAN, at, told
+from tests.mission.comparing.reports import SCAN, at, told
 from tests.mission.worlds import square_tour
 
 

@@ -108,5 +108,5 @@ def test_the_filter_is_right_about_where_it_stood(found: Replay) -> None:
         assert item.deviation_m == pytest.approx(found.true_offset_m(k), abs=0.01)
 
 
-def test_triggers_are_told_in_the_verdict(found: Replay) -> None:
+def test_triggers_are_reported_in_the_verdict(found: Replay) -> None:
     assert "trigger of the scanner at 5 of 5 stops" in drive_verdict(found).text

@@ -1,4 +1,4 @@
-"""Yes only from evidence for every stop, no only from evidence against one, else it cannot be told."""
+"""Yes only from evidence for every stop, no only from evidence against one, else undecided."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from stopgo.recordings.replay.stop_evidence import stop_evidence
 from stopgo.recordings.replay.unseen_visits import possible_s
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 from tests.recordings.replay.test_replaying import held, log_of
+from tests.recordings.truth.disturbances import sensed
 from tests.recordings.truth.drives import (
     about_the_start,
     as_planned,
@@ -29,7 +30,6 @@ from tests.recordings.truth.drives import (
     shifted,
     shuffled,
 )
-from tests.recordings.truth.senses import sensed
 
 MISSION = wandering(1)
 FIRST = Placing(align="first")
@@ -44,7 +44,7 @@ def seen(drive: Drive, kept: Callable[[np.ndarray], np.ndarray]) -> Track:
 
 
 @pytest.mark.parametrize("placing", [Placing(align="first"), Placing(align="stops")])
-def test_a_constant_drift_that_explains_every_halt_is_no_evidence_for_them(placing: Placing) -> None:
+def test_a_constant_drift_that_explains_every_standstill_is_no_evidence_for_them(placing: Placing) -> None:
     """Wheels 1 % too large that turn away look like a robot whose map is turned and stretched."""
     found = replay(log_of(logged(driven(MISSION), Senses(slip=0.01))), MISSION, placing)
     assert found.comparison.greatest_deviation_m is not None and found.comparison.greatest_deviation_m > 0.1
@@ -56,7 +56,7 @@ def test_a_constant_drift_that_explains_every_halt_is_no_evidence_for_them(placi
 def test_a_tour_that_was_turned_or_stretched_is_never_a_yes(
     turn: float, scale: float, placing: Placing
 ) -> None:
-    """The robot's map lies so beside the drawing; at its start both agree."""
+    """The robot's map lies so far off the drawing; at its start both agree."""
     for seed in range(1, 4):
         mission = mission_with_return(seed)
         tour = about_the_start(mission, turn, scale)
@@ -89,8 +89,8 @@ def test_a_fit_to_the_stops_is_a_yes_where_the_log_begins_at_the_start() -> None
 
 
 @pytest.mark.parametrize("seed", range(1, 5))
-def test_a_drift_that_wanders_tells_neither_yes_nor_no(seed: int) -> None:
-    """The error grows by some 0.1 m between stops: no fit explains that, and no halt excludes it."""
+def test_a_drift_that_wanders_shows_neither_yes_nor_no(seed: int) -> None:
+    """The error grows by some 0.1 m between stops: no fit explains that, and no standstill excludes it."""
     track = logged(driven(MISSION))
     chance = np.random.default_rng(seed)
     walk = np.cumsum(chance.normal(0, 0.06, (60, 2)), axis=0)
@@ -104,7 +104,7 @@ def test_a_drift_that_wanders_tells_neither_yes_nor_no(seed: int) -> None:
 
 
 @pytest.mark.parametrize("beside", [0.1, 0.15, 0.3])
-def test_one_position_error_is_told_though_the_log_drifts(beside: float) -> None:
+def test_one_position_error_is_reported_though_the_log_drifts(beside: float) -> None:
     drive = driven(MISSION)
     track = logged(drive, Senses(slip=0.01))
     halt = drive.halts[4]
@@ -114,14 +114,14 @@ def test_one_position_error_is_told_though_the_log_drifts(beside: float) -> None
     assert drive_verdict(replay(log_of(Track.of(track.ns, xy, track.heading)), MISSION, FIRST)).answer == "no"
 
 
-def test_a_robot_that_stood_off_its_stops_is_told_though_the_log_drifts() -> None:
+def test_a_robot_that_stood_off_its_stops_is_reported_though_the_log_drifts() -> None:
     """Distances between its standstills differ from those planned by more than any drift."""
     drive = driven(MISSION, Odd(beside_m=0.5))
     found = replay(log_of(logged(drive, Senses(slip=0.01))), MISSION, Placing(align="first"))
     assert drive_verdict(found).answer == "no"
 
 
-def test_one_stop_that_was_missed_by_a_little_is_told_where_the_others_hold() -> None:
+def test_one_stop_that_was_missed_by_a_little_is_reported_where_the_others_hold() -> None:
     drive = driven(MISSION)
     track = logged(drive)
     halt = drive.halts[4]
@@ -154,7 +154,7 @@ def test_a_run_on_another_storey_is_undecided_until_its_height_is_given(level: f
     assert ("begin at 9.6 m" in judged.text) == (level != 9.6)
 
 
-def test_poses_that_are_missing_during_a_stop_do_not_tell_that_nobody_was_there() -> None:
+def test_poses_that_are_missing_during_a_stop_do_not_show_that_nobody_was_there() -> None:
     drive = driven(MISSION)
     halt = drive.halts[4]
     track = seen(drive, lambda s: (s < halt.begin_s - 2) | (s > halt.end_s + 2))
@@ -164,7 +164,7 @@ def test_poses_that_are_missing_during_a_stop_do_not_tell_that_nobody_was_there(
 
 
 @pytest.mark.parametrize("late_s", [0.13, 0.23, 1.23, -3.3])
-def test_a_gap_into_which_the_robot_turned_away_does_not_tell_that_it_stood_too_shortly(
+def test_a_gap_into_which_the_robot_turned_away_does_not_show_that_it_stood_too_shortly(
     late_s: float,
 ) -> None:
     """Of 14 s at the stop, the last ones are unseen, and after the gap it has turned, or driven on."""
@@ -192,7 +192,7 @@ def test_a_stop_that_was_passed_in_sight_is_a_no() -> None:
     assert drive_verdict(replay(log_of(track), MISSION, THERE)).answer == "no"
 
 
-def test_a_log_that_begins_late_does_not_tell_of_the_stops_before() -> None:
+def test_a_log_that_begins_late_is_no_evidence_of_the_stops_before() -> None:
     drive = driven(MISSION)
     track = seen(drive, lambda s: s > drive.halts[2].end_s + 1)
     judged = drive_verdict(replay(log_of(track), MISSION, THERE))
@@ -200,7 +200,7 @@ def test_a_log_that_begins_late_does_not_tell_of_the_stops_before() -> None:
     assert "s01, s02 and s03 are undecided: the log begins" in judged.text
 
 
-def test_half_a_log_does_not_tell_of_the_stops_after() -> None:
+def test_half_a_log_is_no_evidence_of_the_stops_after() -> None:
     drive = driven(MISSION)
     track = seen(drive, lambda s: s < drive.halts[5].end_s + 1)
     judged = drive_verdict(replay(log_of(track), MISSION, THERE))
@@ -208,7 +208,7 @@ def test_half_a_log_does_not_tell_of_the_stops_after() -> None:
     assert "s07, s08 and s09 are undecided: the log ends" in judged.text
 
 
-def test_rare_poses_do_not_tell_that_a_standstill_was_too_short() -> None:
+def test_rare_poses_do_not_show_that_a_standstill_was_too_short() -> None:
     """Every 5 s a pose, and scans of 14 s: what is seen of them is 5 or 10 s."""
     track = logged(driven(MISSION))
     rare = np.arange(len(track)) % 50 == 3

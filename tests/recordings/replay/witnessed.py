@@ -1,4 +1,4 @@
-"""A simulated robot's run with faults and orders, and what a witness beside it wrote down: the truth."""
+"""A simulated robot's run with faults and orders, and what a witness next to it wrote down: the truth."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Shot:
 
 @dataclass
 class Witness:
-    """Stands beside the robot; knows nothing of its journal."""
+    """Stands next to the robot; knows nothing of its journal."""
 
     clock: WatchedClock
     base: SimulatedBase
@@ -239,7 +239,7 @@ def _pause(world: Field, witness: Witness) -> None:
 
 
 def _hear_nothing(world: Field, witness: Witness) -> None:
-    """The robot holds at once, but for a scan: it is not cut short."""
+    """The robot holds at once, except for a scan: it is not cut short."""
     if world.controller.run.state == "RUNNING":
         world.controller.on_link_silence(SILENCE_S)
         if world.controller.run.state == "HELD":

@@ -1,4 +1,4 @@
-"""A run's recording shows what the robot told, overlays the plan, and survives a killed writer."""
+"""A run's recording shows what the robot reported, overlays the plan, and survives a killed writer."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_the_driven_path_grows_piece_by_piece(field: Path) -> None:
     assert np.concatenate(lengths).min() >= 0.05
 
 
-def test_no_way_is_drawn_across_a_long_silence(tmp_path: Path, mission: Mission) -> None:
+def test_no_path_is_drawn_across_a_long_silence(tmp_path: Path, mission: Mission) -> None:
     path = tmp_path / "field.rrd"
     poses = [item for item in run.reports(mission) if isinstance(item, PoseReport)]
     with FieldRecording(path, mission) as recording:
@@ -110,7 +110,7 @@ def test_deviation_and_distance_from_the_route_are_plotted(field: Path) -> None:
     assert driving
 
 
-def test_a_scan_from_outside_its_tolerance_is_told_by_log_report_and_plot(
+def test_a_scan_from_outside_its_tolerance_is_reported_by_log_report_and_plot(
     tmp_path: Path, mission: Mission
 ) -> None:
     path, first = tmp_path / "field.rrd", mission.stops[0]
@@ -132,7 +132,7 @@ def test_a_scan_from_outside_its_tolerance_is_told_by_log_report_and_plot(
     assert deviation[at] == pytest.approx([120.0])
 
 
-def test_states_are_told_on_both_clocks(field: Path) -> None:
+def test_states_are_reported_on_both_clocks(field: Path) -> None:
     states = on(field, f"{RUN}/stop_state", "StateChange:state", entities.MISSION_TIME)
     told = [value[0] for _, value in sorted(states.items())]
     assert told[-3:] == ["SETTLING", "SCANNING", ""]
@@ -151,7 +151,7 @@ def test_reports_before_the_mission_are_kept(tmp_path: Path, mission: Mission, f
     assert check(path).rows == check(field).rows
 
 
-def test_the_mission_may_be_told_again(tmp_path: Path, mission: Mission) -> None:
+def test_the_mission_may_be_reported_again(tmp_path: Path, mission: Mission) -> None:
     with FieldRecording(tmp_path / "field.rrd", mission) as recording:
         recording.mission(mission)
         for report in run.reports(mission):
@@ -249,7 +249,7 @@ def test_what_finds_no_room_waits_until_there_is_some(tmp_path: Path, mission: M
     assert os.listdir(tmp_path) == ["field.rrd"]
 
 
-def test_what_finds_no_room_to_the_end_is_told_and_keeps_its_partial_name(
+def test_what_finds_no_room_to_the_end_is_reported_and_keeps_its_partial_name(
     tmp_path: Path, mission: Mission, field: Path
 ) -> None:
     path, partial = tmp_path / "field.rrd", tmp_path / "field.partial.rrd"
@@ -296,7 +296,7 @@ def test_how_a_run_ended_is_not_hidden_by_what_became_of_its_recording(
     assert not os.listdir(tmp_path)
 
 
-def test_a_recording_whose_folder_went_away_is_told_of(tmp_path: Path, mission: Mission) -> None:
+def test_a_recording_whose_folder_went_away_is_reported(tmp_path: Path, mission: Mission) -> None:
     folder = tmp_path / "usb"
     folder.mkdir()
     with (
@@ -310,7 +310,7 @@ def test_a_recording_whose_folder_went_away_is_told_of(tmp_path: Path, mission: 
 
 
 def test_without_room_for_two_the_recording_stays_as_it_is(tmp_path: Path, mission: Mission) -> None:
-    """Compacting needs room beside the file; a file not compacted holds the same."""
+    """Compacting needs room next to the file; a file not compacted holds the same."""
     path = tmp_path / "field.rrd"
     with small_disk() as full_at, FieldRecording(path, mission) as recording:
         for report in run.reports(mission):
@@ -345,7 +345,7 @@ with FieldRecording(Path(sys.argv[1]), mission) as recording:
 """
 
 
-def test_a_killed_writer_leaves_what_it_was_told(tmp_path: Path) -> None:
+def test_a_killed_writer_leaves_what_it_was_given(tmp_path: Path) -> None:
     path = tmp_path / "field.rrd"
     root = Path(__file__).parents[3]
     for partial in ("field.partial.rrd", "field.partial-2.rrd"):

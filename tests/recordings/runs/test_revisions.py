@@ -1,4 +1,4 @@
-"""A run that goes on by a new revision of its mission: drawn, told, reviewed and compared by it."""
+"""A run that goes on by a new revision of its mission: drawn, reported, reviewed and compared by it."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_the_distance_from_the_route_is_that_from_the_new_legs(revised: Path) ->
     assert max(map(abs, beside)) == pytest.approx(1000 * run.OFFSET, abs=0.5)
 
 
-def test_the_report_tells_both_revisions(revised: Path) -> None:
+def test_the_report_reports_both_revisions(revised: Path) -> None:
     told = on(revised, RUN.flat(entities.RUN_REPORT), "TextDocument:text", entities.MISSION_TIME)
     (text,) = told[max(told)]
     assert "revision 2 (before: 1)" in text
@@ -87,7 +87,7 @@ def test_the_report_tells_both_revisions(revised: Path) -> None:
     assert check(revised).properties["run"]["revision"] == 2
 
 
-def test_what_a_revision_dropped_is_told_in_the_report(tmp_path: Path, mission: Mission) -> None:
+def test_what_a_revision_dropped_is_reported_in_the_report(tmp_path: Path, mission: Mission) -> None:
     shorter = with_digest(msgspec.structs.replace(mission, revision=2, stops=mission.stops[:1]))
     path = tmp_path / "field.rrd"
     with FieldRecording(path, mission) as recording:
@@ -112,7 +112,7 @@ def test_a_run_that_begins_by_a_later_revision_shows_it_from_its_beginning(
     assert TWO.flat(entities.NEW_STOPS) not in check(path).rows
 
 
-def test_a_station_that_only_heard_of_the_later_revision_records_the_whole_run(
+def test_a_station_that_only_received_the_later_revision_records_the_whole_run(
     tmp_path: Path, mission: Mission
 ) -> None:
     path, after = tmp_path / "field.rrd", world.revised(mission)
@@ -124,7 +124,7 @@ def test_a_station_that_only_heard_of_the_later_revision_records_the_whole_run(
     assert np.allclose(static(path, entities.STOPS, "Points2D:positions")[1:], [(3.2, 0.6), (4.8, 1.6)])
 
 
-def test_a_revision_that_was_never_heard_of_is_told_by_the_one_after_it(
+def test_a_revision_that_was_never_received_is_reported_by_the_one_after_it(
     tmp_path: Path, mission: Mission
 ) -> None:
     path, third = (
@@ -150,7 +150,7 @@ def test_what_waits_for_a_revision_that_never_comes_is_kept(tmp_path: Path, miss
     assert check(path).rows[RUN.events] == count
 
 
-def test_review_tells_the_revisions(revised: Path, field: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_review_reports_the_revisions(revised: Path, field: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["review", str(revised), "--json"]) == 0
     (told,) = json.loads(capsys.readouterr().out)["runs"]
     assert (told["revisions"], told["scanned"]) == ([1, 2], 3)

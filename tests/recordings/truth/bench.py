@@ -1,7 +1,7 @@
-"""The truth bench: logs with a known truth, and whether a replay answers yes, no, or that it cannot be told.
+"""The truth bench: logs with a known truth, and whether a replay answers yes, no, or undecided.
 
-An oracle that knows the error of each pose says what a log could tell. A false yes or no is a defect, and so
-is every log that could tell and is said not to.
+An oracle that knows the error of each pose says what a log can decide. A false yes or no is a defect, and so
+is every log that can decide and is said not to.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import numpy as np
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import write
-from tests.recordings.truth import drives, senses
+from tests.recordings.truth import disturbances, drives
+from tests.recordings.truth.disturbances import SENSES, SLOW, Sense, Sensed
 from tests.recordings.truth.drives import MISHAPS, STOPS, Mishap, Tour, mission_with_return
 from tests.recordings.truth.formats import BAGS, FIRST, FITTED, MAP, VEHICLES, WRITERS, Writer, write_log
-from tests.recordings.truth.senses import SENSES, SLOW, Sense, Sensed
 
 AWAY = (drives.mirrored, drives.another_mission)
 """Drives of another mission: their logs may be refused, and no fit to the stops tells anything."""
@@ -51,7 +51,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Answer:
-    """Answer to a case, beside its truth."""
+    """Answer to a case, next to its truth."""
 
     case: Case
     truth: str
@@ -62,7 +62,7 @@ class Answer:
 
     @property
     def kind(self) -> str:
-        """`right`, `false yes`, `false no`, `untold` (it could be told), or `open` (it could not)."""
+        """`right`, `false yes`, `false no`, `untold` (it can be decided), or `open` (it cannot)."""
         if self.answer == "yes":
             return "right" if self.truth == "yes" else "false yes"
         if self.answer == "no":
@@ -82,7 +82,7 @@ def cases(seeds: int = 1) -> Iterator[Case]:
                 writer = WRITERS[(number + k + 3 * seed) % len(WRITERS)]
                 if sense in SLOW and writer in BAGS:
                     writer = VEHICLES[k % len(VEHICLES)]
-                if sense is senses.without_headings:
+                if sense is disturbances.without_headings:
                     writer = WRITERS[0]
                 placing = (MAP, FIRST, FITTED, MAP)[(n + 2 * k + seed) % 4]
                 yield Case(1000 * seed + number, mishap, sense, writer, placing)
@@ -158,7 +158,7 @@ def _whole(poses: Sensed, tour: Tour, least_s: float) -> bool:
 
 
 def _steps_ahead_at_a_halt(poses: Sensed, least_s: float) -> bool:
-    """True if the clock steps forward while the robot is stationary: nothing tells that from a gap."""
+    """True if the clock steps forward while the robot is stationary: it looks like a gap."""
     ahead = np.diff(poses.ns) / 1e9 - np.diff(poses.true_s)
     moved = np.hypot(*np.diff(poses.xy, axis=0).T)
     return bool((ahead[moved < 0.02] > least_s).any()) if (ahead > least_s).sum() == 1 else False

@@ -19,7 +19,7 @@ STOREY_M = 3.2
 
 @dataclass(frozen=True)
 class Visit:
-    """One halt of a drive."""
+    """One standstill of a drive."""
 
     stop: int | None
     """Index of the stop; None for a halt on the way to the next one."""
@@ -97,7 +97,7 @@ def _halt_on_the_way(drive: Drive, mission: Mission, to: int | None, stay: float
 
 
 def truth_of(mission: Mission, drive: Drive) -> tuple[bool, ...]:
-    """Return for each stop: was there a halt within its tolerance, long enough for its scan?"""
+    """Return for each stop: was there a standstill within its tolerance, long enough for its scan?"""
     return tuple(
         any(
             math.dist((halt.x, halt.y), (stop.x, stop.y)) <= stop.tolerance_m
@@ -131,13 +131,13 @@ def _off(chance: np.random.Generator, least: float, most: float) -> Point:
 
 
 def one_skipped(mission: Mission, chance: np.random.Generator) -> Tour:
-    """One stop in the middle is passed without a halt."""
+    """One stop in the middle is passed without a standstill."""
     left = int(chance.integers(1, STOPS - 1))
     return _tour(mission, [replace(one, stay=0.0) if one.stop == left else one for one in _all(mission)])
 
 
 def ends_skipped(mission: Mission, chance: np.random.Generator) -> Tour:
-    """The first or the last stop is passed without a halt."""
+    """The first or the last stop is passed without a standstill."""
     left = int(chance.choice([0, STOPS - 1]))
     return _tour(mission, [replace(one, stay=0.0) if one.stop == left else one for one in _all(mission)])
 
@@ -149,13 +149,13 @@ def one_left_out(mission: Mission, chance: np.random.Generator) -> Tour:
 
 
 def one_off(mission: Mission, chance: np.random.Generator) -> Tour:
-    """One scan is made 0.1 to 0.5 m beside its stop."""
+    """One scan is made 0.1 to 0.5 m off its stop."""
     where, off = int(chance.integers(STOPS)), _off(chance, 0.1, 0.5)
     return _tour(mission, [replace(one, off=off) if one.stop == where else one for one in _all(mission)])
 
 
 def one_far_off(mission: Mission, chance: np.random.Generator) -> Tour:
-    """One scan is made 1.2 to 2 m beside its stop."""
+    """One scan is made 1.2 to 2 m off its stop."""
     where, off = int(chance.integers(STOPS)), _off(chance, 1.2, 2.0)
     return _tour(mission, [replace(one, off=off) if one.stop == where else one for one in _all(mission)])
 
@@ -167,13 +167,13 @@ def one_just_off(mission: Mission, chance: np.random.Generator) -> Tour:
 
 
 def all_off_alike(mission: Mission, chance: np.random.Generator) -> Tour:
-    """Every scan is made 0.12 m beside its stop, all to the same side: only poses of a map can show it."""
+    """Every scan is made 0.12 m off its stop, all to the same side: only poses of a map can show it."""
     off = _off(chance, 0.12, 0.12)
     return _tour(mission, [replace(one, off=off) for one in _all(mission)])
 
 
 def one_short(mission: Mission, chance: np.random.Generator) -> Tour:
-    """One halt is a third as long as its scan."""
+    """One standstill is a third as long as its scan."""
     where = int(chance.integers(STOPS))
     return _tour(mission, [replace(one, stay=0.33) if one.stop == where else one for one in _all(mission)])
 
@@ -290,7 +290,7 @@ def another_mission(mission: Mission, chance: np.random.Generator) -> Tour:
 
 
 def shifted(mission: Mission, by: Point) -> Tour:
-    """The robot drove from its start to stops that all lie beside the mission's."""
+    """The robot drove from its start to stops that all lie off the mission's."""
     other = _mapped(mission, lambda x, y: (x + by[0], y + by[1]))
     drive = toured(other, _all(other))
     return Tour(mission, drive, truth_of(mission, drive))

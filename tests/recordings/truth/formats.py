@@ -24,7 +24,7 @@ from tests.recordings.logs.writing import (
     write_json_mcap,
     write_ulog,
 )
-from tests.recordings.truth.senses import Sensed
+from tests.recordings.truth.disturbances import Sensed
 
 FRAME = Transform(x=5.0, y=-3.0, heading=0.8)
 """Pose of the site in the frame of logs that do not know the earth."""

@@ -1,6 +1,6 @@
 """Runs of stopgo's own robots with a known truth: what a station hears of them, with every loss and fault.
 
-A run is told event by event, as a robot's journal has it. A robot's events are signed by it: what they say of
+A run is reported event by event, as a robot's journal has it. A robot signs its events: what they say of
 a scan is the truth, unless the poses that the robot sent meanwhile contradict it.
 """
 
@@ -85,7 +85,7 @@ def scanned(mission: Mission, k: int) -> tuple[Told, bool | None]:
 
 
 def scanned_beside(mission: Mission, k: int) -> tuple[Told, bool | None]:
-    """The scan is made 0.2 m beside the stop."""
+    """The scan is made 0.2 m off the stop."""
     about = {"stop": mission.stops[k].id, "pose": _pose(mission, k, 0.2)}
     return [*_arrival(mission, k, 0.2), (Scanned, STAY_S, {**about, **SCAN})], False
 
@@ -114,7 +114,7 @@ def failed_and_scanned(mission: Mission, k: int) -> tuple[Told, bool | None]:
 
 
 def unconfirmed(mission: Mission, k: int) -> tuple[Told, bool | None]:
-    """The camera told nothing."""
+    """The camera reported nothing."""
     about = {"stop": mission.stops[k].id, "pose": _pose(mission, k), "reason": "no word of the camera"}
     return [*_arrival(mission, k), (Unconfirmed, STAY_S, about)], None
 
@@ -255,7 +255,7 @@ LOSSES: tuple[Loss, ...] = (
 
 @dataclass(frozen=True)
 class OwnAnswer:
-    """Answer to a run, beside its truth."""
+    """Answer to a run, next to its truth."""
 
     name: str
     truth: str

@@ -1,4 +1,4 @@
-"""Verdicts on logs with a known truth: none is false, and few logs that could tell are undecided."""
+"""Verdicts on logs with a known truth: none is false, and few logs that can decide are undecided."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def test_what_is_not_ours_is_left_to_others_without_a_word(
     ("name", "content"),
     [("cut.json", '{"schema": "stopgo/mission"'), ("junk.dxf", "junk"), ("empty.DXF", ""), ("x.ifc", "ISO")],
 )
-def test_a_damaged_one_is_told_in_one_line(
+def test_a_damaged_one_is_reported_in_one_line(
     name: str,
     content: str,
     tmp_path: Path,

@@ -43,7 +43,7 @@ KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
 
 
 def real_tour(**details: Any) -> Mission:
-    """The tour for a vehicle that drives as a real one: beside its stops, and late to stand still."""
+    """The tour for a vehicle that drives as a real one: off its stops, and late to stand still."""
     made = tour(**{"tolerance_m": 0.3, "settle_s": 3.0, **details})
     return with_digest(msgspec.structs.replace(made, robot=msgspec.structs.replace(made.robot, speed=0.5)))
 

@@ -21,7 +21,7 @@ MANUAL = 0
 
 
 class NoHands:
-    """Nothing is told to this vehicle."""
+    """This vehicle gets no message."""
 
     def ask_for_picture(self) -> None: ...
 
@@ -40,7 +40,7 @@ class NobodyElse:
 
 
 def told_at_first_look(boot_ms: int) -> list[str]:
-    """Reasons of the pauses told of a run that is found in MANUAL, a minute after it was started."""
+    """Reasons of the pauses of a run that is found in MANUAL, a minute after it was started."""
     clock, mission = SimulatedClock(), tour()
     book = Logbook(memory_journal(), "mavlink-1", clock)
     remember(book, mission, translate(mission, "ardupilot"))
@@ -66,9 +66,9 @@ def found_in_manual(boot_ms: int) -> tuple[Message, ...]:
     )
 
 
-def test_a_reboot_is_told_before_the_mode_that_it_brought_about() -> None:
+def test_a_reboot_is_reported_before_the_mode_that_it_brought_about() -> None:
     assert told_at_first_look(boot_ms=3_000) == ["reboot"]
 
 
-def test_a_mode_that_somebody_chose_is_told_as_theirs() -> None:
+def test_a_mode_that_somebody_chose_is_reported_as_theirs() -> None:
     assert told_at_first_look(boot_ms=90_300) == ["mode MANUAL, by somebody (not known who)"]

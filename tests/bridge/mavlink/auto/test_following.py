@@ -1,4 +1,4 @@
-"""An autopilot drives a mission; what is told of it is what a robot would tell, and is true."""
+"""An autopilot drives a mission; its reports are those of a robot, and are true."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from stopgo.mission.run.events import Arrived, Failed, Held, PoseReport, Scanned
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
 
-def test_a_run_is_told_from_start_to_finish(tmp_path: Path) -> None:
+def test_a_run_is_reported_from_start_to_finish(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
     with site.up(), watched(site) as seen:
         assert site.order("start").outcome == "ok"
@@ -30,7 +31,7 @@ def test_a_run_is_told_from_start_to_finish(tmp_path: Path) -> None:
     assert min(away) > 0.05 and max(away) < 0.3
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4", "strict"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4", "strict"], every=2))
 def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: Path) -> None:
     from stopgo.bridge.station.watch import watch_run
 
@@ -45,7 +46,7 @@ def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: P
     assert all(stop.deviation_m is not None for stop in run.stops)
 
 
-def test_scans_of_a_vehicle_that_tells_nothing_are_not_made_up(tmp_path: Path) -> None:
+def test_scans_of_a_vehicle_that_reports_nothing_are_not_made_up(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot", trigger="none")
     with site.up(), watched(site):
         site.order("start")
@@ -142,7 +143,7 @@ def test_a_last_stop_that_is_left_out_ends_the_run_where_the_vehicle_is(tmp_path
             assert not peer.in_auto
 
 
-def test_the_way_back_is_driven_at_the_end(tmp_path: Path) -> None:
+def test_the_return_is_driven_at_the_end(tmp_path: Path) -> None:
     there = real_tour()
     back = with_digest(msgspec.structs.replace(there, return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))))
     site = Site(tmp_path, "ardupilot", mission=back)
@@ -162,7 +163,7 @@ def test_a_pause_stops_a_vehicle_that_somebody_else_has_started(tmp_path: Path) 
         assert not peer.in_auto
 
 
-def test_a_run_that_somebody_else_has_started_is_told_as_theirs(tmp_path: Path) -> None:
+def test_a_run_that_somebody_else_has_started_is_reported_as_theirs(tmp_path: Path) -> None:
     site = Site(tmp_path, "px4")
     with site.up(), found_peer(site.url, vehicle=1) as peer, watched(site, compares=True):
         peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)

@@ -36,7 +36,7 @@ def count_often(folder: Path, times: int) -> None:
             counted(book)
 
 
-def test_processes_at_once_tell_one_story(tmp_path: Path) -> None:
+def test_processes_at_once_agree(tmp_path: Path) -> None:
     spawn = multiprocessing.get_context("spawn")
     workers = [spawn.Process(target=count_often, args=(tmp_path, 25)) for _ in range(3)]
     for worker in workers:

@@ -94,7 +94,7 @@ def test_a_mission_is_pushed_on_the_open_line(tmp_path: Path) -> None:
         assert vehicle.mission(fewer.id, 2) == fewer
 
 
-def test_hold_goes_to_a_vehicle_that_was_never_heard(tmp_path: Path, sent: list[Message]) -> None:
+def test_hold_goes_to_a_vehicle_that_never_answered(tmp_path: Path, sent: list[Message]) -> None:
     """By the record of the push; the outcome is unknown, and nothing is claimed."""
     site = Site(tmp_path)
     with opened(site) as vehicle:

@@ -36,7 +36,7 @@ NAV = (Command.NAV_WAYPOINT, Command.NAV_DELAY)
 
 
 class NoHands:
-    """Nothing can be told to a log."""
+    """A log takes no commands."""
 
     def ask_for_picture(self) -> None: ...
 
@@ -86,7 +86,7 @@ def as_messages(entry: Any) -> Iterator[Any]:
 
 
 def followed(log: list[Any], tour: Mission) -> tuple[AnyEvent, ...]:
-    """The events of the run, as a station would have told them."""
+    """The events of the run, as a station would have reported them."""
     clock = SimulatedClock()
     book = Logbook(memory_journal(), "mavlink-1", clock)
     placed = recognise(items_of(log), mission=tour)

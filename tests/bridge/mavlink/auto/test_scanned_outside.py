@@ -1,4 +1,4 @@
-"""A vehicle that is beside a stop while it scans there: told as it is, at once, at the end and ever after."""
+"""A vehicle that is off its stop while it scans there: reported at once, at the end and later."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.auto.site import PATIENCE_S, Site, real_tour, until, watched
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -53,7 +54,7 @@ def site_that_jumps(folder: Path) -> Site:
     return Site(folder, "ardupilot", mission=mission, faults=[JUMP])
 
 
-def test_a_scan_during_which_the_estimate_jumps_is_told_with_its_deviation_everywhere(
+def test_a_scan_during_which_the_estimate_jumps_is_reported_with_its_deviation_everywhere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     site, said = site_that_jumps(tmp_path), []
@@ -84,11 +85,11 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_with_its_deviation_every
     assert f"{1000 * away:.1f}" in index_text(index_of(path.parent))
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_a_stop_that_is_missed_and_left_out_is_not_done(
     profile: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It drives as a real one, so all its stops are beside their places; it scans there all the same."""
+    """It drives as a real one, so all its stops are off their positions; it scans there all the same."""
     mission = real_tour(tolerance_m=NARROW_M, on_failure="skip")
     site, said, heard = Site(tmp_path, profile, mission=mission, seed=2), [], RunCollector()
     with site.up(), site.reached() as station:
@@ -105,7 +106,7 @@ def test_a_stop_that_is_missed_and_left_out_is_not_done(
     assert "0 of 3 stops scanned" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_within_a_tolerance_that_it_keeps_its_stops_are_done_with_their_deviation(
     profile: str, tmp_path: Path
 ) -> None:
@@ -126,7 +127,7 @@ def test_within_a_tolerance_that_it_keeps_its_stops_are_done_with_their_deviatio
 def test_a_stop_that_nobody_saw_scanned_from_elsewhere_has_failed_and_is_not_only_unconfirmed(
     tmp_path: Path,
 ) -> None:
-    """Its camera tells where it was: whoever comes later can know it."""
+    """Its camera reports its position: who connects later can know it."""
     site = Site(tmp_path, "ardupilot", mission=real_tour(tolerance_m=NARROW_M, on_failure="skip"))
     with site.up():
         assert site.order("start").outcome == "ok"

@@ -1,4 +1,4 @@
-"""A vehicle that stands in AUTO between two waypoints: told within 10 s, held, and driven on by retry."""
+"""A vehicle that stands in AUTO between two waypoints: reported within 10 s, held, and driven on by retry."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_vehicle_that_stands_in_auto_is_held_within_ten_seconds_and_retry_driv
     assert site.run.done == ("S1", "S2", "S3")
 
 
-def test_a_short_standstill_is_told_to_nobody(tmp_path: Path) -> None:
+def test_a_short_standstill_is_reported_to_nobody(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot", faults=["stuck@7=5"], speed_up=1.0)
     with site.up(), watched(site):
         site.order("start")

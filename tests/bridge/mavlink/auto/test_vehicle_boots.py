@@ -1,4 +1,4 @@
-"""Restarts of a vehicle, links that deliver late, and clocks that drift: told apart by its clock."""
+"""Restarts of a vehicle, links that deliver late, and clocks that drift: distinguished by its clock."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_a_clock_that_drifts_is_no_restart_and_no_delay() -> None:
     assert station.boots.late_s < 1.0
 
 
-def test_a_restart_during_a_long_silence_is_told_once_the_next_reports_do_not_catch_up() -> None:
+def test_a_restart_during_a_long_silence_is_reported_once_the_next_reports_do_not_catch_up() -> None:
     """The vehicle is up for longer than it was before the silence."""
     station = Listener()
     station.hear(20.0, 20.0)
@@ -82,7 +82,7 @@ def test_a_date_that_is_set_while_nobody_listens_is_no_restart_of_an_armed_vehic
     assert set(told) == {"same"} and second.boots.late_s < 0.5
 
 
-def test_each_restart_is_told_by_one_of_the_processes_that_listen() -> None:
+def test_each_restart_is_reported_by_one_of_the_processes_that_listen() -> None:
     one = Listener()
     other = Listener(one.journal)
     for listener in (one, other):
@@ -93,7 +93,7 @@ def test_each_restart_is_told_by_one_of_the_processes_that_listen() -> None:
     assert one.boots.boot_id == other.boots.boot_id
 
 
-def test_a_restart_between_two_processes_is_told_by_the_second() -> None:
+def test_a_restart_between_two_processes_is_reported_by_the_second() -> None:
     first = Listener()
     first.hear_all(*((t, t) for t in range(60, 100)))
     assert Listener(first.journal).hear(120.0, 15.0) == "restarted"

@@ -19,6 +19,7 @@ from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Arrived, Held, Paused, Resumed, Started
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.bridge.mavlink.lossy import Lossy, Roughness
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -29,7 +30,7 @@ def by_hand(peer: Peer, mode: tuple[int, int]) -> None:
     assert peer.command(dialect.MAV_CMD_DO_SET_MODE, 1, *mode).accepted
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_after_a_reboot_the_run_goes_on_at_the_stop_that_was_not_finished(
     profile: str, tmp_path: Path
 ) -> None:
@@ -87,7 +88,7 @@ def test_a_stop_that_nobody_saw_is_not_said_to_be_scanned(tmp_path: Path) -> Non
     assert words[-1] == "Finished"
 
 
-def test_two_that_watch_tell_every_event_once(tmp_path: Path) -> None:
+def test_two_that_watch_report_every_event_once(tmp_path: Path) -> None:
     site = Site(tmp_path, "px4")
     with site.up(), watched(site) as one, watched(site) as other:
         site.order("start")
@@ -96,7 +97,7 @@ def test_two_that_watch_tell_every_event_once(tmp_path: Path) -> None:
         assert told([report for report in seen if hasattr(report, "number")]) == ALL
 
 
-def test_a_mode_that_somebody_else_chooses_is_told_as_theirs(tmp_path: Path) -> None:
+def test_a_mode_that_somebody_else_chooses_is_reported_as_theirs(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
     with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
         site.order("start")
@@ -130,7 +131,7 @@ def test_a_mission_that_somebody_else_changes_holds_the_run(tmp_path: Path) -> N
     assert any(isinstance(event, Held) for event in site.events)
 
 
-def test_a_silent_vehicle_is_told_as_silence_and_its_run_goes_on(tmp_path: Path) -> None:
+def test_a_silent_vehicle_is_reported_as_silence_and_its_run_goes_on(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
     silent, heard = threading.Event(), []
 
@@ -156,7 +157,7 @@ def test_a_silent_vehicle_is_told_as_silence_and_its_run_goes_on(tmp_path: Path)
     assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_what_a_restart_took_from_the_vehicle_one_command_gives_again(profile: str, tmp_path: Path) -> None:
     """Its origin, its mode and its arming."""
     site = Site(tmp_path, profile)
@@ -207,7 +208,7 @@ def test_a_stop_is_measured_where_the_vehicle_stands(tmp_path: Path) -> None:
     assert arrived.deviation_m == pytest.approx(0.03, abs=0.012)
 
 
-def test_an_order_whose_answer_was_lost_is_told_as_its_commanders_once_it_shows(
+def test_a_command_whose_answer_was_lost_is_reported_as_its_commanders_once_it_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     site = Site(tmp_path, "ardupilot")

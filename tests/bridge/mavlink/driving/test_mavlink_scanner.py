@@ -125,19 +125,19 @@ def test_a_scan_is_what_the_vehicle_names_with_size_points_and_sha256() -> None:
     assert camera.orders == [(dialect.MAV_CMD_IMAGE_START_CAPTURE, (0.0, 2.0, 1.0, 5.0))]
 
 
-def test_a_script_is_told_the_stops_number_and_times() -> None:
+def test_a_script_gets_the_stops_number_and_times() -> None:
     camera = Camera(captured(0))
     assert scan(camera, trigger="script") == GOOD
     assert camera.orders == [(dialect.MAV_CMD_DO_SEND_SCRIPT_MESSAGE, (100.0, 2.0, 2.0, 1.0))]
 
 
-def test_an_older_picture_told_again_is_not_taken_for_the_new_one() -> None:
+def test_an_older_picture_reported_again_is_not_taken_for_the_new_one() -> None:
     old = captured(3, url=URL.replace("scan-1", "scan-0"))
     assert scan(Camera(old, captured(4), taken=4)) == GOOD
     assert scan(Camera(old, taken=4)) == ScanFailed(reason="no result within 1 s")
 
 
-def test_what_was_told_for_one_scan_does_not_count_for_the_next() -> None:
+def test_what_was_reported_for_one_scan_does_not_count_for_the_next() -> None:
     camera = Camera(captured(7))
     scanner = MavlinkScanner(camera, clock=WallClock(speed_up=10))  # type: ignore[arg-type]
     assert scanner.scan("run-s1-1", SCAN, interrupt=Event()) == GOOD
@@ -159,7 +159,7 @@ def test_a_result_that_was_lost_is_asked_for() -> None:
     assert scanner.scan("run-s2-1", slow, interrupt=Event()) == GOOD
 
 
-def test_a_vehicle_that_is_busy_is_waited_for_and_what_it_then_tells_is_not_ours() -> None:
+def test_a_vehicle_that_is_busy_is_waited_for_and_what_it_then_reports_is_not_ours() -> None:
     busy = dialect.MAV_RESULT_TEMPORARILY_REJECTED
     slow = Scan(profile="default", duration_s=2.0, timeout_s=30.0)
     camera = Camera(captured(5), acks=(busy, busy, 0))
@@ -173,7 +173,7 @@ def test_a_trigger_that_is_not_answered_may_have_been_obeyed() -> None:
     assert scan(Camera(captured(4), taken=4, acks=(-1,))) == GOOD
 
 
-def test_a_trigger_that_is_refused_is_told() -> None:
+def test_a_trigger_that_is_refused_is_reported() -> None:
     refused = scan(Camera(taken=4, acks=(dialect.MAV_RESULT_UNSUPPORTED,)))
     assert refused == ScanFailed(reason="the vehicle answered the trigger with UNSUPPORTED")
 

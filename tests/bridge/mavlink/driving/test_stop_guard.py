@@ -112,7 +112,7 @@ def test_signed_frames_are_accepted_one_after_another(vehicle: socket.socket) ->
 
 
 @pytest.mark.parametrize(("drives", "end"), [("stands", "kill"), ("drives", "close")])
-def test_nothing_is_sent_for_a_vehicle_that_stands_or_after_an_orderly_end(
+def test_nothing_is_sent_for_a_vehicle_that_stands_or_after_a_orderly_end(
     vehicle: socket.socket, drives: str, end: str
 ) -> None:
     with driver(url_of(vehicle), drives, "") as process:
@@ -126,7 +126,9 @@ def test_nothing_is_sent_for_a_vehicle_that_stands_or_after_an_orderly_end(
             vehicle.recv(2048)
 
 
-def test_a_listening_end_sends_to_the_vehicle_that_it_heard(vehicle: socket.socket, tmp_path: Path) -> None:
+def test_a_listening_end_sends_to_the_vehicle_of_its_last_message(
+    vehicle: socket.socket, tmp_path: Path
+) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]

@@ -58,7 +58,7 @@ def test_how_far_it_rolls_on_is_learnt_at_each_stop() -> None:
     assert drive.coast_s == pytest.approx((0.4 + 0.07 / 0.2) / 2)
 
 
-def test_beside_its_place_it_goes_again_backwards_if_that_is_nearer() -> None:
+def test_off_its_position_it_goes_again_backwards_if_that_is_nearer() -> None:
     drive = straight()
     seen(drive, 0.0, 0.0)
     seen(drive, 8.0, 4.0, speed=0.2)
@@ -73,7 +73,7 @@ def test_beside_its_place_it_goes_again_backwards_if_that_is_nearer() -> None:
     assert abs(turned.steer.heading) == pytest.approx(math.pi)
 
 
-def test_beside_the_line_it_steers_back_to_it_and_slowly() -> None:
+def test_off_the_line_it_steers_back_to_it_and_slowly() -> None:
     drive = straight()
     seen(drive, 0.0, 0.0)
     for step in range(40):
@@ -93,7 +93,7 @@ def test_its_speed_is_such_that_it_stops_near_the_end_if_it_hears_no_more() -> N
         assert asked * (1.0 + 0.2 + 0.4) + asked**2 / (2 * 0.5) <= left + 0.2 + 1e-9
 
 
-def test_who_stands_though_told_to_drive_is_pushed_and_then_blocked() -> None:
+def test_who_stands_though_commanded_to_drive_is_pushed_and_then_blocked() -> None:
     drive = straight()
     seen(drive, 0.0, 2.0)
     verdicts = [seen(drive, part / 10, 2.0) for part in range(1, 102)]
@@ -102,7 +102,7 @@ def test_who_stands_though_told_to_drive_is_pushed_and_then_blocked() -> None:
     assert drive.why == "the vehicle stopped 2.00 m from its goal, and does not go on"
 
 
-def test_a_vehicle_that_leaves_the_way_by_more_than_its_radius_is_stopped() -> None:
+def test_a_vehicle_that_leaves_the_path_by_more_than_its_radius_is_stopped() -> None:
     drive = straight()
     assert seen(drive, 0.0, 2.0, 0.34) == "going"
     assert seen(drive, 0.1, 2.0, 0.36) == "blocked"

@@ -1,4 +1,4 @@
-"""A simulated vehicle without a socket, on clocks that pass when told to, and stations that talk to it."""
+"""A simulated vehicle without a socket, on clocks that pass on request, and stations that talk to it."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class Bench:
         assert (self.arm(), self.mode("auto")) == (OBEYED, OBEYED)
 
     def reached(self) -> list[int]:
-        """Items told as reached, repeats left out, counted without home."""
+        """Items reported as reached, repeats left out, counted without home."""
         numbers = [message.seq - self.first for message in self.said("MISSION_ITEM_REACHED")]
         return [number for number, _ in itertools.groupby(numbers)]
 

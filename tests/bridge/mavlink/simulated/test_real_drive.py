@@ -48,7 +48,7 @@ def beside_mm(stood: list[tuple[float, Pose]]) -> list[float]:
     return [1000 * math.dist((pose.x, pose.y), corner) for (_, pose), corner in pairs]
 
 
-def test_its_stops_in_auto_are_beside_as_those_of_the_log() -> None:
+def test_its_stops_in_auto_have_errors_as_those_of_the_log() -> None:
     stood = driven(Bench("ardupilot", at=START, seed=1))
     assert beside_mm(stood) == pytest.approx(MEASURED_MM, abs=50)
     legs = [after - before for (before, _), (after, _) in pairwise(stood)]
@@ -84,7 +84,7 @@ def test_slower_is_nearer() -> None:
     assert max(beside_mm(driven(slow))) < 0.7 * min(MEASURED_MM)
 
 
-def test_without_pivot_turns_it_leaves_the_way() -> None:
+def test_without_pivot_turns_it_leaves_the_path() -> None:
     """As a Rover that may not turn on the spot does: it drives a bow to the next place."""
     bench = Bench("ardupilot", at=START, seed=1, WP_PIVOT_ANGLE=0.0)
     driven_to_north = beside_mm(driven(bench))
@@ -144,7 +144,7 @@ def test_px4_turns_on_the_spot_and_drives_where_the_velocity_points() -> None:
     assert truth(bench).y > 0.3
 
 
-def test_its_estimate_wanders_by_millimetres_and_jumps_when_told() -> None:
+def test_its_estimate_wanders_by_millimetres_and_jumps_on_request() -> None:
     bench = Bench("ardupilot", at=START, seed=1, faults=("jump@10=0.4",))
     off = []
     for _ in range(200):
@@ -170,7 +170,7 @@ def test_a_gap_and_a_restart_are_silence(fault: str) -> None:
     assert bench.vehicle.armed == fault.startswith("gap")
 
 
-def test_all_its_parameters_are_told_and_kept() -> None:
+def test_all_its_parameters_are_reported_and_kept() -> None:
     bench = Bench("ardupilot", at=START, seed=1)
     bench.say(dialect.MAVLink_param_request_list_message(1, 1))
     told = {message.param_id: message.param_value for message in bench.said("PARAM_VALUE")}

@@ -137,7 +137,7 @@ def test_mavsdk_sends_and_reads_fence_and_rally_points() -> None:
 
 
 @pytest.mark.parametrize("profile", ["strict", "px4"])
-def test_mavsdk_is_told_what_is_wrong_with_an_item(profile: str) -> None:
+def test_mavsdk_is_informed_what_is_wrong_with_an_item(profile: str) -> None:
     from mavsdk.plugins.mission_raw.mission_raw import MissionRaw, MissionRawError, MissionRawResult
 
     with vehicle(profile) as port, station(port) as system:

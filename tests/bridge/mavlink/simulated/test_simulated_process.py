@@ -60,7 +60,7 @@ def answer(station: Wire, message: Message, kind: str, *, tries: int = 40) -> Me
 
 
 def upload(station: Wire, items: list[Item], *, home: bool = False) -> bool:
-    """All items, each as often as it is asked for; true once they are accepted."""
+    """All items, each as often as it is requested; true once they are accepted."""
     listed = [item_message(number, item) for number, item in enumerate([items[0], *items] if home else items)]
     count = dialect.MAVLink_mission_count_message(1, 1, len(listed), 0)
     with station.waiting("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") as waiting:
@@ -175,7 +175,7 @@ def test_a_vehicle_that_was_refused_leaves_its_port_free(tmp_path: Path) -> None
     assert threading.active_count() == threads
 
 
-def test_two_stations_on_streams_are_told_the_same() -> None:
+def test_two_stations_on_streams_are_informed_the_same() -> None:
     port = free_port()
     with (
         vehicle_on(Url("tcpin", "127.0.0.1", port), VehicleSetup(PROFILES["strict"])),

@@ -1,4 +1,4 @@
-"""The vehicle drives its mission, obeys and tells, each autopilot in its own way."""
+"""The vehicle drives its mission, obeys and reports, each autopilot in its own way."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def test_pause_keeps_the_item_and_resume_goes_on_with_it(make: Make) -> None:
     assert bench.reached() == [0, 1, 2]
 
 
-def test_disarming_and_rebooting_begin_the_mission_anew_and_keep_the_items(make: Make) -> None:
+def test_disarming_and_rebooting_begin_the_mission_again_and_keep_the_items(make: Make) -> None:
     bench = make()
     bench.upload([delay(5.0), delay(5.0), delay(5.0)])
     bench.start()
@@ -402,7 +402,7 @@ def test_a_yaw_alone_turns_on_the_spot_where_the_autopilot_does(make: Make) -> N
     assert bench.at() == (0.0, 0.0)
 
 
-def test_a_speed_is_taken_on_the_way(make: Make) -> None:
+def test_a_speed_is_taken_on_a_leg(make: Make) -> None:
     """8 m at 0.5 m/s take 17 s, at 2 m/s with 0.5 m/s² no more than 8 s."""
     bench = make()
     bench.arm()
@@ -484,7 +484,7 @@ def test_the_specifications_vehicle_knows_modes_by_their_flags_and_pauses_by_com
     assert Bench("px4").command(d.MAV_CMD_DO_SET_MODE, d.MAV_MODE_FLAG_AUTO_ENABLED) == d.MAV_RESULT_DENIED
 
 
-def test_what_is_not_known_is_unsupported_and_told_to_who_asked(make: Make) -> None:
+def test_what_is_not_known_is_unsupported_and_reported_to_who_asked(make: Make) -> None:
     bench = make()
     assert bench.command(31_010, who=OTHER) == d.MAV_RESULT_UNSUPPORTED
     ack = bench.last("COMMAND_ACK")
@@ -529,7 +529,7 @@ def test_reached_is_repeated_when_asked_so(make: Make) -> None:
     assert len(bench.said("MISSION_ITEM_REACHED")) == before
 
 
-def test_intervals_are_set_told_and_reset(make: Make) -> None:
+def test_intervals_are_set_reported_and_reset(make: Make) -> None:
     bench = make()
     number = d.MAVLINK_MSG_ID_ATTITUDE
     assert bench.command(d.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1.0) == OBEYED
@@ -573,7 +573,7 @@ def test_a_scan_by_command_is_not_begun_twice(make: Make) -> None:
     assert bench.vehicle.camera.under_way is None
 
 
-def test_the_camera_tells_how_much_it_has_taken_and_an_older_picture_again(make: Make) -> None:
+def test_the_camera_reports_how_much_it_has_taken_and_an_older_picture_again(make: Make) -> None:
     bench = make()
     for number in (1, 2, 3):
         bench.command(d.MAV_CMD_IMAGE_START_CAPTURE, 0, 1.0, 1, number)
@@ -632,7 +632,7 @@ def test_its_time_since_boot_does_not_run_ahead_of_the_messages(make: Make) -> N
     assert bench.vehicle.time.boot_ms == 0
 
 
-def test_a_stop_error_is_not_told(make: Make) -> None:
+def test_a_stop_error_is_not_reported(make: Make) -> None:
     bench = make(faults=[f"beside@{make().first}=0.5"])
     bench.upload([waypoint(4.0, 0.0)])
     bench.start()

@@ -118,7 +118,7 @@ class Full(Scripted):
         self.ack(dialect.MAV_MISSION_NO_SPACE, to)
 
 
-def test_too_many_items_are_told_as_such() -> None:
+def test_too_many_items_are_reported_as_such() -> None:
     with Full() as vehicle, pytest.raises(NegativeResult, match=r"refused 40 items .* plan fewer stops"):
         pushed(vehicle)
 
@@ -130,7 +130,7 @@ class Busy(Scripted):
         self.ack(dialect.MAV_MISSION_DENIED, to)
 
 
-def test_a_second_station_is_told_that_nothing_was_stored() -> None:
+def test_a_second_station_is_informed_that_nothing_was_stored() -> None:
     said = r"takes no mission now \(DENIED\).*nothing of this mission was stored"
     with Busy(held(OLD)) as vehicle, pytest.raises(NegativeResult, match=said):
         pushed(vehicle)
@@ -230,7 +230,7 @@ class Reboots(Breaks):
         self.boot_ms, self.receiving = 0, None
 
 
-def test_a_reboot_is_noticed_and_what_it_left_is_told() -> None:
+def test_a_reboot_is_noticed_and_what_it_left_is_reported() -> None:
     said = r"was restarted when \d of 40 items had arrived; it still holds the mission it had"
     with Reboots(held(OLD)) as vehicle, pytest.raises(NegativeResult, match=said):
         pushed(vehicle, timeout_s=5.0)
@@ -247,7 +247,7 @@ def test_a_transfer_that_the_vehicle_ends_is_begun_again() -> None:
         assert pushed(vehicle) == HELD_NEW
 
 
-def test_a_vehicle_that_tells_nothing_was_not_touched() -> None:
+def test_a_vehicle_that_reports_nothing_was_not_touched() -> None:
     class Deaf(Scripted):
         def take(self, message: Message) -> None:
             self.heard[message.get_type()] += 1

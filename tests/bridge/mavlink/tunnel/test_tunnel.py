@@ -82,7 +82,7 @@ def both_ends(**details: Any) -> Iterator[tuple[Line, Line, Tunnel]]:
 
 
 @pytest.mark.parametrize("signed", [False, True])
-def test_frames_pass_unchanged_both_ways(signed: bool) -> None:
+def test_frames_pass_unchanged_in_both_directions(signed: bool) -> None:
     down, up = frames(signed=signed), frames(system=255, signed=signed)
     with both_ends() as (vehicle, ground, _):
         vehicle.coming.put(down[0] + down[1])
@@ -135,7 +135,7 @@ def test_a_link_that_is_stuck_costs_the_oldest_frames_and_never_waits() -> None:
         free.set()
 
 
-def test_without_raw_orders_one_can_look_and_stop_and_nothing_else() -> None:
+def test_without_raw_commands_one_can_look_and_stop_and_nothing_else() -> None:
     judge = MessageFilter()
     reader = Frames(tunnels.Counter())
     for _, message in reader.whole(frames(1)[0], datagram=True):
@@ -213,7 +213,7 @@ def test_mavsdk_uploads_and_downloads_through_the_tunnel(tmp_path: Path) -> None
     assert [(item.x, item.y) for item in read[1:]] == [(item.x, item.y) for item in items[1:]]
 
 
-def test_without_raw_orders_arming_is_refused_in_words_and_hold_passes(tmp_path: Path) -> None:
+def test_without_raw_commands_arming_is_refused_in_words_and_hold_passes(tmp_path: Path) -> None:
     with tunnelled(tmp_path) as (port, operator):
         operator.manual()
         with reached(Url("udpout", "127.0.0.1", port), vehicle=1, timeout_s=60) as peer:
@@ -229,7 +229,7 @@ def test_without_raw_orders_arming_is_refused_in_words_and_hold_passes(tmp_path:
         assert not operator.peer.armed
 
 
-def test_the_station_is_told_once_for_each_kind_of_message_that_is_refused(
+def test_the_station_is_informed_once_for_each_kind_of_message_that_is_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     listener, reader = RefusalListener("r1"), Frames(tunnels.Counter())

@@ -105,7 +105,7 @@ class Slow(Scripted):
             self.answer(message.command, dialect.MAV_RESULT_ACCEPTED, to)
 
 
-def test_an_order_is_repeated_until_it_is_answered() -> None:
+def test_a_command_is_repeated_until_it_is_answered() -> None:
     with Slow() as vehicle, reached(vehicle.url, vehicle=1) as peer:
         assert peer.command(ARM, 1).accepted
         assert vehicle.heard["COMMAND_LONG"] >= 3
@@ -117,7 +117,7 @@ class Refusing(Scripted):
         self.answer(message.command, dialect.MAV_RESULT_FAILED, to)
 
 
-def test_a_refusal_is_told_with_the_vehicles_words() -> None:
+def test_a_refusal_is_reported_with_the_vehicles_words() -> None:
     told = pytest.raises(NegativeResult, match=r"COMPONENT_ARM_DISARM was answered FAILED .*Arm: no position")
     with Refusing() as vehicle, reached(vehicle.url, vehicle=1) as peer, told:
         peer.order(ARM, 1)
@@ -128,7 +128,7 @@ class Deaf(Scripted):
         pass
 
 
-def test_an_unanswered_order_is_unknown_and_an_unanswered_question_is_not() -> None:
+def test_an_unanswered_command_is_unknown_and_an_unanswered_question_is_not() -> None:
     with Deaf() as vehicle, reached(vehicle.url, vehicle=1) as peer:
         with pytest.raises(OutcomeUnknown, match="heartbeats come: does it want signed messages"):
             peer.command(ARM, 1, patience_s=0.4)

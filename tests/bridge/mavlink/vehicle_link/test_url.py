@@ -44,7 +44,7 @@ def test_an_ipv6_address_is_shown_in_brackets() -> None:
         ("serial:/dev/ttyUSB0:300", "300 is no baud rate"),
     ],
 )
-def test_what_is_none_is_refused_with_the_way_to_write_one(text: str, said: str) -> None:
+def test_what_is_none_is_refused_with_an_example(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_url(text)
 

@@ -66,13 +66,13 @@ def passes(one: Wire, other: Wire, *, start: int = 0) -> None:
 
 
 @pytest.mark.parametrize(("station", "vehicle"), [("udpin", "udpout"), ("udpout", "udpin")])
-def test_udp_goes_both_ways(station: str, vehicle: str) -> None:
+def test_udp_goes_in_both_directions(station: str, vehicle: str) -> None:
     port = free_port()
     with wire(udp(station, port)) as one, wire(udp(vehicle, port), me=VEHICLE) as other:
         passes(other, one) if station == "udpin" else passes(one, other)
 
 
-def test_tcp_goes_both_ways_and_is_connected_again() -> None:
+def test_tcp_goes_in_both_directions_and_is_connected_again() -> None:
     port = free_port()
     with ExitStack() as stack:
         vehicle = stack.enter_context(wire(udp("tcpin", port), me=VEHICLE))
@@ -222,7 +222,7 @@ def test_a_signed_wire_hears_only_its_key() -> None:
         assert station.dropped[SIGNATURE] == 2
 
 
-def test_a_replay_is_not_heard_again_nor_is_what_was_signed_long_ago() -> None:
+def test_a_replay_is_not_accepted_again_nor_is_what_was_signed_long_ago() -> None:
     with listening(KEY) as (station, waiting, throw):
         throw(packed(1, key=KEY, ahead_s=-120.0))
         first = packed(2, key=KEY)
@@ -274,7 +274,7 @@ def test_a_key_is_hexadecimal_or_a_passphrase(tmp_path: Path) -> None:
     assert read_signing_key(path) == hashlib.sha256(b"correct horse").digest()
 
 
-def test_a_key_that_others_can_read_is_told_of_without_showing_it(
+def test_a_key_that_others_can_read_is_reported_without_showing_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "key"

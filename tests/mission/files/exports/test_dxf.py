@@ -81,7 +81,7 @@ def test_a_block_per_stop_with_number_id_and_heading(mission: Mission) -> None:
         assert shown == {"NUMBER", "ID"}
 
 
-def test_a_polyline_per_leg_and_the_way_back_dashed() -> None:
+def test_a_polyline_per_leg_and_the_return_dashed() -> None:
     drawing = opened(exported(square_tour(), "dxf", Supplements()))
     lines = drawing.modelspace().query("LWPOLYLINE").filter(lambda line: line.dxf.layer == "SCAN_ROUTE")
     points = [[point[:2] for point in line.get_points()] for line in lines]

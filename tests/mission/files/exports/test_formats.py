@@ -46,7 +46,7 @@ def test_a_drawing_in_national_coordinates_keeps_its_millimetres(name: str) -> N
 
 
 @every
-def test_without_georeference_it_is_written_or_refused_with_the_way_out(name: str) -> None:
+def test_without_georeference_it_is_written_or_refused_with_the_remedy(name: str) -> None:
     made = msgspec.structs.replace(square_tour(), georeference=None)
     if not FORMATS[name].georeferenced:
         assert exported(made, name, Supplements())

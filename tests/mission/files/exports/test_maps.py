@@ -60,7 +60,7 @@ def test_rows_end_as_rfc_4180_says() -> None:
     assert data.count(b"\r\n") == data.count(b"\n") == 3
 
 
-def test_the_way_back_is_told_of_where_it_is_left_out() -> None:
+def test_the_return_is_reported_where_it_is_left_out() -> None:
     notes = FORMATS["csv"].notes
     assert notes(from_the_first_stop(), Supplements()) == ()
     assert "path back" in notes(laboratory(), Supplements())[0]

@@ -94,7 +94,7 @@ def test_an_origin_given_turns_the_site() -> None:
     assert visit.xy == pytest.approx((-10.0, 0.0), abs=0.05)
 
 
-def test_what_a_plan_has_besides_items_is_told_of() -> None:
+def test_what_a_plan_has_besides_items_is_reported() -> None:
     fence = {"circles": [], "polygons": [{"path": []}], "version": 2}
     rally = {"points": [[47.0, 8.0, 0]], "version": 2}
     notes = track(waypoint(hold=5), geoFence=fence, rallyPoints=rally).notes

@@ -23,7 +23,7 @@ AT_S1 = Run(state="RUNNING", run_id="r", at=0, stop_state="SCANNING")
 
 
 class Telling:
-    """A observer, and what it is told."""
+    """An observer, and its messages."""
 
     def __init__(self) -> None:
         mission = tour()
@@ -100,7 +100,7 @@ def test_local_metres_are_exact_and_degrees_a_step_off() -> None:
     assert (fix.pose.x, fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.001)  # type: ignore[union-attr]
 
 
-def test_a_pose_is_of_the_item_only_if_it_was_told_after_it() -> None:
+def test_a_pose_is_of_the_item_only_if_it_was_reported_after_it() -> None:
     telling = Telling()
     telling.origin()
     telling.tell(dialect.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0))
@@ -142,21 +142,21 @@ def test_a_scan_belongs_to_the_stop_where_it_was_made_and_counts_once() -> None:
     assert isinstance(telling.scan(after=(2, 2000)), ScanFailed)
 
 
-def test_a_file_that_is_not_told_in_full_is_no_scan() -> None:
+def test_a_file_that_is_not_reported_in_full_is_no_scan() -> None:
     telling = Telling()
     telling.current(4)
     telling.captured(1, at=(1.0, 0.0), url=URL.replace(b"size=1600", b"size=01600"))
     assert isinstance(telling.scan(), ScanFailed)
 
 
-def test_a_battery_that_is_not_told_changes_nothing() -> None:
+def test_a_battery_that_is_not_reported_changes_nothing() -> None:
     telling = Telling()
     for remaining in (40, -1):
         telling.tell(dialect.MAVLink_sys_status_message(0, 0, 0, 0, 0, 0, remaining, 0, 0, 0, 0, 0, 0))
     assert telling.observer.status.health.charge == 0.4
 
 
-def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
+def test_a_number_of_items_that_is_not_reported_is_not_taken_for_one() -> None:
     telling = Telling()
     told = []
     for total in (0, 65_535, 7):
@@ -185,7 +185,7 @@ def arrival(x: float) -> Arrived:
     )  # fmt: skip
 
 
-def test_a_scan_made_beside_its_stop_is_that_stops_with_where_it_was_made() -> None:
+def test_a_scan_made_off_its_stop_is_that_stops_with_where_it_was_made() -> None:
     """The vehicle arrived, and was moved, or its estimate jumped, before the scan was over."""
     telling = Telling()
     telling.origin()
@@ -196,8 +196,8 @@ def test_a_scan_made_beside_its_stop_is_that_stops_with_where_it_was_made() -> N
     assert stood(telling, arrival(1.01)).x == pytest.approx(1.12, abs=0.001)
 
 
-def test_where_a_scan_was_made_is_told_as_exactly_as_it_is_known() -> None:
-    """The camera tells it in steps of a centimetre; what it rounds, nobody is said to have moved."""
+def test_where_a_scan_was_made_is_reported_as_exactly_as_it_is_known() -> None:
+    """The camera reports it in steps of a centimetre; its rounding is no motion of anybody."""
     telling = Telling()
     telling.origin()
     telling.current(4)

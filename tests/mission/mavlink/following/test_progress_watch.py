@@ -17,7 +17,7 @@ HERE = Pose(x=1.0, y=0.0, heading=0.0)
 def stalled_s(
     place: int, *, lasts_s: float, moves: float = 0.0, turns: float = 0.0, drives: bool = True, x: float = 1.0
 ) -> float:
-    """Stall that is told after so long at an item; motion per second."""
+    """Stall that is reported after so long at an item; motion per second."""
     watch = ProgressWatch()
     for tenth in range(round(lasts_s * 10) + 1):
         pose = Pose(x=x + moves * tenth / 10, y=0.0, heading=turns * tenth / 10)

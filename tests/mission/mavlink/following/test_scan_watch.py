@@ -39,7 +39,7 @@ def test_a_motion_is_known_after_the_vehicle_has_left() -> None:
     assert moved.why(LISTED, "S1") == "the vehicle moved 0.20 m during the scan"
 
 
-def test_another_attempt_is_watched_anew() -> None:
+def test_another_attempt_is_watched_again() -> None:
     moved = watched((S1.scan, 1.0), (S1.scan, 1.0), (S1.scan, 1.2), (S1.at, 1.2), (S1.scan, 1.0))
     assert moved.why(LISTED, "S1") == ""
 

@@ -60,7 +60,7 @@ def event_of(telling: object) -> AnyEvent:
     return telling(**blank, robot_ns=0, mission_time_s=0.0)  # type: ignore[operator,no-any-return]
 
 
-def test_a_place_in_the_list_tells_the_stop_and_the_work_there() -> None:
+def test_a_place_in_the_list_reports_the_stop_and_the_work_there() -> None:
     items = listed().stops[1]
     roles = [placed.role for placed in listed().sent.placed]
     assert (roles[items.first], roles[items.at]) == ("corner", "stop")
@@ -114,7 +114,7 @@ def test_a_stop_that_was_left_is_never_gone_back_to() -> None:
 
 
 @pytest.mark.parametrize("mode", ["HOLD", "MANUAL"])
-def test_a_scan_under_way_outlives_a_hold_and_nothing_else(mode: str) -> None:
+def test_a_scan_in_progress_outlives_a_hold_and_nothing_else(mode: str) -> None:
     mine, items = listed(), listed().stops[1]
     observed = Observation(mode=mode, armed=True, place=items.scan)
     change = taken_over(going(stop_state="SCANNING"), mine, observed)

@@ -78,7 +78,7 @@ def test_a_zipped_model_is_read_as_the_model(whole: str, tmp_path: Path) -> None
     assert read_floor(path, FloorOptions(storey="EG")).area == pytest.approx(8.2 * 4.4)
 
 
-def test_what_the_schema_does_not_know_is_told_as_a_warning(whole: str, tmp_path: Path) -> None:
+def test_what_the_schema_does_not_know_is_reported_as_a_warning(whole: str, tmp_path: Path) -> None:
     path = tmp_path / "m.ifc"
     path.write_text(whole.replace("DATA;", "DATA;\n#999999=IFCNOSUCHTHING($);"))
     found = read_floor(path, FloorOptions(storey="EG")).findings
@@ -124,7 +124,7 @@ def test_a_model_that_needs_too_much_memory_is_refused(read: Read, monkeypatch: 
         read(two_rooms())
 
 
-def test_a_kept_model_that_is_damaged_is_read_anew(read: Read, models: Path) -> None:
+def test_a_kept_model_that_is_damaged_is_read_again(read: Read, models: Path) -> None:
     house = two_rooms()
     read(house)
     newest = max(models.iterdir(), key=lambda path: path.stat().st_mtime_ns)

@@ -1,4 +1,4 @@
-"""Real models beside the layered drawings made of them: the same rooms, doors and walls."""
+"""Real models next to the layered drawings made of them: the same rooms, doors and walls."""
 
 from __future__ import annotations
 

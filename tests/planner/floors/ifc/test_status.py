@@ -70,7 +70,7 @@ def test_three_days_give_three_floors(read: Read, assigned: str) -> None:
     assert {item.kind for item in late.openings} == {"door"}
 
 
-def test_what_is_begun_is_in_the_way_and_a_target_only_if_told(read: Read) -> None:
+def test_what_is_begun_is_in_the_way_and_a_target_only_on_request(read: Read) -> None:
     house = scheduled(two_rooms(), WORK)
     (column,) = [item for item in read(house, date="2024-03-20").elements if item.kind == "columns"]
     assert (column.obstacle, column.target) == (True, False)
@@ -109,7 +109,7 @@ def test_days_may_stand_in_properties(read: Read) -> None:
     assert "no_task" in {item.code for item in before.findings}
 
 
-def test_ifc2x3_tells_days_by_schedule_time_controls(read: Read) -> None:
+def test_ifc2x3_reports_days_by_schedule_time_controls(read: Read) -> None:
     house = two_rooms("IFC2X3")
     model = house.model
     day = model.create_entity("IfcCalendarDate", DayComponent=1, MonthComponent=6, YearComponent=2024)
@@ -143,7 +143,7 @@ def test_ifc2x3_tells_days_by_schedule_time_controls(read: Read) -> None:
     assert "column" in there(read(house, date="2024-06-01"), house)
 
 
-def test_a_schedule_beside_the_model_names_products_by_global_id(read: Read, tmp_path: Path) -> None:
+def test_a_schedule_next_to_the_model_names_products_by_global_id(read: Read, tmp_path: Path) -> None:
     house, path = two_rooms(), tmp_path / "work.csv"
     guid = house.things["column"].GlobalId
     path.write_text(f"GUID;Task;Start;Finish\n{guid};cast;3-1-2024;28-2-2024\n;;;\n{guid};strip;;15-3-2024\n")
@@ -179,7 +179,7 @@ def test_a_schedule_gives_days_to_phases_by_their_names(read: Read, tmp_path: Pa
     )
 
 
-def test_a_schedule_of_another_model_is_told_as_a_warning(read: Read, tmp_path: Path) -> None:
+def test_a_schedule_of_another_model_is_reported_as_a_warning(read: Read, tmp_path: Path) -> None:
     path = tmp_path / "work.csv"
     path.write_text("guid,finish\nsomewhere-else,2024-01-01\n")
     floor = read(two_rooms(), date="2024-03-01", schedule=path)

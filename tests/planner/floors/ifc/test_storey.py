@@ -160,7 +160,7 @@ def test_a_level_that_is_not_the_storeys_is_refused(read: Read) -> None:
     assert read(house, level=0.1).source.storey == "EG"
 
 
-def test_the_roof_is_no_floor_that_is_planned_unasked(read: Read, tmp_path: Path) -> None:
+def test_the_roof_is_no_floor_that_is_planned_without_a_request(read: Read, tmp_path: Path) -> None:
     house = two_rooms()
     assert read(house, storey=None).source.storey == "EG"
     found = survey_floor(tmp_path / "house.ifc")

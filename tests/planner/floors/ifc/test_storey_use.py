@@ -137,6 +137,14 @@ def test_storeys_of_equal_and_empty_names_can_be_chosen(read: Read, tmp_path: Pa
         read(house, storey="flat")
 
 
+def test_a_merged_storey_has_the_name_of_the_one_with_rooms(read: Read) -> None:
+    house = two_rooms()
+    framing = house.storey("Framing", 0.0)
+    for k in range(20):
+        house.box("IfcMember", f"batten {k}", (0.3 + k / 5, 0.3, 2.5, 0.35 + k / 5, 4, 2.6), framing)
+    assert read(house, storey="Framing").level == "EG"
+
+
 def test_a_merged_storey_is_chosen_by_either_name(read: Read) -> None:
     house = two_rooms()
     house.storey("FFL", 0.01)

@@ -121,14 +121,14 @@ def test_a_hairline_between_two_walls_is_closed_at_its_whole_length() -> None:
     assert len(part.interiors) == 0
 
 
-def test_a_face_in_no_open_space_is_told_with_its_place() -> None:
+def test_a_face_in_no_open_space_is_reported_with_its_place() -> None:
     mesh = mesh_of(whole_steps(shapely.box(0, 0, 4, 4)))
     a, b = np.array([[1.0, 2.0]]), np.array([[3.0, 2.0]])
     with pytest.raises(StopgoError, match=r"face \(1\.00000, 2\.00000\) to \(3\.00000, 2\.00000\) m from"):
         scene_of(mesh, a, b, np.array([40]), np.array([True]))
 
 
-def test_open_space_that_is_none_is_told_with_its_place() -> None:
+def test_open_space_that_is_none_is_reported_with_its_place() -> None:
     bow_tie = shapely.Polygon([(0, 0), (4, 4), (4, 0), (0, 4)])
     with pytest.raises(StopgoError, match=r"Self-intersection\[2 2\]"):
         mesh_of(bow_tie)

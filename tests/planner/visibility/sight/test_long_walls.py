@@ -36,7 +36,7 @@ def test_a_unit_a_millimetre_beyond_the_range_is_not_seen(speed: str) -> None:
     assert tell(*ends, 8391, 8392, 500_000)
 
 
-def test_the_greatest_numbers_are_told_as_in_python() -> None:
+def test_the_greatest_numbers_are_reported_as_in_python() -> None:
     """At the bounds of what is let in: one more bit, and products would not fit."""
     pieces, turn = 2 * MOST_UNITS, 2 * (2 * COORDINATE) ** 2
     fast = machine_code(not_negative), machine_code(within_reach)

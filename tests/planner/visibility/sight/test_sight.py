@@ -51,7 +51,7 @@ class World:
         self.stand_at(viewpoints)
 
     def stand_at(self, viewpoints: np.ndarray) -> None:
-        """Look from these points, but for those within occluders."""
+        """Look from these points, except for those within occluders."""
         inside = shapely.contains_properly(self.occluders, shapely.points(viewpoints))
         self.viewpoints = to_grid(viewpoints[~inside])
 

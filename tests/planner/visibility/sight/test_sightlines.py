@@ -24,7 +24,7 @@ def lines_of(seed: int, extent: int) -> tuple[np.ndarray, Midpoints, np.ndarray]
 
 
 @pytest.mark.parametrize("extent", [3, 10, 10**8, 2**29])
-def test_lines_are_told_as_in_fractions(extent: int) -> None:
+def test_lines_are_reported_as_in_fractions(extent: int) -> None:
     for seed in range(6):
         place, midpoints, edges = lines_of(seed, extent)
         for reach in (None, extent // 2 + 1):

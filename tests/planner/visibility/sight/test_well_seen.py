@@ -111,7 +111,7 @@ def test_the_ends_of_a_stretch_are_where_the_formulas_put_them() -> None:
 
 
 def test_what_is_exactly_at_a_limit_is_seen() -> None:
-    """A midpoint 3 m beside the foot of a wall 4 m away is exactly 5 m away."""
+    """A midpoint 3 m from the foot of a wall 4 m away is exactly 5 m away."""
     wall = SeenSegments(np.array([[250_000, 400_000]]), np.array([[350_000, 400_000]]), np.array([1]))
     unit = np.array([0])
     assert well_seen(wall, unit, ViewLimits(near=5.0))[0]

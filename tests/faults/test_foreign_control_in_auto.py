@@ -34,7 +34,7 @@ from tests.faults.sizes import size
 from tests.faults.test_gateway import moment
 from tests.own_time import World, stepped_into
 
-SEEDS = range(size(short=4, full=240))
+SEEDS = range(size(short=2, full=240))
 OTHER = Who(255, 190)
 TRUE_M = 0.05
 """By how much an estimate may differ from the truth."""
@@ -186,7 +186,7 @@ def followed(hands: Hands, befalls: list[Any], chance: random.Random) -> None:
 
 
 def check_told(hands: Hands, mishap: object, before: int) -> None:
-    """Whoever watches is told of a foreign hand in time, also over a link that loses frames.
+    """Who watches is informed of foreign control in time, also over a link that loses frames.
 
     A jump from the end of a stop's work to the next leg is what comes anyway; the run may be over before.
     """

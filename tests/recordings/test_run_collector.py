@@ -32,7 +32,7 @@ def heard_run(mission: Mission, *sights: Sight, skips: str | None = None) -> tup
 
 
 @pytest.mark.parametrize(("skips", "code"), [(None, 0), ("S2", 1)])
-def test_what_was_heard_decides_how_watching_ends(
+def test_what_was_received_decides_how_watching_ends(
     skips: str | None, code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mission, sight = planned()
@@ -56,7 +56,7 @@ def test_an_aborted_run_is_judged_by_its_scans(capsys: pytest.CaptureFixture[str
     assert "The run was aborted: abort by ann." in capsys.readouterr().out
 
 
-def test_a_plan_of_another_mission_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plan_of_another_mission_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     mission, sight = planned()
     object.__setattr__(sight, "mission_id", "f" * 32)
     heard, state = heard_run(mission, sight)
@@ -64,7 +64,7 @@ def test_a_plan_of_another_mission_is_told(capsys: pytest.CaptureFixture[str]) -
     assert "--plan: belongs to another mission" in capsys.readouterr().err
 
 
-def test_a_run_that_is_told_twice_is_one(mission: Mission) -> None:
+def test_a_run_that_is_reported_twice_is_one(mission: Mission) -> None:
     heard, _ = heard_run(mission)
     for report in run.reports(mission):
         hand_over(heard, report)

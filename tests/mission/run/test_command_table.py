@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mission.run.order_table import PLACES, VERBS, effect, table_text
+from tests.mission.run.command_table import PLACES, VERBS, effect, table_text
 
 PROTOCOL = Path(__file__).parents[3] / "docs" / "reference" / "protocol.md"
 
@@ -25,7 +25,7 @@ EFFECTS = {
 
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("place", PLACES)
-def test_every_order_does_in_every_state_what_the_table_says(verb: str, place: str) -> None:
+def test_every_command_does_in_every_state_what_the_table_says(verb: str, place: str) -> None:
     refused = "no_mission" if place == "IDLE" else "wrong_state"
     assert effect(verb, place) == EFFECTS[verb].get(place, refused)
 

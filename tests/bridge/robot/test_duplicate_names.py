@@ -33,7 +33,7 @@ def twins() -> tuple[Field, Field]:
     return one, other
 
 
-def test_an_order_is_for_the_one_that_told_its_state() -> None:
+def test_a_command_is_for_the_one_that_reported_its_state() -> None:
     """Written for the first before the second came, it is not carried out by that."""
     one, other = Field(), Field()
     for field in (one, other):

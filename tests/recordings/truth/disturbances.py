@@ -1,6 +1,6 @@
 """A robot's log of a drive: its poses with every disturbance that logs of the field have.
 
-The error of each pose and its true time stay known, so that an oracle can say what a log could tell.
+The error of each pose and its true time stay known, so that an oracle can say what a log can decide.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def noisy(tour: Tour, chance: np.random.Generator) -> Sensed:
 
 
 def very_noisy(tour: Tour, chance: np.random.Generator) -> Sensed:
-    """40 mm of noise in each pose; their mean at a halt is still good."""
+    """40 mm of noise in each pose; their mean at a standstill is still good."""
     poses = sensed(tour)
     return replace(poses, xy=poses.xy + chance.normal(0, 0.04, poses.xy.shape))
 
@@ -91,7 +91,7 @@ def _gap(poses: Sensed, begin_s: float, end_s: float) -> Sensed:
 
 
 def gap_on_the_way(tour: Tour, chance: np.random.Generator) -> Sensed:
-    """Half of the way between two halts is missing."""
+    """Half of the way between two standstills is missing."""
     halts = tour.drive.halts
     k = int(chance.integers(len(halts) - 1))
     begin, end = halts[k].end_s, halts[k + 1].begin_s
@@ -99,13 +99,13 @@ def gap_on_the_way(tour: Tour, chance: np.random.Generator) -> Sensed:
 
 
 def gap_at_a_halt(tour: Tour, chance: np.random.Generator) -> Sensed:
-    """One halt is missing, and a little before and after."""
+    """One standstill is missing, and a little before and after."""
     halt = tour.drive.halts[int(chance.integers(len(tour.drive.halts)))]
     return _gap(sensed(tour), halt.begin_s - 2, halt.end_s + 2)
 
 
 def gap_within_a_halt(tour: Tour, chance: np.random.Generator) -> Sensed:
-    """The middle of one halt is missing; the robot did not move meanwhile."""
+    """The middle of one standstill is missing; the robot did not move meanwhile."""
     halt = tour.drive.halts[int(chance.integers(len(tour.drive.halts)))]
     return _gap(sensed(tour), halt.begin_s + 3, halt.end_s - 3)
 
@@ -118,7 +118,7 @@ def long_gap(tour: Tour, chance: np.random.Generator) -> Sensed:
 
 
 def late_begin(tour: Tour, chance: np.random.Generator) -> Sensed:
-    """The log begins after two or three halts."""
+    """The log begins after two or three standstills."""
     halts = tour.drive.halts
     return _gap(sensed(tour), -1, halts[min(int(chance.integers(1, 3)), len(halts) - 1)].end_s + 1)
 
@@ -129,7 +129,7 @@ def early_end(tour: Tour, chance: np.random.Generator) -> Sensed:
 
 
 def ends_in_last_halt(tour: Tour, chance: np.random.Generator) -> Sensed:
-    """The log ends 4 s after the robot reached its last halt."""
+    """The log ends 4 s after the robot reached its last standstill."""
     return _gap(sensed(tour), tour.drive.halts[-1].begin_s + 4, math.inf)
 
 
@@ -233,7 +233,7 @@ def wild_poses(tour: Tour, chance: np.random.Generator) -> Sensed:
 
 
 def map_shifted(tour: Tour, chance: np.random.Generator) -> Sensed:
-    """The whole map lies 0.15 m beside the drawing."""
+    """The whole map lies 0.15 m off the drawing."""
     turn = chance.uniform(0, math.tau)
     poses = sensed(tour)
     return poses.moved(np.full(poses.xy.shape, 1.0) * (0.15 * math.cos(turn), 0.15 * math.sin(turn)))

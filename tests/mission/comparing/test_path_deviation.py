@@ -10,12 +10,12 @@ from stopgo.mission.comparing.path_deviation import PathFollower, cross_track_of
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import Arrived, Finished, Homing, Scanned, Skipped, Started
 from stopgo.mission.run.run_log import RunLog
-from tests.mission.comparing.told import SCAN, at, told
+from tests.mission.comparing.reports import SCAN, at, told
 from tests.mission.worlds import mission_of, stop
 
 
 def hook() -> Mission:
-    """Out to S1, round a square to S2, whose end lies 1 m beside the way's beginning, and on to S3."""
+    """Out to S1, round a square to S2, whose end lies 1 m off the path's beginning, and on to S3."""
     return mission_of(
         stop("S1", (0.0, 0.0), (10.0, 0.0)),
         stop("S2", (10.0, 0.0), (10.0, 1.0), (0.0, 1.0)),
@@ -35,7 +35,7 @@ def greatest(log: RunLog, mission: Mission) -> float:
     return found
 
 
-def test_a_way_that_is_driven_exactly_has_nothing_beside_it() -> None:
+def test_a_path_that_is_driven_exactly_has_no_deviation() -> None:
     mission = hook()
     poses = line(0, (0, 0), (10, 0)) + line(100, (10, 0), (10, 1)) + line(130, (10, 1), (0, 1))
     log = told(
@@ -54,7 +54,7 @@ def test_left_is_positive_and_right_is_negative() -> None:
     assert follower.measure(np.array([(2.0, 0.2), (3.0, -0.3)]))[:, 0].tolist() == pytest.approx([0.2, -0.3])
 
 
-def test_a_robot_on_the_leg_of_a_skipped_stop_is_on_its_way() -> None:
+def test_a_robot_on_the_leg_of_a_skipped_stop_is_on_its_path() -> None:
     """From the skip on the robot works on S3, yet it still drives S2's leg: up to 10 m from that of S3."""
     mission = hook()
     log = told(
@@ -116,7 +116,7 @@ def test_events_that_come_late_change_nothing() -> None:
     assert np.array_equal(np.concatenate([metres, others]), np.concatenate(expected)[:, 0])
 
 
-def test_home_is_by_the_return_or_back_the_way_it_came() -> None:
+def test_home_is_by_the_return_or_back_along_its_path() -> None:
     mission = hook()
     follower = PathFollower(mission)
     follower.take(_scanned("S1"))
@@ -130,7 +130,7 @@ def test_home_is_by_the_return_or_back_the_way_it_came() -> None:
     assert follower.measure(np.array([(0.2, 3.0)]))[0, 0] == pytest.approx(0.2)
 
 
-def test_after_the_end_there_is_no_way() -> None:
+def test_after_the_end_there_is_no_path() -> None:
     mission = hook()
     follower = PathFollower(mission)
     follower.take(told(mission, (Finished, 9, {})).events[0])

@@ -1,4 +1,4 @@
-"""A run told by hand: events one after another, each at its second, and poses where they are wanted."""
+"""A run reported by hand: events one after another, each at its second, and poses where they are wanted."""
 
 from __future__ import annotations
 
