@@ -25,6 +25,7 @@ from stopgo.bridge.commands.bridge_options import (
     KeyFolder,
     MavlinkUrl,
     RobotOrAll,
+    RosDomain,
     Roster,
     SigningKey,
     SiteName,
@@ -161,6 +162,7 @@ def status(
     all_: AllRobots = False,
     roster: Roster = None,
     forget: Forget = None,
+    ros2: RosDomain = None,
     json_: Json = False,
 ) -> None:
     """Print the state of the robot, or of all robots of the site; 1 if one of those does not answer.
@@ -172,6 +174,8 @@ def status(
     Example: stopgo status --mavlink udpout:127.0.0.1:14550
     """
     given = given_options(context)
+    if ros2 is not None:
+        return print_ros_status(given, ros2, connect, as_json=json_)
     named: dict[str, Any] = {"robot": robot, "mavlink": mavlink, "connect": connect, "site": site}
     named = with_robots(given, named | {"keys": keys}, all_=all_)
     if named["robot"] is None and named["mavlink"] is None:
@@ -192,6 +196,24 @@ def with_robots(given: GivenOptions, named: dict[str, Any], *, all_: bool) -> di
         return named
     refuse_options(given, "--all", "--robot", "--mavlink")
     return named | {"robot": None, "mavlink": None}
+
+
+def print_ros_status(given: GivenOptions, ros2: str, endpoint: str, *, as_json: bool) -> None:
+    """Print the state of a robot that speaks ROS 2 over zenoh; exit code 1 if nothing of it is known."""
+    from stopgo.bridge.commands.ros_checks import ros_status, ros_status_text
+
+    refuse_options(
+        given, "--ros2", "--robot", "--mavlink", "--site", "--keys", "--all", "--roster", "--forget"
+    )
+    found = ros_status(ros2, endpoint)
+    for refused in found["refused"]:
+        say(refused)
+    if as_json:
+        print_json(found)
+    else:
+        print_line(ros_status_text(found))
+    if found["pose"] is None and found["state"] is None:
+        raise typer.Exit(1)
 
 
 def print_status(connection: Connection, *, as_json: bool) -> None:

@@ -177,7 +177,9 @@ def _verdict(path: Path, mission: Mission, found: _Checked) -> dict[str, Any]:
 OriginOption = Annotated[
     str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Position of the drawing's origin on Earth.")
 ]
-FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, nav2-route, mcap, vda5050 or vda5050-2.1, whatever the suffix."
+FORMAT_NAMES = (
+    "plan, waypoints, dxf, csv, geojson, nav2, nav2-route, mcap, vda5050 or vda5050-2.1, whatever the suffix."
+)
 AutopilotOption = Annotated[
     str | None,
     typer.Option(
