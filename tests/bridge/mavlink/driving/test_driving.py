@@ -17,7 +17,7 @@ from stopgo.bridge.mavlink.vehicle_link.wire import read_signing_key
 from stopgo.mission.document import Scan, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import STILL_M_S
-from stopgo.mission.run.events import Arrived, Finished, Held, PoseReport, Scanned, Settled
+from stopgo.mission.run.events import Arrived, Finished, Held, Paused, PoseReport, Scanned, Settled
 from tests.bridge.mavlink.driving.world import (
     SITE,
     bearing_of_corridor,
@@ -201,16 +201,21 @@ def _retried(station: Any) -> bool:
         return False
 
 
-def test_a_hold_during_a_scan_keeps_the_next_leg_from_being_driven(tmp_path: Path) -> None:
+def test_a_hold_during_a_scan_is_told_at_once_and_the_next_leg_waits(tmp_path: Path) -> None:
     with rover(tmp_path, "ardupilot") as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
         station.push(site_mission())
         station.command("start")
         reports = station.reports()
         until(reports, lambda report: getattr(report, "stop_state", "") == "SCANNING")
         operator.hold()
-        held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody (not known who) switched the autopilot to HOLD" in held.reason
-        assert scanned(station) == ["s1"]
+        paused = until(reports, lambda report: isinstance(report, Paused))
+        assert paused.reason == "somebody (not known who) switched the autopilot to HOLD"
+        assert scanned(station) == []
+        until(reports, lambda report: isinstance(report, Scanned))
+        assert station.status().state == "PAUSED"
+        station.command("resume")
+        until(reports, lambda report: isinstance(report, Finished))
+        assert scanned(station) == ["s1", "s2"]
 
 
 def test_a_disarmed_vehicle_ends_the_leg(tmp_path: Path) -> None:
