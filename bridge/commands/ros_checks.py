@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from stopgo.bridge.commands.checks import Check
 from stopgo.bridge.link.link import endpoints_in
+from stopgo.bridge.ros2.ros_graph import actions_of, discords
 
 if TYPE_CHECKING:
     from stopgo.bridge.ros2.ros_zenoh import HeardTopic, RosListener
@@ -42,8 +43,6 @@ def ros_checks(text: str, endpoint: str) -> Iterator[Check]:
 
 def graph_checks(listener: RosListener) -> Iterator[Check]:
     """Check what a listener has heard."""
-    from stopgo.bridge.ros2.ros_graph import actions_of, discords
-
     entities = listener.entities
     nodes = sorted({one.node for one in entities})
     yield Check("ros2", bool(nodes), f"{len(nodes)} nodes: {', '.join(nodes) or 'none'}")

@@ -46,6 +46,7 @@ from stopgo.bridge.commands.connection import (
     with_connection,
     with_presets,
 )
+from stopgo.bridge.commands.ros_checks import ros_status, ros_status_text
 from stopgo.bridge.console import print_json, print_line, refusals_printed, reporting_done, say
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ def status(
 
     Example: stopgo status --connect tls/router.site:7447 --keys ~/keys/alice --roster robots.toml
 
-    Example: stopgo status --mavlink udpout:127.0.0.1:14550
+    Example: stopgo status --ros2 0/r1 --connect tcp/10.1.2.3:7447
     """
     given = given_options(context)
     if ros2 is not None:
@@ -182,11 +183,8 @@ def status(
         refuse_options(given, "all robots of a site", *VEHICLES)
         return fleet_status(named, roster, forget or [], timeout, insecure=insecure, as_json=json_)
     refuse_options(given, "one robot", "--roster", "--forget")
-    connection = connection_of(
-        given, vehicle=vehicle, signing_key=signing_key, state=state, timeout=timeout, insecure=insecure,
-        **named,
-    )  # fmt: skip
-    print_status(connection, as_json=json_)
+    named |= {"vehicle": vehicle, "signing_key": signing_key, "state": state}
+    print_status(connection_of(given, timeout=timeout, insecure=insecure, **named), as_json=json_)
 
 
 def with_robots(given: GivenOptions, named: dict[str, Any], *, all_: bool) -> dict[str, Any]:
@@ -200,8 +198,6 @@ def with_robots(given: GivenOptions, named: dict[str, Any], *, all_: bool) -> di
 
 def print_ros_status(given: GivenOptions, ros2: str, endpoint: str, *, as_json: bool) -> None:
     """Print the state of a robot that speaks ROS 2 over zenoh; exit code 1 if nothing of it is known."""
-    from stopgo.bridge.commands.ros_checks import ros_status, ros_status_text
-
     refuse_options(
         given, "--ros2", "--robot", "--mavlink", "--site", "--keys", "--all", "--roster", "--forget"
     )

@@ -31,7 +31,7 @@ ATTACHMENT = struct.Struct("<qq")
 
 @dataclass
 class HeardTopic:
-    """What was heard of one topic."""
+    """Messages of one topic, counted."""
 
     entity: RosEntity
     count: int = 0
