@@ -11,6 +11,8 @@ import pytest
 
 from tests.test_house import MODULES, tree_of
 
+pytestmark = pytest.mark.together("sources")
+
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md")])
 GUIDES = [ROOT / "README.md", ROOT / "SECURITY.md", *sorted(ROOT.glob("docs/**/*.md"))]
@@ -78,10 +80,11 @@ def paragraphs(page: Path) -> Iterator[str]:
 
 def messages(name: str) -> Iterator[str]:
     """Texts in a module's code that a user may read: constants of several words that are no docstrings."""
-    tree = tree_of(name)
-    comments = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in comments:
+    comments = set()
+    for node in ast.walk(tree_of(name)):
+        if isinstance(node, ast.Expr):
+            comments.add(id(node.value))  # before the walk comes to it
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in comments:
             yield from [node.value] * (" " in node.value.strip())
 
 

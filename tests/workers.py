@@ -61,7 +61,7 @@ class _Workers:
 
     def __init__(self, session: pytest.Session) -> None:
         self.session = session
-        numbered = groupby(enumerate(session.items), key=lambda numbered: numbered[1].path)
+        numbered = groupby(enumerate(session.items), key=lambda numbered: file_of(numbered[1]))
         self.files = [[number for number, _ in group] for _, group in numbered]
         here = [any(map(self._needs_threads, file)) for file in self.files]
         self.own = [
@@ -170,6 +170,12 @@ class _Workers:
         self._listen(self._start(number, left[1:]))
 
 
+def file_of(item: pytest.Item) -> object:
+    """The item's file, or the name of files that have parsed the same sources for their tests."""
+    together = item.get_closest_marker("together")
+    return together.args if together else item.path
+
+
 class _Teller:
     """In a worker: what pytest would tell the terminal goes to the process that has it."""
 
@@ -200,14 +206,9 @@ class _Teller:
 def _work(
     session: pytest.Session, there: Connection, items: Iterator[pytest.Item], folder: Path, number: int
 ) -> None:
-    """Run the tests, with a folder and captured output of this process alone.
-
-    On one processor its threads and processes wake one another at a tenth of the cost.
-    """
+    """Run the tests, with a folder and captured output of this process alone."""
     config = session.config
     os.environ[NUMBER] = str(number)
-    processors = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, {processors[number % len(processors)]})
     folder.mkdir(exist_ok=True)
     config._tmp_path_factory._basetemp = folder  # type: ignore[attr-defined]
     config.pluginmanager.unregister(name="terminalreporter")

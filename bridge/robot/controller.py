@@ -155,6 +155,14 @@ class Controller:
         if self._store.run.state in ("RUNNING", "HOMING"):
             self._store.apply(runs.held(self._store.run, reason), interrupts=True)
 
+    def pause_scanning(self, reason: str) -> bool:
+        """Pause a run whose base somebody else has put on hold; the scan goes on. True if it is paused."""
+        with self._store.lock:
+            run = self._store.run
+            if (run.state, run.stop_state) == ("RUNNING", "SCANNING"):
+                self._store.apply(runs.paused(run, reason))
+            return self._store.run.state == "PAUSED"
+
     def on_link_silence(self, silent_s: float) -> None:
         """Do what the mission's policy wants after `silent_s` seconds without data from any station."""
         with self._control.standing_on_error():

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.map_frame import OnMap, turned
-from stopgo.bridge.robot.runner import Runner
 from stopgo.bridge.robot.simulator import (
     ENDURANCE_S,
     NO_FAULTS,
@@ -31,7 +31,7 @@ class Body:
     base: Base
     scanner: Scanner
     take: Callable[[Mission], None]
-    attach: Callable[[Runner], None] = lambda runner: None
+    attach: Callable[[Controller], None] = lambda controller: None
 
 
 OpenBody = Callable[[Clock], AbstractContextManager[Body]]

@@ -129,7 +129,7 @@ class GoalDrive:
         if goal.status == "sent" and watch.since_begin_s(now_ns) > ANSWER_S:
             return f"Nav2 does not answer a goal within {ANSWER_S:g} s"
         if watch.without_server_s(now_ns) > GONE_S:
-            return "Nav2's action server is gone"
+            return "Nav2's action server is not available"
         if watch.without_progress_s(now_ns) > limits.stalled_s:
             return f"no progress for {limits.stalled_s:g} s"
         return ""

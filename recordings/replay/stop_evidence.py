@@ -16,6 +16,7 @@ import numpy as np
 
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
+from stopgo.mission.comparing.evidence import missing_events
 from stopgo.mission.document import Point
 from stopgo.mission.run.events import JUMPED_OVER, Aborted, AnyEvent, Finished, Settled
 from stopgo.mission.run.tolerance import is_outside
@@ -110,7 +111,7 @@ def _of_visit(replay: Replay, number: int, item: StopComparison, errors: Positio
     if item.disputed_m is not None:
         why = f"{item.disputed_text}; the scan's cloud would show it"
     elif within == "unknown":
-        why = DRIFTS if errors.drifts else NOISE
+        why = DRIFTS if errors.drifts or errors.most_m[number] > 0 else NOISE
     elif within == "yes":
         why = other_storey(replay, number) or _why_unlogged(replay, item.stop)
     elif replay.inferred:
@@ -160,6 +161,8 @@ def _why_not_the_end(replay: Replay, number: int, item: StopComparison) -> str:
     over = any(isinstance(event, Finished | Aborted) for event in replay.run.events)
     if not over and (followed or item.outcome in ("not reached", "arrived")):
         return RUN_GOES_ON
+    if item.is_open and (missing := missing_events(replay.run)):
+        return f"the log lacks {missing}; `stopgo watch --run` would fetch them from the robot"
     stop = replay.mission.stops[number]
     stood = any(
         long_enough(match.standstill, stop) and not is_outside(match.away_m, stop.tolerance_m)

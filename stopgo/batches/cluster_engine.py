@@ -94,13 +94,13 @@ class ClusterEngine:
         """
         if self._client.status == "running" and self._limits:
             return False
-        notice(f"--scheduler {self._address}: is gone; waiting for it up to {PATIENCE_S:.0f} s")
+        notice(f"--scheduler {self._address}: is offline; waiting for it up to {PATIENCE_S:.0f} s")
         deadline = time.monotonic() + PATIENCE_S
         self._given.clear()
         while not self._reconnected():
             if time.monotonic() > deadline:
                 raise OutcomeUnknown(
-                    f"--scheduler {self._address}: is gone; call the batch again to continue it"
+                    f"--scheduler {self._address}: is offline; call the batch again to continue it"
                 )
             time.sleep(1.0)
         notice(f"--scheduler {self._address}: is back with {len(self._limits)} workers")

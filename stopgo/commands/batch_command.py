@@ -50,9 +50,7 @@ SizeOption = Annotated[
 
 SinceOption = Annotated[
     str | None,
-    typer.Option(
-        metavar="DAY|last", help="Only elements finished after DAY; last: a floor's last run."
-    ),
+    typer.Option(metavar="DAY|last", help="Only elements finished after DAY; last: a floor's last run."),
 ]
 RunsOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Recordings of earlier runs.")]
 DayOption = Annotated[

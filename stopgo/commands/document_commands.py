@@ -177,7 +177,9 @@ def _verdict(path: Path, mission: Mission, found: _Checked) -> dict[str, Any]:
 OriginOption = Annotated[
     str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Position of the drawing's origin on Earth.")
 ]
-FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, mcap, vda5050 or vda5050-2.1, whatever the suffix."
+FORMAT_NAMES = (
+    "plan, waypoints, dxf, csv, geojson, nav2, nav2-route, mcap, vda5050 or vda5050-2.1, whatever the suffix."
+)
 AutopilotOption = Annotated[
     str | None,
     typer.Option(
@@ -212,7 +214,8 @@ def export(
     """Write a mission in a format of other programs.
 
     .plan (QGroundControl), .waypoints (QGC WPL 110), .dxf, .csv, .geojson, .nav2.yaml, .mcap (nav_msgs/Path),
-    .vda5050.json (3.0), .vda5050-2.1.json; docs/how-to/exports.md lists the programs that open each.
+    .route.geojson (Nav2's Route Server), .vda5050.json (3.0), .vda5050-2.1.json; docs/how-to/exports.md lists
+    the programs that open each.
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage-file plan/coverage.json -o site.dxf
     """

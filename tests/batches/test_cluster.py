@@ -192,6 +192,6 @@ def test_a_scheduler_that_stays_away_ends_the_batch_as_unknown(
     monkeypatch.setattr(cluster_engine, "time", clock)
     monkeypatch.setattr(cluster_engine, "_must_answer", nobody)
     engine._client.status = "closed"
-    with pytest.raises(OutcomeUnknown, match="is gone; call the batch again"):
+    with pytest.raises(OutcomeUnknown, match="is offline; call the batch again"):
         list(Running(engine, [task(tmp_path)]).outcomes())
     assert now[0] >= cluster_engine.PATIENCE_S

@@ -47,6 +47,8 @@ ELSEWHERE = {
     r"stopgo conform station": "tests a third-party station: tests/bridge/conform/test_conform_station.py",
     r"stopgo site .*--listen": "needs an address of a local network: tests/site/test_web_server.py",
     r"python docs/query_runs.py": "tests/recordings/test_query.py runs it",
+    r"(sudo apt|python3 -m venv|source) ": "prepares a computer with ROS 2",
+    r"~/stopgo/bin/stopgo robot": "needs ROS 2: tests/ros2, in make ros2",
     r"cat ": "prints a file of the guide",
 }
 """Commands that do not run here, and the reason."""
@@ -198,7 +200,8 @@ PREPARED: dict[str, Callable[[GuideFolder], None]] = {
     "floors": with_models, "conform": with_robot, "deployment": with_keys, "gateway": with_gateway,
     "replay": with_log, "push-to-autopilot": lambda guide: with_vehicle(guide, has_origin=False),
     "run-on-autopilot": with_vehicle, "tunnel": with_radio, "plugins": with_plugins, "campus": with_campus,
-    "review": with_runs, "exports": with_parameters, "README": with_robot, "site": with_vehicles,
+    "review": with_runs, "exports": with_parameters, "nav2": with_robot, "README": with_robot,
+    "site": with_vehicles,
 }  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from stopgo.bridge.mavlink.driving.mavlink_base import MavlinkBase
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger, check_trigger
 from stopgo.bridge.mavlink.driving.onboard_autopilot import on_board
 from stopgo.bridge.mavlink.vehicle_link.wire import read_link
+from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.robot_hardware import Body
 from stopgo.mission.document import Mission
 
@@ -55,5 +56,8 @@ class AutopilotBody:
                 base.take(mission)
                 scanner.take(mission)
 
+            def attach(controller: Controller) -> None:
+                scanner.pause = lambda why: controller.pause_scanning(why) and base.take_hold(why)
+
             with autopilot.guarded() if self.guards else nullcontext():
-                yield Body(base, scanner, take)
+                yield Body(base, scanner, take, attach)

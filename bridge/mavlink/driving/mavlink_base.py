@@ -86,6 +86,12 @@ class MavlinkBase:
             or self._engagement.disarmed()
         )
 
+    def take_hold(self, why: str) -> bool:
+        """Take the hold as known, for the run is paused for it; a failsafe then must end before a drive."""
+        self._blocked_by = why
+        self._autopilot.control.accept_mode()
+        return True
+
     def blocked_by(self) -> str:
         return self._blocked_by
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from threading import Event
 from typing import Literal
 
@@ -99,6 +100,8 @@ class MavlinkScanner:
         self._autopilot = autopilot
         self._clock = clock
         self._trigger = trigger
+        self.pause: Callable[[str], bool] = lambda why: False
+        """Pauses the run for a hold that somebody else commands during a scan; true if it is paused then."""
         self._numbers: dict[str, int] = {}
         self._tolerances_m: dict[str, float] = {}
         self._camera: Who | None = None
@@ -232,7 +235,9 @@ class MavlinkScanner:
         From the first of the two times on, when it should have ended, it is requested again.
         """
         asked_s, until_s = times_s[0] - AGAIN_S, times_s[1]
+        reported = False
         while not (interrupt.is_set() or watch.why()) and (left := until_s - self._now_s()) > 0:
+            reported = reported or self._report_hold()
             message = waiting.get(min(LOOK_S, left))
             if message is not None and self._is_new(message, next_index):
                 return message
@@ -240,6 +245,11 @@ class MavlinkScanner:
                 asked_s = self._now_s()
                 self._request_picture(next_index)
         return None
+
+    def _report_hold(self) -> bool:
+        """Report a hold that somebody else has commanded; the scan goes on, for the vehicle stands."""
+        control = self._autopilot.control
+        return control.is_put_on_hold and (self.pause(control.mode_change()) or True)
 
     def _is_new(self, message: Message, next_index: int | None) -> bool:
         """True at the first report of a picture of this vehicle; the picture counts as reported then."""

@@ -98,6 +98,11 @@ class ModeControl:
         ours = self._stop_pending.is_set() and mode == self._modes.hold
         return not ours and self.known_mode not in (None, mode)
 
+    @property
+    def is_put_on_hold(self) -> bool:
+        """True if somebody else has put the vehicle on hold since the known mode."""
+        return self.is_changed and self.mode() == self._modes.hold
+
     def mode_change(self) -> str:
         """Report a change of mode that somebody else made since the known mode; empty if there was none."""
         return self._switched() if self.is_changed else ""

@@ -12,6 +12,7 @@ from stopgo.mission.document import Mission, Point
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files.exports import (
     geojson,
+    nav2_route,
     nav2_yaml,
     path_mcap,
     qgc_plan,
@@ -44,6 +45,10 @@ FORMATS: dict[str, Format] = {
     "csv": Format(
         ".csv", "table of stops", stops_csv.write, stops_csv.read_back, 1e-6,
         uses=("origin",), notes=stops_csv.notes,
+    ),
+    "nav2-route": Format(  # before .geojson, the end of its suffix
+        ".route.geojson", "graph of Nav2's Route Server", nav2_route.write, nav2_route.read_back, 1e-5,
+        uses=("map",), notes=nav2_route.notes,
     ),
     "geojson": Format(
         ".geojson", "GeoJSON (RFC 7946)", geojson.write, geojson.read_back, 1e-3,

@@ -17,7 +17,7 @@ from stopgo.bridge.mavlink.vehicle_link.wire import read_signing_key
 from stopgo.mission.document import Scan, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import STILL_M_S
-from stopgo.mission.run.events import Arrived, Finished, Held, PoseReport, Scanned, Settled
+from stopgo.mission.run.events import Arrived, Finished, Held, Paused, PoseReport, Scanned, Settled
 from tests.bridge.mavlink.driving.world import (
     SITE,
     bearing_of_corridor,
@@ -31,6 +31,7 @@ from tests.bridge.mavlink.driving.world import (
     until,
 )
 from tests.bridge.mavlink.lossy import Lossy, Roughness
+from tests.faults.sizes import some
 from tests.ports import free_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -135,7 +136,7 @@ def test_nothing_starts_without_origin_arming_or_a_free_hand(tmp_path: Path) -> 
         assert station.status().state == "READY"
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_pause_stops_the_vehicle_and_resume_drives_on(tmp_path: Path, profile: str) -> None:
     with rover(tmp_path, profile) as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
         station.push(site_mission())
@@ -150,7 +151,7 @@ def test_a_pause_stops_the_vehicle_and_resume_drives_on(tmp_path: Path, profile:
         assert scanned(station) == ALL
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_an_operators_hold_is_never_changed_back_before_a_retry(tmp_path: Path, profile: str) -> None:
     with rover(tmp_path, profile) as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
         station.push(site_mission())
@@ -201,16 +202,21 @@ def _retried(station: Any) -> bool:
         return False
 
 
-def test_a_hold_during_a_scan_keeps_the_next_leg_from_being_driven(tmp_path: Path) -> None:
+def test_a_hold_during_a_scan_is_told_at_once_and_the_next_leg_waits(tmp_path: Path) -> None:
     with rover(tmp_path, "ardupilot") as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
         station.push(site_mission())
         station.command("start")
         reports = station.reports()
         until(reports, lambda report: getattr(report, "stop_state", "") == "SCANNING")
         operator.hold()
-        held = until(reports, lambda report: isinstance(report, Held))
-        assert "somebody (not known who) switched the autopilot to HOLD" in held.reason
-        assert scanned(station) == ["s1"]
+        paused = until(reports, lambda report: isinstance(report, Paused))
+        assert paused.reason == "somebody (not known who) switched the autopilot to HOLD"
+        assert scanned(station) == []
+        until(reports, lambda report: isinstance(report, Scanned))
+        assert station.status().state == "PAUSED"
+        station.command("resume")
+        until(reports, lambda report: isinstance(report, Finished))
+        assert scanned(station) == ["s1", "s2"]
 
 
 def test_a_disarmed_vehicle_ends_the_leg(tmp_path: Path) -> None:

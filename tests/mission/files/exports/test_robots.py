@@ -71,6 +71,29 @@ def test_nav2_is_given_every_leg_and_the_return(mission: Mission) -> None:
         assert np.allclose(np.array(document["return"]), there.return_, rtol=0, atol=1e-6)
 
 
+def test_the_route_server_reads_a_graph_on_which_every_leg_can_be_driven(mission: Mission) -> None:
+    """What its loader takes: unique numbers, edges between known nodes, metadata of plain values."""
+    there = mapped(mission)
+    features = json.loads(exported(mission, "nav2-route", Supplements()))["features"]
+    nodes = {item["properties"]["id"]: item for item in features if item["geometry"]["type"] == "Point"}
+    edges = [item for item in features if item["geometry"]["type"] == "MultiLineString"]
+    numbers = [item["properties"]["id"] for item in features]
+    assert len(set(numbers)) == len(features)
+    place = {number: tuple(node["geometry"]["coordinates"]) for number, node in nodes.items()}
+    driven = set()
+    for edge in edges:
+        ends = (edge["properties"]["startid"], edge["properties"]["endid"])
+        assert [place[end] for end in ends] == [tuple(end) for end in edge["geometry"]["coordinates"][0]]
+        driven.add((place[ends[0]], place[ends[1]]))
+    for stop_ in there.stops:
+        leg = [(round(x, 6), round(y, 6)) for x, y in stop_.approach]
+        assert {pair for pair in pairwise(leg) if pair[0] != pair[1]} <= driven
+    scans = [scan for node in nodes.values() for scan in node["properties"].get("operations", {}).values()]
+    scans.sort(key=lambda scan: scan["metadata"]["number"])
+    assert [scan["metadata"]["stop"] for scan in scans] == [stop_.id for stop_ in there.stops]
+    assert {scan["trigger"] for scan in scans} == {"NODE"}
+
+
 def test_nav2_says_in_which_frame_it_is() -> None:
     assert b"# Frame: the robot's map;" in exported(on_a_map(), "nav2", Supplements())
     assert b"# Frame: the site 'room', not transformed to a map" in exported(
