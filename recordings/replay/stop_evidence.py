@@ -111,7 +111,7 @@ def _of_visit(replay: Replay, number: int, item: StopComparison, errors: Positio
     if item.disputed_m is not None:
         why = f"{item.disputed_text}; the scan's cloud would show it"
     elif within == "unknown":
-        why = DRIFTS if errors.drifts else NOISE
+        why = DRIFTS if errors.drifts or errors.most_m[number] > 0 else NOISE
     elif within == "yes":
         why = other_storey(replay, number) or _why_unlogged(replay, item.stop)
     elif replay.inferred:
