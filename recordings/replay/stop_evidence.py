@@ -71,8 +71,13 @@ def _with_jump(evidence: StopEvidence, jump_m: float) -> StopEvidence:
 
 
 def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: bool) -> StopEvidence:
-    """Return a yes as undecided if the common error of placing may exceed the tolerance."""
+    """Return a yes as undecided if the common error of placing may exceed the tolerance.
+
+    Without headings nothing limits that error, and a no is undecided too.
+    """
     item = evidence.item
+    if math.isinf(unsure_m) and not headings:
+        return StopEvidence(item, "unknown", NO_HEADINGS)
     if evidence.answer != "yes" or not is_outside(
         (item.deviation_m or 0.0) + unsure_m, item.tolerance_m or 0.0
     ):
