@@ -143,16 +143,19 @@ def copies(floor: FloorPlan, count: int) -> FloorPlan:
             for opening in floor.openings
         ),
         elements=tuple(
-            replace(
-                element,
-                id=f"{k}-{element.id}",
-                solids=_moved(element.solids, shift),
-                lines=tuple(frozen(line + shift) for line in element.lines),
-            )
-            for k, shift in enumerate(shifts)
-            for element in floor.elements
+            _copy(element, k, shift) for k, shift in enumerate(shifts) for element in floor.elements
         ),
         findings=(),
+    )
+
+
+def _copy(element: Element, k: int, shift: FloatArray) -> Element:
+    """Copy `k` of an element."""
+    return replace(
+        element,
+        id=f"{k}-{element.id}",
+        solids=_moved(element.solids, shift),
+        lines=tuple(frozen(line + shift) for line in element.lines),
     )
 
 

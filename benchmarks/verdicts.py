@@ -12,7 +12,7 @@ from benchmarks.table import put, table, versions
 from tests.recordings.truth.auto_logs import auto_answers
 from tests.recordings.truth.bench import answered, cases
 from tests.recordings.truth.cloud_cases import cloud_answers, small_floor
-from tests.recordings.truth.own_runs import own_answers
+from tests.recordings.truth.own_runs import own_answers, recorded_answers
 
 KINDS = ("right", "false yes", "false no", "untold", "open")
 OWN_SEEDS = range(1, 4)
@@ -68,6 +68,12 @@ def _own() -> Iterator[tuple[str, str, str]]:
     for seed in OWN_SEEDS:
         for answer in own_answers(seed):
             yield "a station's reports", answer.name.split(" / ")[1].split(" #")[0], answer.kind
+    with TemporaryDirectory() as folder:
+        for answer in recorded_answers(Path(folder)):
+            if answer.kind not in ("right", "open"):
+                print(f"{answer.kind}: {answer.name}: {answer.text[:200]}", file=sys.stderr, flush=True)
+            source = "rrd, " + answer.name.split(" / ")[-1].split(" #")[0]
+            yield source, answer.name.split(" / ")[1], answer.kind
 
 
 def _table(head: str, pairs: Iterable[tuple[str, str]]) -> str:

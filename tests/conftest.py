@@ -97,8 +97,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def own_time(request: pytest.FixtureRequest) -> Iterator[None]:
-    """The test's threads wait in a time of their own; in the long form of the tests, in real time."""
-    if FULL or request.node.get_closest_marker("real_time"):
+    """The test's threads wait in a time of their own; in the long form of the fault tests, in real time."""
+    long = FULL and TESTS / "faults" in request.path.parents
+    if long or request.node.get_closest_marker("real_time"):
         yield
         return
     from tests.own_time import stepped_into

@@ -78,10 +78,11 @@ def paragraphs(page: Path) -> Iterator[str]:
 
 def messages(name: str) -> Iterator[str]:
     """Texts in a module's code that a user may read: constants of several words that are no docstrings."""
-    tree = tree_of(name)
-    comments = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in comments:
+    comments = set()
+    for node in ast.walk(tree_of(name)):
+        if isinstance(node, ast.Expr):
+            comments.add(id(node.value))  # before the walk comes to it
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in comments:
             yield from [node.value] * (" " in node.value.strip())
 
 

@@ -38,6 +38,17 @@ def parsed(words: list[str]) -> None:
         command = command.commands[words[0]]
 
 
+INLINE = re.compile(r"`(stopgo [^`\n]+)`")
+ENDS_AT_ONCE = ("--help", "--install-completion", "--print-config", "--version")
+"""Options that act while a command line is parsed."""
+
+
+def named_in(page: Path) -> Iterator[str]:
+    """Commands in the text of a page, often without their arguments."""
+    text = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    yield from (line for line in INLINE.findall(text) if not any(end in line for end in ENDS_AT_ONCE))
+
+
 EVERY = [(str(page.relative_to(ROOT)), line) for page in PAGES for line in commands_of(page)]
 
 
@@ -50,3 +61,16 @@ def test_a_documented_command_is_one(page: str, line: str) -> None:
         pytest.fail(f"{page}: {line}: {error.format_message()}")
     except KeyError as error:
         pytest.fail(f"{page}: {line}: no such command {error}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_and_options_that_a_page_names_are_known(page: Path) -> None:
+    for line in named_in(page):
+        words = shlex.split(re.split(r" [|&<>]", line)[0])
+        try:
+            parsed([word for word in words if word not in ("…", "...")])
+        except TyperException as error:
+            said = error.format_message()
+            assert said.startswith("Missing ") or said.endswith("requires an argument."), f"{line}: {said}"
+        except KeyError as error:
+            pytest.fail(f"{line}: no such command {error}")

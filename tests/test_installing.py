@@ -120,7 +120,9 @@ def test_an_older_installation_next_to_it_changes_nothing(installed: Path, tmp_p
 def test_of_two_versions_the_first_on_the_path_is_whole(installed: Path, tmp_path: Path) -> None:
     other = shutil.copytree(installed, tmp_path / "other")
     (other / "stopgo" / "planner" / "__init__.py").write_text("raise ImportError('the other version')\n")
-    code = f"import sys; sys.path.append({str(other)!r})\n{OURS}\nprint(stopgo.planner.__file__)"
+    code = (
+        f"import sys; sys.path.append({str(other)!r})\nimport stopgo.planner\nprint(stopgo.planner.__file__)"
+    )
     done = run(code, installed)
     assert (done.returncode, done.stdout.strip()) == (
         0,

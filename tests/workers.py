@@ -200,14 +200,9 @@ class _Teller:
 def _work(
     session: pytest.Session, there: Connection, items: Iterator[pytest.Item], folder: Path, number: int
 ) -> None:
-    """Run the tests, with a folder and captured output of this process alone.
-
-    On one processor its threads and processes wake one another at a tenth of the cost.
-    """
+    """Run the tests, with a folder and captured output of this process alone."""
     config = session.config
     os.environ[NUMBER] = str(number)
-    processors = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, {processors[number % len(processors)]})
     folder.mkdir(exist_ok=True)
     config._tmp_path_factory._basetemp = folder  # type: ignore[attr-defined]
     config.pluginmanager.unregister(name="terminalreporter")

@@ -108,6 +108,15 @@ MavlinkUrl = Annotated[
         help="A vehicle instead, such as udpout:127.0.0.1:14550.",
     ),
 ]
+RosDomain = Annotated[
+    str | None,
+    typer.Option(
+        "--ros2",
+        metavar="DOMAIN[/NS]",
+        rich_help_panel=CONNECTION,
+        help="Topics of a ROS 2 robot (rmw_zenoh) instead, at --connect.",
+    ),
+]
 RequiredMavlinkUrl = Annotated[
     str,
     typer.Option(

@@ -24,6 +24,7 @@ from stopgo.bridge.commands.bridge_options import (
     Json,
     KeyFolder,
     MavlinkUrl,
+    RosDomain,
     SigningKey,
     SiteName,
     Timeout,
@@ -39,6 +40,7 @@ from stopgo.bridge.commands.connection import (
     refuse_options,
     with_presets,
 )
+from stopgo.bridge.commands.ros_checks import ros_checks
 from stopgo.bridge.commands.run_control_commands import state_line
 from stopgo.bridge.console import print_json, print_line
 from stopgo.bridge.link.capabilities import told_of_capabilities
@@ -75,13 +77,13 @@ def doctor(
     any_origin: AnyOrigin = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
+    ros2: RosDomain = None,
     json_: Json = False,
 ) -> int:
     """Print the presets and their sources, and check keys, robot, clock, disk and libraries.
 
-    Of a vehicle (--mavlink): check its state, position and parameters, with the value to set for each. The
-    vehicle is only queried, nothing of it is changed.
-
+    Of a vehicle (--mavlink): its state, position and parameters, with the value to set for each. Of a robot
+    with ROS 2 (--ros2): topics, frames, actions, clock, and what does not fit. Both are only queried.
     Exit code 1: something is wrong, and its line names the remedy. A missing extra is not an error.
 
     Example: stopgo doctor --robot r1 --connect tcp/127.0.0.1:7447
@@ -93,14 +95,20 @@ def doctor(
         named = with_presets(given, named)
     if named["keys"] is not None:
         checks += _checked("keys", lambda: _keys(Path(str(named["keys"]))))
-    if mavlink is not None:
-        checks += _vehicle_checks(
-            given, mavlink, vehicle, signing_key, timeout, insecure=insecure, any_origin=any_origin
-        )
+    if ros2 is not None:
+        checks += _checked("ros2", lambda: _ros(given, ros2, connect))
+    elif mavlink is not None:
+        options = {"insecure": insecure, "any_origin": any_origin}
+        checks += _vehicle_checks(given, mavlink, vehicle, signing_key, timeout, **options)
     else:
         checks += _robot_checks(given, named, timeout, insecure=insecure)
     print_checks(checks, as_json=json_)
     return 0 if all(check.ok for check in checks) else 1
+
+
+def _ros(given: GivenOptions, ros2: str, endpoint: str) -> Iterator[Check]:
+    refuse_options(given, "--ros2", "--robot", "--site", "--keys", "--mavlink")
+    yield from ros_checks(ros2, endpoint)
 
 
 def _machine_checks() -> Iterator[Check]:

@@ -25,6 +25,7 @@ from stopgo.bridge.commands.bridge_options import (
     KeyFolder,
     MavlinkUrl,
     RobotOrAll,
+    RosDomain,
     Roster,
     SigningKey,
     SiteName,
@@ -45,6 +46,7 @@ from stopgo.bridge.commands.connection import (
     with_connection,
     with_presets,
 )
+from stopgo.bridge.commands.ros_checks import ros_status, ros_status_text
 from stopgo.bridge.console import print_json, print_line, refusals_printed, reporting_done, say
 
 if TYPE_CHECKING:
@@ -161,6 +163,7 @@ def status(
     all_: AllRobots = False,
     roster: Roster = None,
     forget: Forget = None,
+    ros2: RosDomain = None,
     json_: Json = False,
 ) -> None:
     """Print the state of the robot, or of all robots of the site; 1 if one of those does not answer.
@@ -169,20 +172,19 @@ def status(
 
     Example: stopgo status --connect tls/router.site:7447 --keys ~/keys/alice --roster robots.toml
 
-    Example: stopgo status --mavlink udpout:127.0.0.1:14550
+    Example: stopgo status --ros2 0/r1 --connect tcp/10.1.2.3:7447
     """
     given = given_options(context)
+    if ros2 is not None:
+        return print_ros_status(given, ros2, connect, as_json=json_)
     named: dict[str, Any] = {"robot": robot, "mavlink": mavlink, "connect": connect, "site": site}
     named = with_robots(given, named | {"keys": keys}, all_=all_)
     if named["robot"] is None and named["mavlink"] is None:
         refuse_options(given, "all robots of a site", *VEHICLES)
         return fleet_status(named, roster, forget or [], timeout, insecure=insecure, as_json=json_)
     refuse_options(given, "one robot", "--roster", "--forget")
-    connection = connection_of(
-        given, vehicle=vehicle, signing_key=signing_key, state=state, timeout=timeout, insecure=insecure,
-        **named,
-    )  # fmt: skip
-    print_status(connection, as_json=json_)
+    named |= {"vehicle": vehicle, "signing_key": signing_key, "state": state}
+    print_status(connection_of(given, timeout=timeout, insecure=insecure, **named), as_json=json_)
 
 
 def with_robots(given: GivenOptions, named: dict[str, Any], *, all_: bool) -> dict[str, Any]:
@@ -192,6 +194,22 @@ def with_robots(given: GivenOptions, named: dict[str, Any], *, all_: bool) -> di
         return named
     refuse_options(given, "--all", "--robot", "--mavlink")
     return named | {"robot": None, "mavlink": None}
+
+
+def print_ros_status(given: GivenOptions, ros2: str, endpoint: str, *, as_json: bool) -> None:
+    """Print the state of a robot that speaks ROS 2 over zenoh; exit code 1 if nothing of it is known."""
+    refuse_options(
+        given, "--ros2", "--robot", "--mavlink", "--site", "--keys", "--all", "--roster", "--forget"
+    )
+    found = ros_status(ros2, endpoint)
+    for refused in found["refused"]:
+        say(refused)
+    if as_json:
+        print_json(found)
+    else:
+        print_line(ros_status_text(found))
+    if found["pose"] is None and found["state"] is None:
+        raise typer.Exit(1)
 
 
 def print_status(connection: Connection, *, as_json: bool) -> None:

@@ -39,8 +39,11 @@ class MendedTimes:
     """Times of the steps, as mended: how long each took is unknown."""
 
 
-def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
-    """Return the times of poses (n, 2) without the steps of their clock."""
+def mended_times(ns: IntArray, xy: FloatArray, *, forward: bool = True) -> MendedTimes:
+    """Return the times of poses (n, 2) without the steps of their clock.
+
+    `forward`: steps forward are mended too. They are not where other messages have times of the same clock.
+    """
     if len(ns) < LEAST_POSES:
         return MendedTimes(ns, np.ones(len(ns), bool), ())
     usual = max(1, int(np.median(np.abs(np.diff(ns)))))
@@ -52,8 +55,8 @@ def mended_times(ns: IntArray, xy: FloatArray) -> MendedTimes:
     back = np.flatnonzero(step < -STEP_NS)
     if len(back) > MOST_STEPS:
         return MendedTimes(ns, kept, tuple(lines[: bool(wrong)]))
-    forward = _forward_steps(step, places, usual).tolist()
-    steps = sorted({*back.tolist(), *forward, *_undone(step, back, usual)})
+    ahead = _forward_steps(step, places, usual).tolist() if forward else []
+    steps = sorted({*back.tolist(), *ahead, *_undone(step, back, usual)})
     lines += [
         f"the clock steps {'back' if step[k] < 0 else 'forward'} by {abs(step[k]) / 1e9:.1f} s "
         f"after pose {k + 1} of {len(times)}; times continue in the order of writing"

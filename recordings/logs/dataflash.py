@@ -292,7 +292,9 @@ def _filtered(tables: _Tables, name: str) -> Poses | None:
             xy[part] += from_geodetic(origin, Geodetic(lat=later.lat, lon=later.lon), RULE)
     rank = LOCAL if origin is not None else WITHOUT_ORIGIN
     height = -tables.numbers(name, "PD")[mine] if tables.has(name, "PD") else None
-    return poses_of(name, "local", ns, xy, heading, rank=rank, origin=origin, rule=RULE, height=height)
+    return poses_of(
+        name, "local", ns, xy, heading, rank=rank, origin=origin, rule=RULE, height=height, own_clock=True
+    )
 
 
 def _origins(tables: _Tables) -> list[tuple[int, SiteOrigin]]:
@@ -327,7 +329,7 @@ def _placed(tables: _Tables, name: str, *, truth: bool) -> Poses | None:
     degrees = np.stack([tables.numbers(name, "Lat"), tables.numbers(name, "Lng")], axis=-1) / 1e7
     own = tables.has(name, "Yaw")
     bearing = tables.numbers(name, "Yaw") if own else _bearing_at(tables, ns)
-    return fixes_of(name, RULE, ns, degrees, bearing, rank=GLOBAL, truth=truth)
+    return fixes_of(name, RULE, ns, degrees, bearing, rank=GLOBAL, truth=truth, own_clock=True)
 
 
 def _bearing_at(tables: _Tables, ns: IntArray) -> FloatArray:

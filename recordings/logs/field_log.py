@@ -180,15 +180,17 @@ def poses_of(
     heading: ArrayLike,
     *,
     height: ArrayLike | None = None,
+    own_clock: bool = False,
     **more: Any,
 ) -> Poses | None:
     """Return the finite poses in order of time; None if there is none.
 
+    `own_clock`: the times are of the clock that all messages in the log have: a step forward is a gap.
     `more` are further fields of `Poses`.
     """
     times, positions = np.asarray(ns, np.int64), np.asarray(xy, float).reshape(-1, 2)
     finite = np.isfinite(positions).all(axis=1) & (np.abs(positions) < FARTHEST).all(axis=1)
-    mended = mended_times(times[finite], positions[finite])
+    mended = mended_times(times[finite], positions[finite], forward=not own_clock)
     times = times.copy()
     times[finite] = mended.ns
     oddities = (*mended.lines, *oddities_of(times, positions, finite))

@@ -25,6 +25,10 @@ def read_run_recording(path: Path, reading: Reading) -> FieldLog:
     run = recording.logs[-1]
     track = run.poses
     about: dict[str, Any] = {"robot": run.robot, "restarts_ns": track.restarts_ns}
-    poses = poses_of("robot", SITE, track.ns, track.xy, track.heading, **about) if len(track) else None
+    poses = (
+        poses_of("robot", SITE, track.ns, track.xy, track.heading, own_clock=True, **about)
+        if len(track)
+        else None
+    )
     stationary = poses_of_events(run.events)
     return own_log(path, "stopgo recording", run.events, recording.missions, poses, stationary)

@@ -472,15 +472,18 @@ def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
             rank=rank,
             origin=vehicle.origin,
             rule=rule,
+            own_clock=True,
         )
     if vehicle.odometry:
         ns, table = _columns(vehicle.odometry)
+        xy, heading, height = table[:, :2], table[:, 2], table[:, 3]
         yield poses_of(
-            "ODOMETRY", "odometry", ns, table[:, :2], table[:, 2], height=table[:, 3], robot=robot, rank=3
+            "ODOMETRY", "odometry", ns, xy, heading, height=height, robot=robot, rank=3, own_clock=True
         )
     if vehicle.earth:
         ns, table = _columns(vehicle.earth)
-        yield fixes_of("GLOBAL_POSITION_INT", rule, ns, table[:, :2], table[:, 2], robot=robot, rank=2)
+        degrees, bearing = table[:, :2], table[:, 2]
+        yield fixes_of("GLOBAL_POSITION_INT", rule, ns, degrees, bearing, robot=robot, rank=2, own_clock=True)
 
 
 def _columns(rows: list[Any]) -> tuple[IntArray, FloatArray]:

@@ -140,7 +140,15 @@ def _poses(log: Any, offset_us: int) -> Iterator[Poses | None]:
     if placed is not None:
         degrees = np.stack([placed["lat"], placed["lon"]], axis=-1)
         ns = _ns(placed, offset_us)
-        yield fixes_of("vehicle_global_position", "px4", ns, degrees, np.degrees(_yaw(log, placed)), rank=2)
+        yield fixes_of(
+            "vehicle_global_position",
+            "px4",
+            ns,
+            degrees,
+            np.degrees(_yaw(log, placed)),
+            rank=2,
+            own_clock=True,
+        )
 
 
 def _local(log: Any, name: str, local: dict[str, Any], offset_us: int, *, truth: bool) -> Poses | None:
@@ -152,7 +160,17 @@ def _local(log: Any, name: str, local: dict[str, Any], offset_us: int, *, truth:
     ns = _ns(local, offset_us)
     height = -np.asarray(local["z"], float) if "z" in local else None
     return poses_of(
-        name, "local", ns, xy, heading, rank=1, origin=_origin(local), rule="px4", truth=truth, height=height
+        name,
+        "local",
+        ns,
+        xy,
+        heading,
+        rank=1,
+        origin=_origin(local),
+        rule="px4",
+        truth=truth,
+        height=height,
+        own_clock=True,
     )
 
 

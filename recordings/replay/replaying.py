@@ -19,6 +19,7 @@ from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.logs.field_log import FieldLog, Remark
+from stopgo.recordings.replay.driven_mission import must_be_driven
 from stopgo.recordings.replay.followed import followed_events
 from stopgo.recordings.replay.inferred_events import events_of
 from stopgo.recordings.replay.joined_parts import joined
@@ -145,10 +146,9 @@ def _own_events(log: FieldLog, mission: Mission, offset_ns: int) -> tuple[AnyEve
         )
     if not own:
         return ()
-
-    return tuple(
-        changed(event, robot_ns=event.robot_ns + offset_ns) for event in own if event.run_id == own[-1].run_id
-    )
+    newest = [event for event in own if event.run_id == own[-1].run_id]
+    must_be_driven(log, mission, newest)
+    return tuple(changed(event, robot_ns=event.robot_ns + offset_ns) for event in newest)
 
 
 def _source(log: FieldLog, placed_log: PlacedLog) -> LogSource:

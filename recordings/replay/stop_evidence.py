@@ -16,6 +16,7 @@ import numpy as np
 
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
+from stopgo.mission.comparing.evidence import missing_events
 from stopgo.mission.document import Point
 from stopgo.mission.run.events import JUMPED_OVER, Aborted, AnyEvent, Finished, Settled
 from stopgo.mission.run.tolerance import is_outside
@@ -160,6 +161,8 @@ def _why_not_the_end(replay: Replay, number: int, item: StopComparison) -> str:
     over = any(isinstance(event, Finished | Aborted) for event in replay.run.events)
     if not over and (followed or item.outcome in ("not reached", "arrived")):
         return RUN_GOES_ON
+    if item.is_open and (missing := missing_events(replay.run)):
+        return f"the log lacks {missing}; `stopgo watch --run` would fetch them from the robot"
     stop = replay.mission.stops[number]
     stood = any(
         long_enough(match.standstill, stop) and not is_outside(match.away_m, stop.tolerance_m)

@@ -70,23 +70,24 @@ def floors_command(
 
 def convert_command(
     file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, an .ifc or an .ifczip.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The .dxf to write.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The .dxf to write, or a .yaml: a map of Nav2.")],
     *,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
     **given: Any,
 ) -> int:
-    """Write a floor as a layered DXF in metres; it gives the same stops, and can be edited first."""
-    from stopgo.mission.files.layered_dxf import layered_dxf
+    """Write a floor as a layered DXF in metres; it gives the same stops, and can be edited first.
+
+    A .yaml is a map of Nav2 with its picture, and a mask for its keep-out filter (.keepout.yaml).
+    """
     from stopgo.planner.floors import options_of, read_floor
 
-    if out.suffix.lower() != ".dxf":
-        raise InputError(f"{out}: does not end in .dxf; give a name that ends in .dxf")
+    if out.suffix.lower() not in (".dxf", ".yaml"):
+        raise InputError(f"{out}: does not end in .dxf or .yaml; give a name with one of them")
     must_not_replace(out, file)
     options = options_of(read_settings(None, values_of(given)))
     with running(f"reading {file}"):
         floor = read_floor(file, options)
-    write_atomic(out, layered_dxf(floor))
-    lost = list(_lost_in_drawing(floor))
+    lost = _write_map(out, file, floor) if out.suffix.lower() == ".yaml" else _write_drawing(out, floor)
     for text in lost:
         typer.echo(f"stopgo: {text}", err=True)
     if as_json:
@@ -95,6 +96,28 @@ def convert_command(
     else:
         typer.echo(f"{out}: {floor.name}, {floor.area:.0f} m², {len(floor.rooms)} rooms")
     return 0
+
+
+def _write_drawing(out: Path, floor: FloorPlan) -> list[str]:
+    """Write a layered DXF; return what it cannot hold."""
+    from stopgo.mission.files.layered_dxf import layered_dxf
+
+    write_atomic(out, layered_dxf(floor))
+    return list(_lost_in_drawing(floor))
+
+
+def _write_map(out: Path, file: Path, floor: FloorPlan) -> list[str]:
+    """Write a map of Nav2 and its mask, each with its picture; return what they cannot hold."""
+    from stopgo.mission.files.nav2_map import nav2_map
+
+    made = nav2_map(floor)
+    for yaml, picture in ((out, made.map), (out.with_suffix(".keepout.yaml"), made.mask)):
+        image = yaml.with_suffix(".pgm")
+        for path in (yaml, image):
+            must_not_replace(path, file)
+        write_atomic(image, picture)
+        write_atomic(yaml, made.yaml(image.name))
+    return ["a map shows what was drawn, not what stands there; localise the robot on it before a run"]
 
 
 def _lost_in_drawing(floor: FloorPlan) -> Iterator[str]:

@@ -25,7 +25,15 @@ from stopgo.mission.files.atomic import replacing
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.files.mission_json import next_revision, read
 from stopgo.site.event_feed import EventFeed
-from stopgo.site.planning_work import DRAWING, CommandTask, ReadTask, VariantTask, WorkAnswer, work_on
+from stopgo.site.planning_work import (
+    DRAWING,
+    CommandTask,
+    EditTask,
+    ReadTask,
+    VariantTask,
+    WorkAnswer,
+    work_on,
+)
 from stopgo.site.site_folder import SiteFiles
 
 MOST_VARIANTS = 24
@@ -33,7 +41,7 @@ POLL_S = 0.2
 FILES = ("plan.rrd", "plan.pdf", "coverage.json", "plan.svg", "mission.json")
 """Files of a plan, in the order in which they appear in the folder."""
 
-WorkTask = ReadTask | VariantTask | CommandTask
+WorkTask = ReadTask | VariantTask | CommandTask | EditTask
 
 
 class VariantRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -45,6 +53,13 @@ class VariantRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     forbidden: tuple[tuple[float, float, float], ...] = ()
     replaces: str | None = None
     """Mission file of the folder that it will replace."""
+
+
+class EditRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Stops of a variant that stay, and positions of more."""
+
+    kept: tuple[str, ...]
+    added: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass
@@ -198,6 +213,16 @@ class PlanningRoom:
         except OSError:
             raise InputError(f"variant {number}: has no plan") from None
         return found
+
+    def edit(self, number: int, request: EditRequest) -> WorkAnswer:
+        """Return what changed stops of a variant cost; nothing is planned.
+
+        Raises
+        ------
+        InputError
+            If the robot does not fit at a position, or the plan is not kept any more.
+        """
+        return self._plans.answer(EditTask(self.variant(number).folder, request.kept, request.added))
 
     def cancel(self, number: int) -> None:
         """End the work on a variant."""

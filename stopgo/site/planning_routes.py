@@ -11,7 +11,7 @@ from starlette.routing import Route
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import PARAMETERS
-from stopgo.site.planning import PlanningRoom, VariantRequest
+from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest
 from stopgo.site.web_app import body_of
 
 OPTIONS = (
@@ -45,6 +45,10 @@ def planning_routes(room: PlanningRoom) -> list[Route]:
         given = await body_of(request, VariantRequest)
         return JSONResponse({"number": await asyncio.to_thread(room.plan, given)})
 
+    async def edit(request: Request) -> Response:
+        given = await body_of(request, EditRequest)
+        return JSONResponse(await asyncio.to_thread(room.edit, request.path_params["number"], given))
+
     async def cancel(request: Request) -> Response:
         room.cancel(request.path_params["number"])
         return JSONResponse({})
@@ -63,6 +67,7 @@ def planning_routes(room: PlanningRoom) -> list[Route]:
         Route("/api/floors", read_floor, methods=["POST"]),
         Route("/api/plans", begin, methods=["POST"]),
         Route("/api/plans/{number:int}/drawing", drawing),
+        Route("/api/plans/{number:int}/edit", edit, methods=["POST"]),
         Route("/api/plans/{number:int}/cancel", cancel, methods=["POST"]),
         Route("/api/plans/{number:int}/save", save, methods=["POST"]),
     ]

@@ -10,23 +10,28 @@ import contextlib
 import io
 import json
 import signal
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import PARAMETERS
 
+if TYPE_CHECKING:
+    from stopgo.site.stop_edits import EditablePlan
+
 Tell = Callable[[dict[str, Any]], None]
 WorkAnswer = dict[str, Any]
 MOST_SHOWN = 3000
 """Candidates that are shown while a plan is made."""
 DRAWING = "drawing.json"
+MOST_KEPT_PLANS = 6
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,16 @@ class VariantTask:
 
 
 @dataclass(frozen=True)
+class EditTask:
+    """Stops changed by hand in a plan that the same process made into a folder."""
+
+    out: Path
+    kept: tuple[str, ...]
+    """Stops of the plan that stay."""
+    added: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
 class CommandTask:
     """A command of the command line on files of the folder."""
 
@@ -62,8 +77,10 @@ class CommandTask:
 def work_on(connection: Connection) -> None:
     """Work on the tasks of a connection until it is closed; a process's own work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    kept = KeptPlans()
     works: dict[type[Any], Callable[[Any, Tell], WorkAnswer]] = {
-        ReadTask: read_work, VariantTask: variant_work, CommandTask: command_work
+        ReadTask: read_work, VariantTask: partial(variant_work, kept=kept), CommandTask: command_work,
+        EditTask: kept.edit_work,
     }  # fmt: skip
     while True:
         try:
@@ -143,7 +160,31 @@ def read_work(task: ReadTask, tell: Tell) -> WorkAnswer:
     }
 
 
-def variant_work(task: VariantTask, tell: Tell) -> WorkAnswer:
+class KeptPlans:
+    """The last plans of a process, so that stops may be changed without planning again."""
+
+    def __init__(self) -> None:
+        self._plans: OrderedDict[Path, EditablePlan] = OrderedDict()
+
+    def add(self, out: Path, results: dict[str, Any]) -> None:
+        """Keep the plan of a folder, by the results of its stages."""
+        from stopgo.mission.stages.sight import sight_of
+        from stopgo.site.stop_edits import EditablePlan
+
+        mission, route = results["Mission"], results["Route"]
+        self._plans[out] = EditablePlan(mission, route, sight_of(route, mission, results["Figures"]))
+        while len(self._plans) > MOST_KEPT_PLANS:
+            self._plans.popitem(last=False)
+
+    def edit_work(self, task: EditTask, tell: Tell) -> WorkAnswer:
+        """Return what changed stops cost; raises `InputError` if the plan is not kept any more."""
+        plan = self._plans.get(task.out)
+        if plan is None:
+            raise InputError("this plan is not kept any more; plan the variant again")
+        return plan.cost(task.kept, task.added)
+
+
+def variant_work(task: VariantTask, tell: Tell, kept: KeptPlans | None = None) -> WorkAnswer:
     """Plan a floor into the task's folder; progress is reported stage by stage."""
     from stopgo.plan_files import PrintOptions, plan_files
 
@@ -159,7 +200,9 @@ def variant_work(task: VariantTask, tell: Tell) -> WorkAnswer:
     reports = plan_files(
         task.floor, task.out, settings, print_options=PrintOptions(sheets=True), observe=progress.observe
     )
-    return {"report": _summary(reports[0].as_json())}
+    if kept is not None:
+        kept.add(task.out, progress.results)
+    return {"report": _summary(reports[0].as_json()) | {"twice": progress.twice}}
 
 
 def _summary(report: dict[str, Any]) -> dict[str, Any]:
@@ -186,12 +229,15 @@ class PlanProgress:
     def __init__(self, tell: Tell, out: Path) -> None:
         self._tell = tell
         self._out = out
-        self._results: dict[str, Any] = {}
+        self.results: dict[str, Any] = {}
+        """Result of each stage, by its type's name."""
+        self.twice: float | None = None
+        """Fraction of all visible targets that two stops or more see."""
 
     def observe(self, result: object) -> None:
         """Take the result of a stage."""
         kind = type(result).__name__
-        self._results[kind] = result
+        self.results[kind] = result
         shown = getattr(self, f"_{kind.lower()}", None)
         if shown is not None:
             self._tell({"stage": kind, **shown(result)})
@@ -221,9 +267,12 @@ class PlanProgress:
         from stopgo.mission.stages.sight import sight_of
         from stopgo.site.page_drawing import mission_drawing_json, shapes_of
 
-        mission, route = self._results["Mission"], self._results["Route"]
-        sight = sight_of(route, mission, self._results["Figures"])
-        drawing = mission_drawing_json(mission, shapes_of(self._results["FloorPlan"]), sight)
+        mission, route = self.results["Mission"], self.results["Route"]
+        sight = sight_of(route, mission, self.results["Figures"])
+        visible = sight.totals.amount(sight.totals.visible)
+        twice = (sight.views_from(sight.ids) > 1) & sight.totals.visible
+        self.twice = sight.totals.amount(twice) / visible if visible else None
+        drawing = mission_drawing_json(mission, shapes_of(self.results["FloorPlan"]), sight)
         (self._out / DRAWING).write_text(json.dumps(drawing), encoding="utf-8")
 
 

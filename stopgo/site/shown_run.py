@@ -1,4 +1,4 @@
-"""The present run of a robot on the feed: its events as soon as they arrive, and the path that it drove.
+"""The present run of a robot on the feed: events as soon as the robot reports them, and the driven path.
 
 Invariants:
 - Events of the present run have a key each, so that no page misses one; a new run replaces them all.

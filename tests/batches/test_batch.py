@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import Future
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -153,12 +154,12 @@ def test_a_notebook_shows_the_table_as_it_grows(tmp_path: Path, monkeypatch: pyt
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a signal that only POSIX has")
 def test_a_killed_batch_goes_on_where_it_was(site: Path) -> None:
-    hall(site / "c.dxf", width=5.0)
     arguments = ["batch", str(site / "plans.toml"), "-o", str(site / "out"), "--workers", "1"]
     first = subprocess.Popen([sys.executable, "-m", "stopgo", *arguments])
     results = site / "out" / ".store" / "results"
     while not list(results.glob("*/*/result.json")) and first.poll() is None:
-        pass
+        with suppress(subprocess.TimeoutExpired):
+            first.wait(timeout=0.02)
     first.send_signal(signal.SIGKILL)
     first.wait()
     code, record, _ = batch(site)
@@ -166,7 +167,7 @@ def test_a_killed_batch_goes_on_where_it_was(site: Path) -> None:
     counts = list(statuses(record).values())
     assert set(counts) <= {"planned", "kept"}
     assert counts.count("kept") >= 1
-    assert len(list(results.glob("*/*/result.json"))) == 3, "none twice"
+    assert len(list(results.glob("*/*/result.json"))) == 2, "none twice"
 
 
 def test_a_batch_on_a_cluster_gives_the_same_bytes(site: Path) -> None:
@@ -174,7 +175,7 @@ def test_a_batch_on_a_cluster_gives_the_same_bytes(site: Path) -> None:
     direct = called("plan", str(site / "a.dxf"), "-o", str(site / "direct"))
     assert direct.returncode == 0
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
     ) as cluster:
         done = called(
             *("batch", str(site / "plans.toml"), "-o", str(site / "far"), "--json"),

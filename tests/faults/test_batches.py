@@ -118,7 +118,7 @@ def test_a_batch_killed_at_any_step_goes_on_with_whole_results(
 ) -> None:
     monkeypatch.setattr("stopgo.batches.store._is_dead", lambda claim: True)
     rng = random.Random(30)
-    for trial in range(size(short=15, full=300)):
+    for trial in range(size(short=8, full=300)):
         run = site / f"trial-{trial}"
         run.mkdir()
         for floor in site.glob("*.dxf"):
@@ -138,7 +138,7 @@ def test_an_entry_on_a_full_disk_fails_in_one_line_and_is_planned_later(
     site: Path, planned: list[str]
 ) -> None:
     rng = random.Random(31)
-    for trial in range(size(short=15, full=300)):
+    for trial in range(size(short=8, full=300)):
         run = site / f"trial-{trial}"
         run.mkdir()
         for floor in site.glob("*.dxf"):
@@ -151,7 +151,7 @@ def test_an_entry_on_a_full_disk_fails_in_one_line_and_is_planned_later(
 
 
 def test_two_batches_on_one_store_plan_nothing_twice(site: Path, planned: list[str]) -> None:
-    for trial in range(size(short=5, full=50)):
+    for trial in range(size(short=3, full=50)):
         run = site / f"trial-{trial}"
         run.mkdir()
         for floor in site.glob("*.dxf"):

@@ -37,7 +37,7 @@ from tests.faults.test_gateway import (
 )
 from tests.own_time import World, stepped_into
 
-SEEDS = range(size(short=3, full=100))
+SEEDS = range(size(short=1, full=100))
 
 
 def driven_on(site: Site, chance: random.Random) -> None:

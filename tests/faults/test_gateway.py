@@ -32,7 +32,7 @@ from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
 from tests.own_time import World, stepped_into
 
-SEEDS = range(size(short=2, full=112))
+SEEDS = range(size(short=1, full=112))
 ALL = ["s1", "s2", "s3", "s4", "s5"]
 WANDERS_M = 0.03
 """By how much an estimate may be beside the truth."""

@@ -19,7 +19,7 @@ from tests.bridge.mavlink.simulated.bench import ACCEPTED, ORIGIN, Bench, delay,
 from tests.faults.sizes import size
 from tests.ports import free_port
 
-FRAMES = size(short=3000, full=20_000)
+FRAMES = size(short=1500, full=20_000)
 BURST = 100
 SEEDS = range(size(short=1, full=3))
 

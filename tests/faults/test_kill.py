@@ -288,16 +288,16 @@ def count(outcomes: list[Outcome]) -> None:
 
 
 def test_kills_of_the_robot_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
-    count([trial(seed, tmp_path / str(seed)) for seed in range(size(short=2, full=300))])
+    count([trial(seed, tmp_path / str(seed)) for seed in range(size(short=1, full=300))])
 
 
 def test_kills_of_a_robot_with_keys_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
     site = guarded(tmp_path / "keys")
-    count([trial(seed, tmp_path / str(seed), site) for seed in range(1000, 1000 + size(short=2, full=100))])
+    count([trial(seed, tmp_path / str(seed), site) for seed in range(1000, 1000 + size(short=1, full=100))])
 
 
 def test_kills_while_a_revision_waits_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
-    seeds = range(size(short=2, full=100))
+    seeds = range(size(short=1, full=100))
     count([trial_of_a_revision(seed, tmp_path / str(seed)) for seed in seeds])
 
 
@@ -314,7 +314,7 @@ def test_a_kill_between_any_two_steps_of_a_stop_leaves_a_robot_that_stands(
     assert int(result.stdout.split()[1]) >= size(short=5, full=300)
 
 
-@pytest.mark.parametrize("seed", range(size(short=2, full=40)))
+@pytest.mark.parametrize("seed", range(size(short=1, full=40)))
 def test_a_killed_station_leaves_a_robot_that_the_next_one_commands(tmp_path: Path, seed: int) -> None:
     """A station dies while it pushes a large mission; pushing again sends the rest."""
     chance = random.Random(seed)

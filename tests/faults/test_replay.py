@@ -16,7 +16,7 @@ from stopgo.recordings.replay.standstills import find_standstills
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 
-RUNS = size(short=4, full=240)
+RUNS = size(short=2, full=240)
 
 
 @dataclass(frozen=True)

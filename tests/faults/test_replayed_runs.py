@@ -19,7 +19,7 @@ from tests.faults.sizes import size
 from tests.recordings.replay.driving import wandering
 from tests.recordings.replay.witnessed import Witness, run_of, troubles_of
 
-SEEDS = range(size(short=3, full=40))
+SEEDS = range(size(short=1, full=40))
 NS = 2e-9
 UM = 1e-6
 THIN_NS = 2e9

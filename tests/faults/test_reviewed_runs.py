@@ -37,7 +37,7 @@ from tests.mission.comparing.test_compare import planned
 from tests.recordings.replay.driving import wandering
 from tests.recordings.replay.witnessed import Troubles, Witness, run_of, tell, troubles_of
 
-SEEDS = range(size(short=2, full=100))
+SEEDS = range(size(short=1, full=100))
 NS = 2e-9
 UM = 1e-6
 ROUNDED = 0.0501

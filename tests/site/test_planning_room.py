@@ -14,7 +14,7 @@ import pytest
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.mission_json import read
 from stopgo.site.event_feed import EventFeed
-from stopgo.site.planning import PlanningRoom, VariantRequest
+from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest
 from stopgo.site.planning_routes import options_json
 from stopgo.site.planning_work import ReadTask, VariantTask, read_work, settings_of, variant_work
 from stopgo.site.run_pages import RunRoom
@@ -82,6 +82,31 @@ def test_variants_and_stops_by_hand_are_revisions_of_one_mission(room: PlanningR
     assert (stop.x, stop.y) not in {(one.x, one.y) for one in again.stops}
     with pytest.raises(NegativeResult, match="another revision"):
         room.save(first["number"], "house")
+
+
+def test_the_cost_of_a_change_by_hand_is_that_of_the_plan_with_it(room: PlanningRoom) -> None:
+    """Coverage agrees exactly; the way is estimated in the order of the tour, so it is at least as long."""
+    first = waited(room, room.plan(VariantRequest(floor="house.dxf")))
+    drawing = room.drawing(first["number"])
+    stop, *others = drawing["stops"]
+    spot = (stop["x"], round(stop["y"] + 0.3, 3))
+    kept = tuple(one["id"] for one in others)
+    cost = room.edit(first["number"], EditRequest(kept=kept, added=(spot,)))
+    assert cost["before"]["coverage"] == pytest.approx(first["report"]["coverage"])
+    assert cost["before"]["twice"] == pytest.approx(first["report"]["twice"])
+    moved = waited(room, room.plan(VariantRequest(
+        floor="house.dxf", required=(spot, *((one["x"], one["y"]) for one in others)),
+        forbidden=((stop["x"], stop["y"], 0.1),),
+    )))["report"]  # fmt: skip
+    assert moved["stops"] == cost["after"]["stops"]
+    assert cost["after"]["coverage"] == pytest.approx(moved["coverage"])
+    assert cost["after"]["twice"] == pytest.approx(moved["twice"])
+    assert cost["after"]["length_m"] >= moved["length_m"] - 1e-6
+    without = room.edit(first["number"], EditRequest(kept=kept))
+    assert without["after"]["coverage"] < cost["after"]["coverage"]
+    assert without["after"]["total_s"] < without["before"]["total_s"]
+    with pytest.raises(InputError, match="the robot does not fit there"):
+        room.edit(first["number"], EditRequest(kept=kept, added=((0.1, 0.1),)))
 
 
 def test_bad_options_and_a_killed_process_are_one_line(room: PlanningRoom, place: Path) -> None:

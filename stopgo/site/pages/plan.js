@@ -7,17 +7,18 @@ import { duration, number, percent, t } from "./words.js";
 
 const FORBIDDEN_M = 0.6;
 const NUDGE_M = 0.1;
+const FINGER_PX = 22;
 const chosen = { floor: null, options: {}, shown: null, base: null };
 const drawings = new Map();
 
 export function makePlan(main, me) {
-  const map = emptyMap(t("map_of_floor"));
+  const map = emptyMap(t("map_of_floor"), "group");
   const layers = Object.fromEntries(["floor", "targets", "progress", "legs", "stops", "findings", "pointer"].map((name) => [name, svg("g")]));
   map.append(...Object.values(layers));
   const view = {
     me, map, layers, form: h("form", { class: "options" }), findings: h("ul", { class: "findings" }),
     note: h("p", { class: "notice", role: "status" }), variants: h("div", { class: "variants" }),
-    hand: h("div", { class: "hand", role: "group", "aria-label": t("by_hand") }), selected: null, mode: null,
+    hand: h("div", { class: "hand", role: "group", "aria-label": t("by_hand") }), selected: null, mode: null, draft: null, focus: null,
   };
   const may = me.role === "operator";
   fill(main, h("div", { class: "planning" },
@@ -170,6 +171,7 @@ function figures(report, base) {
     [t("figure_coverage"), percent(report.coverage), base && signed(100 * (report.coverage - base.coverage), 1, " %")],
     [t("figure_route"), `${number(report.length_m, 1)} m`, base && signed(report.length_m - base.length_m, 1, " m")],
     [t("figure_time"), duration(report.total_s), base && signed((report.total_s - base.total_s) / 60, 1, " min")],
+    [t("figure_twice"), percent(report.twice), base && signed(100 * (report.twice - base.twice), 1, " %")],
     [t("figure_overlap"), joined(report) ? t("joined") : t("not_joined"), base && joined(base) !== joined(report) ? "≠" : ""],
   ];
   return h("table", {}, h("tbody", {}, rows.map(([name, value, change]) =>
@@ -217,15 +219,20 @@ async function show(view, one) {
   fill(view.layers.legs, one.legs && svg("path", { d: one.legs.map(line).join(""), class: "legs", "vector-effect": "non-scaling-stroke" }));
 }
 
+// Stops of the plan and of the changes by hand: those that go are crossed out, those that come are named +1.
 function drawStops(view, drawing) {
-  fill(view.layers.stops, drawing.stops.map((stop) => {
+  const draft = draftOf(view);
+  const gone = new Set(draft?.gone);
+  const stops = [...drawing.stops.map((stop) => [stop, gone.has(stop.id) ? "skipped" : "waiting"]), ...(draft?.added ?? []).map((stop) => [stop, "waiting"])];
+  fill(view.layers.stops, stops.map(([stop, state]) => {
     const pick = () => { view.selected = stop.id; view.mode = null; drawVariants(view); };
-    return stopMark(drawing, stop, view.selected === stop.id ? "current" : "waiting", view.size, {
+    return stopMark(drawing, stop, view.selected === stop.id ? "current" : state, view.size, {
       tabindex: "0", role: "button", "aria-label": t("stop_named", { stop: stop.id }), "data-stop": stop.id,
       onclick: (event) => { if (view.mode) return; event.stopPropagation(); pick(); },
       onkeydown: (event) => keyOnStop(view, event, stop, pick),
     });
   }));
+  if (view.focus) view.layers.stops.querySelector(`[data-stop="${view.focus}"]`)?.focus();
 }
 
 function keyOnStop(view, event, stop, pick) {
@@ -243,31 +250,83 @@ function drawHand(view, shown) {
   if (view.me.role !== "operator" || shown?.state !== "done") return fill(view.hand);
   const mode = (name) => () => { view.mode = view.mode === name ? null : name; drawHand(view, shown); };
   const button = (name, work, needs) => (!needs || view.selected) && h("button", { type: "button", "aria-pressed": String(view.mode === name), onclick: work }, t(`hand_${name}`, { stop: view.selected }));
-  fill(view.hand, h("span", {}, view.mode ? t(`hand_${view.mode}_where`) : view.selected ? "" : t("hand_help")),
-    button("add", mode("add")), button("move", mode("move"), true), button("forbid", () => edit(view, { without: view.selected }), true));
+  const draft = draftOf(view);
+  fill(view.hand, h("span", { role: "status" }, view.mode ? t(`hand_${view.mode}_where`) : draft ? costText(draft) : view.selected ? "" : t("hand_help")),
+    button("add", mode("add")), button("move", mode("move"), true), button("forbid", () => edit(view, { without: view.selected }), true),
+    draft && h("button", { type: "button", class: "primary", onclick: () => planDraft(view, shown) }, t("hand_plan")),
+    draft && h("button", { type: "button", onclick: () => { view.draft = view.selected = null; drawVariants(view); } }, t("hand_discard")));
 }
 
+// A press near a stop picks it, so that its target is as large as a finger.
 function pressedMap(view, event) {
-  if (!view.mode || !view.drawing) return;
-  const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(view.map.getScreenCTM().inverse());
+  if (!view.drawing) return;
+  const scale = view.map.getScreenCTM();
+  const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(scale.inverse());
   const { left, top } = view.drawing.frame;
   const at = [Math.round(1000 * (point.x + left)) / 1000, Math.round(1000 * (top - point.y)) / 1000];
-  edit(view, view.mode === "add" ? { at } : { without: view.selected, at });
+  if (view.mode) return edit(view, view.mode === "add" ? { at } : { without: view.selected, at });
+  const stops = [...(view.drawing.stops ?? []), ...(draftOf(view)?.added ?? [])];
+  const away = (stop) => Math.hypot(stop.x - at[0], stop.y - at[1]) * scale.a;
+  const nearest = stops.sort((a, b) => away(a) - away(b))[0];
+  if (!nearest || away(nearest) > FINGER_PX) return;
+  view.selected = nearest.id;
+  drawVariants(view);
 }
 
-// A change by hand is a new variant beside this one: all other stops stay, so the difference is its cost.
-// A stop in a doorway cannot be required; the planner chooses it again where it is needed.
-function edit(view, { without = null, at = null }) {
-  const base = variantsShown().find((one) => one.number === chosen.shown);
+function draftOf(view) {
+  return view.draft?.number === chosen.shown ? view.draft : null;
+}
+
+// What a change costs is there at once, from what the plan's stops see. The plan is made again on demand.
+async function edit(view, change) {
   const drawing = drawings.get(chosen.shown);
-  if (!base || !drawing) return;
-  const gone = drawing.stops.find((stop) => stop.id === without);
-  const required = drawing.stops.filter((stop) => stop.id !== without && !stop.doorway).map((stop) => [stop.x, stop.y]);
-  if (at) required.push(at);
-  const far = gone && at ? Math.hypot(at[0] - gone.x, at[1] - gone.y) : Infinity;
-  const radius = Math.min(FORBIDDEN_M, 0.5 * far);
-  const forbidden = [...base.request.forbidden, ...(gone ? [[gone.x, gone.y, radius]] : [])];
+  if (!drawing) return;
+  const before = draftOf(view);
+  const draft = withChange(before ?? { number: chosen.shown, gone: [], added: [], named: 0 }, change);
+  view.draft = draft;
   view.mode = view.selected = null;
+  view.focus = change.at ? draft.added.at(-1).id : null;
+  drawVariants(view);
+  const kept = drawing.stops.map((stop) => stop.id).filter((id) => !draft.gone.includes(id));
+  try {
+    draft.cost = await send(`/api/plans/${draft.number}/edit`, { kept, added: draft.added.map((stop) => [stop.x, stop.y]) });
+  } catch (error) {
+    if (view.draft === draft) view.draft = before;
+    say(view.note, t("not_changed", { reason: error.message }));
+  }
+  drawVariants(view);
+}
+
+function withChange(draft, { without = null, at = null }) {
+  const isNew = draft.added.some((stop) => stop.id === without);
+  const added = draft.added.filter((stop) => stop.id !== without);
+  const gone = without && !isNew ? [...new Set([...draft.gone, without])] : draft.gone;
+  const named = draft.named + (at && !isNew ? 1 : 0);
+  if (at) added.push({ id: isNew ? without : `+${named}`, x: at[0], y: at[1] });
+  return { number: draft.number, gone, added, named };
+}
+
+function costText({ cost }) {
+  if (!cost) return t("hand_counting");
+  const { before, after } = cost;
+  return t("hand_cost", {
+    coverage: percent(after.coverage), coverage_change: signed(100 * (after.coverage - before.coverage), 1, " %"),
+    twice: percent(after.twice), twice_change: signed(100 * (after.twice - before.twice), 1, " %"),
+    time: duration(after.total_s), time_change: signed((after.total_s - before.total_s) / 60, 1, " min"),
+  });
+}
+
+// The changes become a new variant beside this one: all other stops stay, so the difference is their cost.
+// A stop in a doorway cannot be required; the planner chooses it again where it is needed.
+function planDraft(view, base) {
+  const [draft, drawing] = [draftOf(view), drawings.get(chosen.shown)];
+  if (!draft || !drawing) return;
+  const gone = drawing.stops.filter((stop) => draft.gone.includes(stop.id));
+  const stay = drawing.stops.filter((stop) => !draft.gone.includes(stop.id) && !stop.doorway);
+  const required = [...stay, ...draft.added].map((stop) => [stop.x, stop.y]);
+  const radius = (stop) => Math.min(FORBIDDEN_M, ...draft.added.map((one) => 0.5 * Math.hypot(one.x - stop.x, one.y - stop.y)));
+  const forbidden = [...base.request.forbidden, ...gone.map((stop) => [stop.x, stop.y, radius(stop)])];
+  view.draft = view.mode = view.selected = view.focus = null;
   const { floor, options, replaces } = base.request;
   begin(view, { floor, options, required, forbidden, replaces: base.saved ?? replaces ?? null });
 }

@@ -90,68 +90,55 @@ def held_keys(folder: Path) -> dict[str, HeldKeys]:
     return held
 
 
+class Dialogue:
+    """What robot r1 and station alice say to one another, signed and verified, as vectors."""
+
+    def __init__(self, held: dict[str, HeldKeys]) -> None:
+        day = datetime.fromisoformat(VECTORS["now"])
+        ns = 1_700_000_000_000_000_000
+        self.station = KeySigning(held["alice"], now=lambda: day, clock_ns=lambda: 5_000_000_000)
+        self.robot = KeySigning(held["r1"], boot_id="b7", now=lambda: day, clock_ns=lambda: ns)
+        self.said: list[dict[str, Any]] = []
+
+    def say(self, shows: str, kind: str, by: str, key: str, payload: str, seal: bytes, **more: Any) -> None:
+        given = {"shows": shows, "kind": kind, "by": by, "key": key, "parameters": {}, "payload": payload}
+        message = {**given, **more}
+        signed = by_the_document(message, json.loads(seal)).decode()
+        self.said.append({**message, "signed": signed, "seal": seal.decode()})
+
+    def ask(self, shows: str, key: str, payload: str, reply: str, **parameters: str) -> None:
+        question = self.station.sign_question(key, payload.encode(), parameters)
+        self.say(shows, "question", "alice", key, payload, question.attachment, parameters=parameters)
+        answered = self.robot.sign_answers(lambda request: reply.encode())
+        got, seal = answered(Request(key, payload.encode(), parameters, question.attachment))
+        assert self.station.verify_answer(question, got, seal) == reply.encode(), self.station.distrusted
+        more = {"parameters": parameters, "question": payload}
+        self.say(f"the answer to {shows}", "answer", "r1", key, reply, seal, **more)
+
+    def publish(self, shows: str, by: str, key: str, payload: str) -> None:
+        speaker, listener = (self.robot, self.station) if by == "r1" else (self.station, self.robot)
+        heard: list[bytes] = []
+        seal = speaker.sign_publication(key, payload.encode())
+        hears = listener.verify_publications(lambda key, payload: heard.append(payload))
+        hears(key, payload.encode(), seal)
+        assert heard == [payload.encode()], listener.distrusted
+        self.say(shows, "told", by, key, payload, seal)
+
+
 def dialogue(held: dict[str, HeldKeys], monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
-    """Alice asks robot r1 what it is, hears its state, asks for its log and orders a pause."""
+    """Alice asks robot r1 what it is, hears its state, asks for its log and commands a pause."""
     nonces: Iterator[int] = iter(range(1, 100))
     monkeypatch.setattr("secrets.token_hex", lambda size: f"{next(nonces):0{2 * size}x}")
-    day = datetime.fromisoformat(VECTORS["now"])
-    station = KeySigning(held["alice"], now=lambda: day, clock_ns=lambda: 5_000_000_000)
-    robot = KeySigning(held["r1"], boot_id="b7", now=lambda: day, clock_ns=lambda: 1_700_000_000_000_000_000)
-    said: list[dict[str, Any]] = []
-
-    def say(shows: str, kind: str, by: str, key: str, payload: str, attachment: bytes, **more: Any) -> None:
-        signed = json.loads(attachment)
-        message = {
-            "shows": shows,
-            "kind": kind,
-            "by": by,
-            "key": key,
-            "parameters": {},
-            "payload": payload,
-            **more,
-        }
-        said.append(
-            {**message, "signed": by_the_document(message, signed).decode(), "seal": attachment.decode()}
-        )
-
-    def ask(shows: str, key: str, payload: str, reply: str, **parameters: str) -> None:
-        question = station.sign_question(key, payload.encode(), parameters)
-        say(shows, "question", "alice", key, payload, question.attachment, parameters=parameters)
-        answered = robot.sign_answers(lambda request: reply.encode())
-        got, attachment = answered(Request(key, payload.encode(), parameters, question.attachment))
-        assert station.verify_answer(question, got, attachment) == reply.encode(), station.distrusted
-        more = {"parameters": parameters, "question": payload}
-        say(f"the answer to {shows}", "answer", "r1", key, reply, attachment, **more)
-
-    def tell(shows: str, speaker: KeySigning, by: str, key: str, payload: str, listener: KeySigning) -> None:
-        heard: list[bytes] = []
-        attachment = speaker.sign_publication(key, payload.encode())
-        listener.verify_publications(lambda key, payload: heard.append(payload))(
-            key, payload.encode(), attachment
-        )
-        assert heard == [payload.encode()], listener.distrusted
-        say(shows, "told", by, key, payload, attachment)
-
-    root = "north/hall/sx/1/r1"
-    ask("a first question, without payload", f"{root}/info", "", '{"is":"Malformed","message":"Büro 😀"}')
-    tell("what a robot publishes", robot, "r1", f"{root}/tel/state", '{"robot":"r1","more":1}', station)
-    tell(
-        "the same once more, by another number",
-        robot,
-        "r1",
-        f"{root}/tel/state",
-        '{"robot":"r1","more":1}',
-        station,
+    talk, root = Dialogue(held), "north/hall/sx/1/r1"
+    state = (f"{root}/tel/state", '{"robot":"r1","more":1}')
+    log = '{"is":"LogPage","events":[],"newest":0}'
+    talk.ask(
+        "a first question, without payload", f"{root}/info", "", '{"is":"Malformed","message":"Büro 😀"}'
     )
-    ask(
-        "a question with parameters",
-        f"{root}/log",
-        "",
-        '{"is":"LogPage","events":[],"newest":0}',
-        since="0",
-        run="x",
-    )
-    ask("a question with a payload", f"{root}/cmd/pause", '{"is":"Command"}', '{"is":"Answer"}')
-    ask("a question to the tunnel", f"{root}/mavlink/hello", "", "{}")
-    tell("what a station publishes", station, "alice", f"{root}/mavlink/up", "frames", robot)
-    return said
+    talk.publish("what a robot publishes", "r1", *state)
+    talk.publish("the same once more, by another number", "r1", *state)
+    talk.ask("a question with parameters", f"{root}/log", "", log, since="0", run="x")
+    talk.ask("a question with a payload", f"{root}/cmd/pause", '{"is":"Command"}', '{"is":"Answer"}')
+    talk.ask("a question to the tunnel", f"{root}/mavlink/hello", "", "{}")
+    talk.publish("what a station publishes", "alice", f"{root}/mavlink/up", "frames")
+    return talk.said

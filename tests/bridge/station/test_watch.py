@@ -20,6 +20,7 @@ from stopgo.bridge.robot import agent as agents
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.recorder import RunRecorder
 from stopgo.bridge.robot.robot_hardware import pose_of
@@ -186,11 +187,9 @@ def test_a_duration_reads_as_a_clock() -> None:
     assert clock(3725.9) == "1:02:05"
 
 
-def test_what_was_missed_while_the_link_was_cut_is_reported_once_and_in_order_and_again_of_the_past_run(
-    tmp_path: Path,
-) -> None:
-    board = Switchboard()
-    journal, wall = memory_journal(), WallClock(speed_up=200)
+def fast_robot(board: Switchboard, journal: Journal, folder: Path) -> tuple[Agent, Controller]:
+    """A robot whose time runs 200 times as fast, with records of its runs."""
+    wall = WallClock(speed_up=200)
     base, scanner = SimulatedBase(clock=wall), SimulatedScanner(clock=wall)
     controller = Controller(
         robot="r1", journal=journal, base=base, scanner=scanner, clock=wall, command_clock=WallClock(),
@@ -199,8 +198,16 @@ def test_what_was_missed_while_the_link_was_cut_is_reported_once_and_in_order_an
     agent = Agent(
         keys=KeyExpressions("r1"), link=board.link(), journal=journal, runner=controller,
         inbox=Inbox(journal, controller, scanner.profiles), clock=wall, command_clock=WallClock(),
-        speed_up=200, recorder=RunRecorder(tmp_path),
+        speed_up=200, recorder=RunRecorder(folder),
     )  # fmt: skip
+    return agent, controller
+
+
+def test_what_was_missed_while_the_link_was_cut_is_reported_once_and_in_order_and_again_of_the_past_run(
+    tmp_path: Path,
+) -> None:
+    board, journal = Switchboard(), memory_journal()
+    agent, controller = fast_robot(board, journal, tmp_path)
     with agents.on_link(agent):
         station = Station(board.link(), KeyExpressions("r1"), commander="test")
         station.push(corridor())

@@ -35,7 +35,7 @@ def test_a_room_has_the_same_best_point_in_each_copy_of_its_floor() -> None:
 
 
 def test_only_what_lies_near_a_room_is_widened_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    feasibility = StopFeasibility(navigable(copies(shared("layered/duplex-l1.dxf"), 12), Settings()))
+    feasibility = StopFeasibility(navigable(copies(shared("layered/duplex-l1.dxf"), 6), Settings()))
     around, corners = StopFeasibility.around, []
 
     def counted(self: StopFeasibility, shape: Any, margin: float) -> tuple[Any, Any]:
@@ -46,4 +46,4 @@ def test_only_what_lies_near_a_room_is_widened_for_it(monkeypatch: pytest.Monkey
     monkeypatch.setattr(StopFeasibility, "around", counted)
     _best_points(feasibility)
     whole = shapely.get_num_coordinates([feasibility.obstacles, feasibility.outline]).sum()
-    assert np.median(corners) < whole / 20
+    assert np.median(corners) < whole / 10

@@ -254,7 +254,10 @@ def test_a_command_writes_a_mission_for_each_robot(
 ) -> None:
     floor = str(SAMPLE)
     out = str(tmp_path)
-    assert main(["plan", floor, "-o", out, "--robots", "2", "--start", "10,8.5,0", "--json"]) == 0
+    assert (
+        main(["plan", floor, "-o", out, "--robots", "2", "--start", "10,8.5,0", "--no-register", "--json"])
+        == 0
+    )
     told = json.loads(capsys.readouterr().out)
     shared = told["shared"]
     assert (shared["kind"], shared["count"]) == ("robot", 2)

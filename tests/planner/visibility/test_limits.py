@@ -27,7 +27,9 @@ from tests.faults.sizes import FULL
 from tests.planner.worlds import LAYERED, SHARED, box, column, element, hall, planned, two_rooms
 
 FLOOR = hall(7, 5, column("a", 3, 2), element("b", "beams", box(1, 3.4, 6, 3.6)))
-QUALITY = Settings(max_incidence=62, near=1.1, density=4, angular_step=0.07, grid=1.4, refine=False)
+QUALITY = Settings(
+    max_incidence=62, near=1.1, density=4, angular_step=0.07, grid=1.4, refine=False, register=False
+)
 SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
 WITHOUT_LIMITS = {
     "office": "78263333d44e823b",
@@ -103,7 +105,9 @@ def test_more_views_never_take_fewer_stops() -> None:
     for floor in (FLOOR, two_rooms(1.0)):
         stops = []
         for views in (1, 2, 3, 4):
-            settings = Settings(range=4, grid=1.2, views=views, selector="exact", refine=False)
+            settings = Settings(
+                range=4, grid=1.2, views=views, selector="exact", refine=False, register=False
+            )
             found = planned(floor, settings)[1][Selection]
             assert found.bound == len(found.chosen)
             stops.append(found.bound)

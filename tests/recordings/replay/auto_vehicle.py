@@ -81,10 +81,9 @@ def heard(
     clock, rows = SimulatedClock(), list[Row]()
     vehicle = complete_vehicle(
         rover_setting(folder / "vehicle", faults, autopilot),
-        clock=clock,
-        wall=clock,
+        clock=clock, wall=clock,
         send=lambda message: rows.append((clock.now_ns(), ROVER, message)),
-    )
+    )  # fmt: skip
     witness(vehicle)
 
     def say(messages: Iterable[Any]) -> None:
@@ -97,9 +96,8 @@ def heard(
             vehicle.advance()
 
     drive(BEFORE_S)
-    go = Orders(plan, autopilot)
+    go, past = Orders(plan, autopilot), 0.0
     say((*go.upload(), *go.arm(), *go.auto()))
-    past = 0.0
     for at, order in sorted((orders or {}).items()):
         drive(at - past)
         say(order if isinstance(order, tuple) else (order,))

@@ -18,6 +18,7 @@ from tests.recordings.replay.auto_vehicle import (
     AUTO_MODE,
     HOLD_MODE,
     FromVehicle,
+    Orders,
     in_mode,
     item_of,
     logged,
@@ -194,6 +195,18 @@ def test_a_stop_without_a_report_of_its_scan_is_undecided_where_others_have_one(
     assert [item.outcome for item in laid.comparison.stops] == ["scanned", "unconfirmed", "scanned"]
     assert drive_verdict(laid).answer == "unknown"
     assert "S2 is undecided: the log contains no report of its scan" in drive_verdict(laid).text
+
+
+def test_a_gap_moves_no_pose_against_the_messages(tmp_path: Path) -> None:
+    """The vehicle leaves S1 for a second visit unheard: a gap that looks like a step of the clock."""
+    plan, deaf = mission(tolerance_m=0.4), (14 * 10**9, 22 * 10**9)
+    path = logged(
+        tmp_path / "a.tlog", plan, orders={14.0: Orders(plan).jump("S1")},
+        kept=lambda ns, name: not deaf[0] <= ns % 10**12 < deaf[1],
+    )  # fmt: skip
+    laid = replayed(path, plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
+    assert drive_verdict(laid).answer == "yes"
 
 
 def test_the_heartbeat_of_a_camera_is_not_the_vehicles(tmp_path: Path) -> None:

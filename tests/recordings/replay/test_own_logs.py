@@ -97,3 +97,20 @@ def test_a_run_of_another_mission_is_refused_by_name(tmp_path: Path) -> None:
     other = with_digest(replace(MISSION, id="f" * 32))
     with pytest.raises(InputError, match="no run of mission ffff"):
         replay(read_log(written_journal(tmp_path)), other, Placing())
+
+
+def test_another_revision_and_another_version_are_refused_with_their_differences(tmp_path: Path) -> None:
+    from msgspec.structs import replace
+
+    from stopgo.mission.document import with_digest
+
+    log = read_log(written_recording(tmp_path))
+    wider = tuple(
+        replace(stop, tolerance_m=0.2 if k == 3 else stop.tolerance_m) for k, stop in enumerate(MISSION.stops)
+    )
+    name = MISSION.stops[3].id
+    later = with_digest(replace(MISSION, revision=MISSION.revision + 1, stops=wider))
+    with pytest.raises(InputError, match=rf"followed revision 1 of mission room, not 2 \(changed: {name}\)"):
+        replay(log, later, Placing())
+    with pytest.raises(InputError, match=rf"another version of mission room, revision 1 \(changed: {name}\)"):
+        replay(log, with_digest(replace(MISSION, stops=wider)), Placing())

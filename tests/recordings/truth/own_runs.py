@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -30,6 +31,12 @@ from stopgo.mission.run.events import (
     Started,
     Unconfirmed,
 )
+from stopgo.recordings.logs import read_log
+from stopgo.recordings.page.reviewed import review
+from stopgo.recordings.replay.drive_verdict import drive_verdict
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replaying import replay
+from stopgo.recordings.runs.field import FieldRecording
 from tests.recordings.replay.driving import BEGIN_NS
 from tests.recordings.truth.drives import STOPS, mission_with_return
 
@@ -276,6 +283,39 @@ def own_answers(seed: int = 1) -> Iterator[OwnAnswer]:
                 judged = judge_of(heard)
                 name = f"{mishap.__name__} / {loss.__name__}{' / given up' if given_up else ''} #{case}"
                 yield OwnAnswer(name, heard.answer, judged.answer, heard.lost, judged.text)
+
+
+def recorded_answers(folder: Path, seed: int = 1, every: int = 1) -> Iterator[OwnAnswer]:
+    """Yield the answers of `review` and of `replay` to recordings (.rrd) of these runs."""
+    runs = [(mishap, loss, given_up) for mishap in MISHAPS for loss in LOSSES for given_up in (False, True)]
+    for number, (mishap, loss, given_up) in enumerate(runs[::every], 1):
+        case = 1000 * seed + number
+        heard = loss(own_run(case, mishap, given_up=given_up), np.random.default_rng(case))
+        path = recorded(folder / f"{case}.rrd", heard)
+        for name, judged in (("review", _reviewed(path)), ("replay", _replayed(path, heard.mission))):
+            about = f"{mishap.__name__} / {loss.__name__}{' / given up' if given_up else ''} / {name} #{case}"
+            yield OwnAnswer(about, heard.answer, judged.answer, heard.lost, judged.text)
+
+
+def recorded(path: Path, run: OwnRun) -> Path:
+    """The recording of a station that heard a run."""
+    reports = [*run.poses, *run.events]
+    with FieldRecording(path, run.mission) as recording:
+        for report in sorted(reports, key=lambda one: (one.boot_id, one.robot_ns)):
+            if isinstance(report, PoseReport):
+                recording.pose(report)
+            else:
+                recording.event(report)
+    return path
+
+
+def _reviewed(path: Path) -> Judgement:
+    (compared,) = review([path]).comparisons
+    return judge(compared)
+
+
+def _replayed(path: Path, mission: Mission) -> Judgement:
+    return drive_verdict(replay(read_log(path), mission, Placing()))
 
 
 def judge_of(run: OwnRun) -> Judgement:

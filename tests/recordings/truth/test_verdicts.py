@@ -11,7 +11,7 @@ from tests.faults.sizes import size
 from tests.recordings.truth.auto_logs import auto_answers
 from tests.recordings.truth.bench import answered, cases
 from tests.recordings.truth.cloud_cases import cloud_answers, small_floor
-from tests.recordings.truth.own_runs import own_answers
+from tests.recordings.truth.own_runs import own_answers, recorded_answers
 
 PARTS = 4
 """The cases are dealt out among so many tests, which run side by side."""
@@ -51,3 +51,8 @@ def test_no_verdict_on_a_run_of_our_own_robot_is_false() -> None:
     found = [answer for seed in range(1, 1 + size(short=1, full=10)) for answer in own_answers(seed)]
     assert [(item.name, item.text) for item in found if item.kind not in ("right", "open")] == []
     assert {item.answer for item in found} == {"yes", "no", "unknown"}
+
+
+def test_no_verdict_on_a_recording_of_such_a_run_is_false(tmp_path: Path) -> None:
+    found = list(recorded_answers(tmp_path, every=size(short=27, full=1)))
+    assert [(item.name, item.text) for item in found if item.kind not in ("right", "open")] == []

@@ -17,11 +17,11 @@ from tests.bridge.mavlink.auto.site import Site, until, watched
 from tests.bridge.mavlink.auto.test_guarded_list import other_station
 from tests.bridge.mavlink.auto.test_jumped_stops import site_sequence
 from tests.bridge.mavlink.shared_line import all_hear_all
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
-PROFILES = ["ardupilot", "px4"]
 STATION = "system 255, component 190"
 UNKNOWN = "somebody (not known who)"
 
@@ -82,7 +82,7 @@ def reason_after(site: Site, does: Does) -> str:
     return reason
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 @pytest.mark.parametrize("does", [manual, manual_by_message, disarmed, jumped_over, set_back])
 def test_a_station_whose_messages_arrive_is_named_for_whatever_it_changes(
     tmp_path: Path, shared: None, profile: str, does: Does
@@ -103,7 +103,7 @@ def test_a_station_on_another_line_is_not_known(tmp_path: Path, does: Does) -> N
     assert UNKNOWN in reason_after(Site(tmp_path, "ardupilot", speed_up=1.0), does)
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_a_remote_control_is_named_by_its_channels(tmp_path: Path, profile: str) -> None:
     site = Site(tmp_path, profile, faults=["switch@15=0"], speed_up=1.0)
     with site.up(), watched(site):

@@ -13,6 +13,7 @@ from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.run.events import Paused
 from stopgo.mission.run.health_text import health_text
 from tests.bridge.mavlink.auto.site import KINDS, Site, real_tour, until, watched
+from tests.faults.sizes import some
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -23,8 +24,10 @@ LASTS = {1: "remote control lost", 3: "geofence is breached", 5: "estimator has 
 LONG = real_tour(scan=Scan(profile="default", duration_s=20.0, timeout_s=60.0))
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
-@pytest.mark.parametrize("cause", [1, 3, 5])
+@pytest.mark.parametrize(
+    ("profile", "cause"),
+    some([(profile, cause) for profile in ("ardupilot", "px4") for cause in LASTS], every=2),
+)
 def test_a_failsafe_that_holds_the_vehicle_is_named_and_resume_waits_for_its_end(
     tmp_path: Path, profile: str, cause: int
 ) -> None:
@@ -43,7 +46,7 @@ def test_a_failsafe_that_holds_the_vehicle_is_named_and_resume_waits_for_its_end
     assert site.run.done == ("S1", "S2", "S3")
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_batterys_failsafe_lasts_until_the_autopilot_is_restarted(tmp_path: Path, profile: str) -> None:
     site = Site(tmp_path, profile, mission=LONG, faults=["failsafe@6=0"])
     with site.up():

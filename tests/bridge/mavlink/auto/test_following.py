@@ -14,6 +14,7 @@ from stopgo.mission.run.events import Arrived, Failed, Held, PoseReport, Scanned
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -30,7 +31,7 @@ def test_a_run_is_reported_from_start_to_finish(tmp_path: Path) -> None:
     assert min(away) > 0.05 and max(away) < 0.3
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4", "strict"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4", "strict"], every=2))
 def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: Path) -> None:
     from stopgo.bridge.station.watch import watch_run
 

@@ -21,6 +21,7 @@ from stopgo.mission.run.events import Paused
 from tests.bridge.mavlink.auto.site import Site, until, watched
 from tests.bridge.mavlink.scripted import Scripted
 from tests.called import stopgo
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -71,7 +72,7 @@ def speed_of(peer: Peer) -> float:
     return local_speed(message)
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 @pytest.mark.parametrize("verb", ["pause", "abort"])
 def test_hold_is_the_first_frame_on_the_line(
     verb: str, profile: str, tmp_path: Path, frames: list[Message]

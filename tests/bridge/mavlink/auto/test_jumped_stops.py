@@ -20,6 +20,7 @@ from stopgo.mission.errors import NegativeResult
 from stopgo.mission.mavlink.telemetry import local_speed
 from stopgo.mission.run.events import Scanned, Skipped
 from tests.bridge.mavlink.auto.site import Site, real_tour, until, watched
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -27,7 +28,7 @@ pytestmark = pytest.mark.usefixtures("own_time")
 LONG = Scan(profile="default", duration_s=20.0, timeout_s=40.0)
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 @pytest.mark.parametrize("seen", ["Scanned S1", "Arrived S2", "Settled S2"])
 def test_a_stop_that_is_jumped_over_is_skipped_by_somebody(profile: str, seen: str, tmp_path: Path) -> None:
     """On the way to it, while it settles, and while it scans."""
@@ -72,7 +73,7 @@ def test_a_scan_that_goes_on_while_the_vehicle_is_jumped_to_the_next_stop_counts
     assert site.run.skipped == ("S2",) and site.run.state == "FINISHED"
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_a_jump_back_to_a_stop_that_is_done_is_held_and_the_run_goes_on_where_it_was(
     profile: str, tmp_path: Path
 ) -> None:
@@ -96,7 +97,7 @@ def offered(site: Site) -> str:
     return site.run.reason
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_jumped_stops_are_offered_at_the_end_and_one_command_drives_to_them(
     profile: str, tmp_path: Path
 ) -> None:

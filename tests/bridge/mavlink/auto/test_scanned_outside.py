@@ -26,6 +26,7 @@ from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.auto.site import PATIENCE_S, Site, real_tour, until, watched
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -84,7 +85,7 @@ def test_a_scan_during_which_the_estimate_jumps_is_reported_with_its_deviation_e
     assert f"{1000 * away:.1f}" in index_text(index_of(path.parent))
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_a_stop_that_is_missed_and_left_out_is_not_done(
     profile: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -105,7 +106,7 @@ def test_a_stop_that_is_missed_and_left_out_is_not_done(
     assert "0 of 3 stops scanned" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_within_a_tolerance_that_it_keeps_its_stops_are_done_with_their_deviation(
     profile: str, tmp_path: Path
 ) -> None:

@@ -21,11 +21,10 @@ from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Aborted, Pose, Resumed, Started
 from stopgo.mission.run.run_commands import RunCommand
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
-
-PROFILES = ["ardupilot", "px4"]
 
 
 def refused(site: Site, verb: str, **details: object) -> str:
@@ -35,7 +34,7 @@ def refused(site: Site, verb: str, **details: object) -> str:
     return str(no.value)
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_paused_vehicle_goes_on_where_it_stood(profile: str, tmp_path: Path) -> None:
     site = Site(tmp_path, profile)
     with site.up(), watched(site):
@@ -48,7 +47,7 @@ def test_a_paused_vehicle_goes_on_where_it_stood(profile: str, tmp_path: Path) -
     assert [event.commander for event in site.events if isinstance(event, Resumed)] == ["test"]
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_a_stop_that_is_skipped_on_a_leg_is_driven_past_without_waiting(profile: str, tmp_path: Path) -> None:
     site = Site(tmp_path, profile)
     with site.up(), watched(site):

@@ -19,6 +19,7 @@ from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Arrived, Held, Paused, Resumed, Started
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.bridge.mavlink.lossy import Lossy, Roughness
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -29,7 +30,7 @@ def by_hand(peer: Peer, mode: tuple[int, int]) -> None:
     assert peer.command(dialect.MAV_CMD_DO_SET_MODE, 1, *mode).accepted
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_after_a_reboot_the_run_goes_on_at_the_stop_that_was_not_finished(
     profile: str, tmp_path: Path
 ) -> None:
@@ -156,7 +157,7 @@ def test_a_silent_vehicle_is_reported_as_silence_and_its_run_goes_on(tmp_path: P
     assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_what_a_restart_took_from_the_vehicle_one_command_gives_again(profile: str, tmp_path: Path) -> None:
     """Its origin, its mode and its arming."""
     site = Site(tmp_path, profile)

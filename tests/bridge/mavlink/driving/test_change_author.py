@@ -24,9 +24,9 @@ from tests.bridge.mavlink.driving.world import (
     until,
 )
 from tests.bridge.mavlink.shared_line import all_hear_all
+from tests.faults.sizes import some
 from tests.own_time import stepped_into
 
-PROFILES = ["ardupilot", "px4"]
 STATION = "system 254, component 190"
 """The operator's, as `reached` opens it."""
 
@@ -70,7 +70,7 @@ def held_after(station: Any, operator: Operator, does: Does) -> str:
     return str(held.reason)
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 @pytest.mark.parametrize(
     "does", [Operator.manual, Operator.disarm, sends_set_points, overrides, moves_a_joystick]
 )
@@ -87,7 +87,7 @@ def test_a_station_on_another_line_is_not_known(tmp_path: Path, does: Does) -> N
         assert "somebody (not known who)" in held_after(station, operator, does)
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_remote_control_is_named_by_its_channels(tmp_path: Path, profile: str) -> None:
     faults = VehicleFaults((VehicleFault("switch", 8, 0.0),))
     with rover(tmp_path, profile, faults=faults) as (vehicle, operator):

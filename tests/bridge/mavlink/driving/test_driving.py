@@ -31,6 +31,7 @@ from tests.bridge.mavlink.driving.world import (
     until,
 )
 from tests.bridge.mavlink.lossy import Lossy, Roughness
+from tests.faults.sizes import some
 from tests.ports import free_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -135,7 +136,7 @@ def test_nothing_starts_without_origin_arming_or_a_free_hand(tmp_path: Path) -> 
         assert station.status().state == "READY"
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_pause_stops_the_vehicle_and_resume_drives_on(tmp_path: Path, profile: str) -> None:
     with rover(tmp_path, profile) as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
         station.push(site_mission())
@@ -150,7 +151,7 @@ def test_a_pause_stops_the_vehicle_and_resume_drives_on(tmp_path: Path, profile:
         assert scanned(station) == ALL
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_an_operators_hold_is_never_changed_back_before_a_retry(tmp_path: Path, profile: str) -> None:
     with rover(tmp_path, profile) as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
         station.push(site_mission())

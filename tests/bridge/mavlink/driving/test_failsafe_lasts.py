@@ -19,11 +19,12 @@ from tests.bridge.mavlink.driving.world import (
     site_mission,
     until,
 )
+from tests.faults.sizes import some
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_retry_is_refused_while_the_fence_is_breached_and_the_state_shows_it(
     tmp_path: Path, profile: str
 ) -> None:

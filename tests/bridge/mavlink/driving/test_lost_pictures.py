@@ -12,6 +12,7 @@ from stopgo.mission.document import Scan
 from stopgo.mission.run.events import StateReport
 from tests.bridge.mavlink.driving.world import gateway, is_state, rover, scanned, site_mission, until
 from tests.bridge.mavlink.lossy import Lossy, Roughness
+from tests.faults.sizes import some
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -34,7 +35,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 
 
 @pytest.mark.parametrize("own", [(), (OWN,)])
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_a_lost_report_is_requested_of_the_scanner_and_no_stop_is_scanned_twice(
     tmp_path: Path, begun: list[bool], profile: str, own: tuple[VehicleFault, ...]
 ) -> None:
@@ -50,8 +51,9 @@ def test_a_lost_report_is_requested_of_the_scanner_and_no_stop_is_scanned_twice(
     assert begun == [True, True]
 
 
-@pytest.mark.parametrize("own", [(), (OWN,)])
-@pytest.mark.parametrize("stall_s", [10.0, 15.0])
+@pytest.mark.parametrize(
+    ("stall_s", "own"), some([(stall, own) for stall in (10.0, 15.0) for own in ((), (OWN,))], every=3)
+)
 def test_a_stall_of_the_link_at_a_trigger_spoils_no_later_scan(
     tmp_path: Path, begun: list[bool], own: tuple[VehicleFault, ...], stall_s: float
 ) -> None:

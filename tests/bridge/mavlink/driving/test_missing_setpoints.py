@@ -12,6 +12,7 @@ import pytest
 from stopgo.bridge.mavlink.driving.setpoints import Setpoints
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from tests.bridge.mavlink.driving.world import gateway, rover, site_mission
+from tests.faults.sizes import some
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -21,7 +22,7 @@ COASTS_S = 1.5
 PLUGINS = Path(__file__).parents[4] / "docs" / "how-to" / "plugins.md"
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_vehicle_without_setpoints_stands_by_itself(
     profile: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

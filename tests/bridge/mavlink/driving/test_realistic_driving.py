@@ -27,6 +27,7 @@ from tests.bridge.mavlink.driving.world import (
     until,
 )
 from tests.bridge.mavlink.lossy import Lossy, Roughness
+from tests.faults.sizes import some
 from tests.own_time import World, stepped_into
 
 STIFF = {"SIM_STICTION": 0.03, "SIM_LAG": 0.6, "SIM_TURN_LAG": 0.3, "SIM_POS_DRIFT": 0.01}
@@ -39,7 +40,7 @@ def world() -> Iterator[World]:
         yield stepped
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 @pytest.mark.parametrize("changed", [{}, STIFF], ids=["as the log's", "stiff"])
 def test_stops_of_5_cm_are_reached_in_twice_the_planned_time_and_on_the_legs(
     tmp_path: Path, world: World, profile: str, changed: dict[str, float]
@@ -83,7 +84,7 @@ def _beside(leg: Any, pose: Pose) -> float:
     return math.dist((pose.x, pose.y), foot(*leg, (pose.x, pose.y)))
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 @pytest.mark.parametrize(("kind", "lasts_s"), [("gap", 0.8), ("gap", 8.0), ("restart", 4.0)])
 def test_a_short_silence_and_a_restart_are_taken_up_by_itself(
     tmp_path: Path, profile: str, kind: VehicleFaultKind, lasts_s: float
@@ -97,7 +98,7 @@ def test_a_short_silence_and_a_restart_are_taken_up_by_itself(
         assert scanned(station) == ["s1", "s2"]
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_one_that_refuses_to_arm_until_its_sensors_agree_is_asked_again(tmp_path: Path, profile: str) -> None:
     """As ArduPilot did for 18 s after each start."""
     faults = VehicleFaults((VehicleFault("restart", 30, 4.0),))
@@ -192,7 +193,7 @@ def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) 
         assert "restarted and is disarmed; arm it, or start stopgo robot with --arm" in held.reason
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_a_failsafe_that_holds_the_vehicle_is_named_and_not_taken_for_somebody(
     tmp_path: Path, profile: str
 ) -> None:

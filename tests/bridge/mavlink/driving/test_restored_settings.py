@@ -26,10 +26,10 @@ from tests.bridge.mavlink.driving.world import (
     site_mission,
     until,
 )
+from tests.faults.sizes import some
 from tests.own_time import World, stepped_into
 
 OWN = VehicleOrigin(lat=SITE.lat, lon=SITE.lon, alt=SITE.alt)
-PROFILES = ["ardupilot", "px4"]
 TIMEOUTS = {"ardupilot": "GUID_TIMEOUT", "px4": "COM_OF_LOSS_T"}
 
 
@@ -39,7 +39,7 @@ def world() -> Iterator[World]:
         yield stepped
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
 def test_an_origin_that_a_restart_took_is_given_again_by_a_gateway_that_may_not_arm(
     tmp_path: Path, world: World, profile: str
 ) -> None:
@@ -104,7 +104,7 @@ def timeout_of(operator: Operator) -> float:
     return read_parameters(operator.peer, [name])[name]
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
 def test_the_autopilots_own_timeout_is_set_with_consent_and_read_back(
     tmp_path: Path, profile: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

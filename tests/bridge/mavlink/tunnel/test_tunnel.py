@@ -291,17 +291,8 @@ def test_viewers_hear_the_vehicle_and_cannot_speak_to_it(tmp_path: Path) -> None
     heard: queue.Queue[str] = queue.Queue()
     with ExitStack() as opened:
         vehicle, _ = opened.enter_context(rover(tmp_path, "ardupilot"))
-        own = (
-            "robot",
-            "--name",
-            "r1",
-            "--mavlink",
-            str(vehicle.url),
-            "--listen",
-            endpoint,
-            "--allow-commands",
-        )
-        opened.enter_context(process(*own, "--keys", str(site / "r1")))
+        own = ("robot", "--name", "r1", "--mavlink", str(vehicle.url), "--listen", endpoint)
+        opened.enter_context(process(*own, "--allow-commands", "--keys", str(site / "r1")))
 
         def link_of(name: str) -> Any:
             keys = read_keys(site / name, now=now)

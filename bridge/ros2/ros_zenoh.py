@@ -1,0 +1,196 @@
+"""Listening to a ROS 2 network over rmw_zenoh's keys, without ROS: nothing is published or called.
+
+Messages are decoded by the definitions of ROS 2 Jazzy. A topic whose definition has another hash is not read.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import zenoh
+
+from stopgo.bridge.link.clock import Clock, WallClock
+from stopgo.bridge.link.zenoh_link import COMMON
+from stopgo.bridge.ros2.ros_graph import TOKENS, RosEntity, entity_of, hash_text
+from stopgo.bridge.ros2.ros_settings import RosSettings
+from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
+from stopgo.mission.errors import InputError, RobotUnreachable
+from stopgo.mission.frames.transform import Transform
+
+ATTACHMENT = struct.Struct("<qq")
+"""Sequence number and source time in nanoseconds; a GID follows."""
+
+
+@dataclass
+class HeardTopic:
+    """Messages of one topic, counted."""
+
+    entity: RosEntity
+    count: int = 0
+    first_s: float = 0.0
+    last_s: float = 0.0
+    missed: int = 0
+    """Messages that were published and did not arrive, by their sequence numbers."""
+    refused: str = ""
+    """Why it is not read; empty if it is."""
+    wrong: str = ""
+    """The last message that could not be decoded, in words."""
+    _sequence: int | None = field(default=None, repr=False)
+
+    @property
+    def rate(self) -> float:
+        """Messages per second."""
+        lasted = self.last_s - self.first_s
+        return (self.count - 1) / lasted if self.count > 1 and lasted > 0 else 0.0
+
+    def take(self, attachment: bytes, now_s: float) -> None:
+        """Count a message that came just now; it is dated by its publisher, if that has dated it."""
+        if len(attachment) >= ATTACHMENT.size:
+            sequence, sent_ns = ATTACHMENT.unpack_from(attachment)
+            now_s = sent_ns / 1e9
+            if self._sequence is not None and sequence > self._sequence + 1:
+                self.missed += sequence - self._sequence - 1
+            self._sequence = sequence
+        self.first_s = self.first_s if self.count else now_s
+        self.count, self.last_s = self.count + 1, now_s
+
+
+class RosListener:
+    """One robot in a ROS 2 network: its topics below a namespace, and the graph of the whole domain."""
+
+    def __init__(
+        self, session: Any, domain: int, namespace: str, settings: RosSettings, clock: Clock | None = None
+    ) -> None:
+        from rosbags.serde import SerdeError
+        from rosbags.typesys import Stores, get_typestore
+
+        self._undecodable = (SerdeError, ValueError, KeyError, IndexError, struct.error)
+        self._types = get_typestore(Stores.ROS2_JAZZY)
+        self._session = session
+        self._domain = domain
+        self._clock = clock or WallClock()
+        self._lock = threading.Lock()
+        self._subscribed: list[Any] = []
+        self.entities: tuple[RosEntity, ...] = ()
+        self.telemetry = RosTelemetry(self._clock, settings.frames, settings.limits)
+        self.state: dict[str, Any] | None = None
+        """The newest state that stopgo's node has published."""
+        base = f"/{namespace.strip('/')}".rstrip("/")
+        self.wanted = {
+            f"{base}/{settings.topics.odometry}": ("nav_msgs/msg/Odometry", self._take_odometry),
+            "/tf": ("tf2_msgs/msg/TFMessage", self._take_tf),
+            "/tf_static": ("tf2_msgs/msg/TFMessage", self._take_tf_static),
+            f"{base}/{settings.topics.battery}": ("sensor_msgs/msg/BatteryState", self._take_battery),
+            f"{base}/{settings.node}/state": ("std_msgs/msg/String", self._take_state),
+        }
+        self.topics: dict[str, HeardTopic] = {}
+
+    def look(self) -> None:
+        """Read the graph, and subscribe to what is new of the robot."""
+        replies = self._session.liveliness().get(f"{TOKENS}/{self._domain}/**", timeout=2.0)
+        tokens = {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
+        found = (entity_of(token) for token in sorted(tokens))
+        self.entities = tuple(one for one in found if one is not None)
+        for one in self.entities:
+            if one.kind == "publisher" and one.name in self.wanted and one.name not in self.topics:
+                self.topics[one.name] = self._heard(one)
+
+    def _heard(self, one: RosEntity) -> HeardTopic:
+        kind, take = self.wanted[one.name]
+        topic = HeardTopic(one)
+        own = self._types.hash_rihs01(kind)
+        if one.type != kind:
+            topic.refused = f"it is of type {one.type}, not {kind}"
+        elif one.hash != own:
+            topic.refused = hash_text(kind, f"{one.hash} there", f"{own} here")
+        else:
+            self._subscribe(topic, kind, take)
+        return topic
+
+    def _subscribe(self, topic: HeardTopic, kind: str, take: Any) -> None:
+        def heard(sample: Any) -> None:
+            attachment = b"" if sample.attachment is None else bytes(sample.attachment)
+            with self._lock:
+                topic.take(attachment, self._clock.now_ns() / 1e9)
+                try:
+                    take(self._types.deserialize_cdr(bytes(sample.payload), kind))
+                except self._undecodable as error:
+                    topic.wrong = f"a message cannot be decoded ({error})"
+
+        key = topic.entity.key
+        if topic.entity.kept:
+            past = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
+            made = zenoh.ext.declare_advanced_subscriber(self._session, key, heard, history=past)
+        else:
+            made = self._session.declare_subscriber(key, heard)
+        self._subscribed.append(made)
+
+    def _take_odometry(self, message: Any) -> None:
+        speed, stamp_ns = message.twist.twist.linear, _stamp_ns(message.header.stamp)
+        behind_s = (time.time_ns() - stamp_ns) / 1e9
+        turn = float(message.twist.twist.angular.z)
+        self.telemetry.take_odometry(math.hypot(speed.x, speed.y), turn, stamp_ns=stamp_ns, behind_s=behind_s)
+
+    def _take_tf(self, message: Any, *, static: bool = False) -> None:
+        for one in message.transforms:
+            at, turn = one.transform.translation, one.transform.rotation
+            self.telemetry.take_transform(
+                one.header.frame_id,
+                one.child_frame_id,
+                Transform(x=at.x, y=at.y, heading=2 * math.atan2(turn.z, turn.w)),
+                stamp_ns=_stamp_ns(one.header.stamp),
+                static=static,
+            )
+
+    def _take_tf_static(self, message: Any) -> None:
+        self._take_tf(message, static=True)
+
+    def _take_battery(self, message: Any) -> None:
+        charge = float(message.percentage)
+        self.telemetry.charge = charge if 0.0 <= charge <= 1.0 else None
+
+    def _take_state(self, message: Any) -> None:
+        told = json.loads(message.data)
+        self.state = told if isinstance(told, dict) else None
+
+
+def _stamp_ns(stamp: Any) -> int:
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+def read_domain(text: str) -> tuple[int, str]:
+    """Read DOMAIN or DOMAIN/NAMESPACE, such as 0/r1."""
+    domain, _, namespace = text.partition("/")
+    if not domain.isdigit() or int(domain) > 232:
+        raise InputError(f"--ros2 {text}: write the domain's number, 0 to 232, or DOMAIN/NAMESPACE, as 0/r1")
+    return int(domain), namespace
+
+
+@contextmanager
+def ros_listener(
+    endpoints: Sequence[str], domain: int, namespace: str, settings: RosSettings
+) -> Iterator[RosListener]:
+    """Listen at a zenoh router, as a client, for as long as the block lasts.
+
+    Raises
+    ------
+    RobotUnreachable
+        If there is no router.
+    """
+    config = zenoh.Config()
+    for key, value in {**COMMON, "mode": "client", "connect/endpoints": list(endpoints)}.items():
+        config.insert_json5(key, json.dumps(value))
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError:
+        raise RobotUnreachable(f"{','.join(endpoints)}: no zenoh router answers there") from None
+    with session:
+        yield RosListener(session, domain, namespace, settings)

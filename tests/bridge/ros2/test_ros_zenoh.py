@@ -1,0 +1,112 @@
+"""A robot's topics over rmw_zenoh's keys, read in this process from a robot that is played here."""
+
+from __future__ import annotations
+
+import json
+import struct
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import zenoh
+from rosbags.typesys import Stores, get_typestore
+
+from stopgo.bridge.commands.ros_checks import graph_checks
+from stopgo.bridge.ros2.ros_settings import RosSettings
+from stopgo.bridge.ros2.ros_zenoh import HeardTopic, RosListener, read_domain
+from stopgo.mission.errors import InputError
+from tests.ports import free_port
+
+TYPES = get_typestore(Stores.ROS2_JAZZY)
+ODOMETRY = "nav_msgs::msg::dds_::Odometry_"
+
+
+@pytest.fixture(scope="module")
+def sessions() -> Iterator[tuple[Any, Any]]:
+    """A robot's session, and a station's."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+
+    def opened(mode: str, key: str) -> Any:
+        config = zenoh.Config()
+        for name, value in {"mode": mode, key: [endpoint], "scouting/multicast/enabled": False}.items():
+            config.insert_json5(name, json.dumps(value))
+        return zenoh.open(config)
+
+    with opened("router", "listen/endpoints") as robot, opened("client", "connect/endpoints") as station:
+        yield robot, station
+
+
+def announced(robot: Any, hash_: str, domain: int) -> Any:
+    tail = f"%r1%odom/{ODOMETRY}/{hash_}/::,10:,:,:,,"
+    return robot.liveliness().declare_token(f"@ros2_lv/{domain}/abc/0/4/MP/%/%r1/base/{tail}")
+
+
+def odometry(speed: float) -> bytes:
+    kind = TYPES.types
+    place, turn, zero = (kind[f"geometry_msgs/msg/{name}"] for name in ("Point", "Quaternion", "Vector3"))
+    header = kind["std_msgs/msg/Header"](kind["builtin_interfaces/msg/Time"](1, 0), "odom")
+    pose = kind["geometry_msgs/msg/Pose"](place(0.0, 0.0, 0.0), turn(0.0, 0.0, 0.0, 1.0))
+    twist = kind["geometry_msgs/msg/Twist"](zero(speed, 0.0, 0.0), zero(0.0, 0.0, 0.0))
+    made = kind["nav_msgs/msg/Odometry"](
+        header, "base_link", kind["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
+        kind["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
+    )  # fmt: skip
+    return bytes(TYPES.serialize_cdr(made, "nav_msgs/msg/Odometry"))
+
+
+def test_a_robots_odometry_is_decoded_and_lost_messages_are_counted(sessions: tuple[Any, Any]) -> None:
+    robot, station = sessions
+    own = TYPES.hash_rihs01("nav_msgs/msg/Odometry")
+    token = announced(robot, own, 7)
+    listener = RosListener(station, 7, "r1", RosSettings())
+    heard = threading.Event()
+    take = listener.telemetry.take_odometry
+
+    def taken(*given: Any, **named: Any) -> None:
+        take(*given, **named)
+        if listener.telemetry.speed() == 0.5:
+            heard.set()
+
+    listener.telemetry.take_odometry = taken  # type: ignore[method-assign]
+    while "/r1/odom" not in listener.topics:
+        listener.look()
+    number = 0
+    while not heard.is_set():  # until the subscription has reached the robot
+        number += 2
+        attachment = struct.pack("<qqB", number, number * 10**8, 16) + bytes(16)
+        robot.put(f"7/r1/odom/{ODOMETRY}/{own}", odometry(0.5), attachment=attachment)
+        heard.wait(0.02)
+    topic = listener.topics["/r1/odom"]
+    assert not topic.refused and not topic.wrong
+    assert listener.telemetry.clock_offset_s is not None
+    token.undeclare()
+
+
+def test_a_type_of_another_version_is_refused_naming_both(sessions: tuple[Any, Any]) -> None:
+    robot, station = sessions
+    token = announced(robot, "RIHS01_00ff", 8)
+    listener = RosListener(station, 8, "r1", RosSettings())
+    while "/r1/odom" not in listener.topics:
+        listener.look()
+    own = TYPES.hash_rihs01("nav_msgs/msg/Odometry")
+    said = f"two versions of nav_msgs/msg/Odometry: RIHS01_00ff there and {own} here"
+    assert listener.topics["/r1/odom"].refused == said
+    (check,) = (check for check in graph_checks(listener) if check.name == "/r1/odom")
+    assert not check.ok and said in check.result
+    token.undeclare()
+
+
+def test_sequence_numbers_show_what_was_missed_and_source_times_the_rate(sessions: tuple[Any, Any]) -> None:
+    topic = HeardTopic(entity=None)  # type: ignore[arg-type]
+    for number, seconds in ((1, 0.0), (2, 0.1), (5, 0.4)):
+        topic.take(struct.pack("<qq", number, round(seconds * 1e9)), now_s=0.0)
+    assert (topic.count, topic.missed, round(topic.rate, 3)) == (3, 2, 5.0)
+
+
+@pytest.mark.parametrize("text", ["", "r1", "-1", "233", "0x1"])
+def test_a_domain_is_a_number(text: str) -> None:
+    with pytest.raises(InputError, match="0 to 232"):
+        read_domain(text)
+    assert read_domain("7/fleet/r1") == (7, "fleet/r1")

@@ -1,0 +1,103 @@
+"""The site at a real socket: over TLS, with keys, and what it refuses there."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import ssl
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stopgo.bridge.link.authority import init_site, issue
+from stopgo.bridge.link.keys import now_utc
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.site.request_checks import KEY_HEADER
+from stopgo.site.server_certificate import own_certificate
+from stopgo.site.web_server import SiteOptions, _certificates, serving_site
+from tests.ports import free_port
+
+STOP = {"id": "s1"}
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    (tmp_path / "site").mkdir()
+
+
+class Browser:
+    """Requests of a page to a served site."""
+
+    def __init__(self, connection: http.client.HTTPConnection, address: str) -> None:
+        self._connection = connection
+        self._origin, _, token = address.partition("/#token=")
+        self._more: dict[str, str] = {}
+        answer, body = self.send("POST", "/api/session", {"token": token})
+        self.cookie = answer.getheader("Set-Cookie") or ""
+        self._more = {"Cookie": self.cookie.partition(";")[0], KEY_HEADER: body["key"]}
+
+    def send(self, method: str, path: str, body: Any = None) -> tuple[http.client.HTTPResponse, Any]:
+        sent = None if body is None else json.dumps(body)
+        about = {"Content-Type": "application/json", "Origin": self._origin, **self._more}
+        self._connection.request(method, path, sent, about)
+        answer = self._connection.getresponse()
+        return answer, json.loads(answer.read())
+
+
+def quiet(line: str) -> None:
+    """Take what is for the terminal."""
+
+
+@pytest.fixture
+def tls_site(tmp_path: Path) -> Iterator[tuple[int, str, Path]]:
+    """A site with a given certificate: its port, address and certificate."""
+    made, port = own_certificate(tmp_path / "certificate", "127.0.0.1"), free_port()
+    options = SiteOptions(
+        tmp_path / "site", "", port=port, certificate=made.certificate, certificate_key=made.key
+    )
+    with serving_site(options, say=quiet, link=Switchboard().link()) as address:
+        yield port, address, made.certificate
+
+
+def test_the_page_over_tls(tls_site: tuple[int, str, Path]) -> None:
+    port, address, certificate = tls_site
+    assert address.startswith(f"https://127.0.0.1:{port}/#token=")
+    context = ssl.create_default_context(cafile=str(certificate))
+    browser = Browser(http.client.HTTPSConnection("127.0.0.1", port, context=context), address)
+    assert {"Secure", "HttpOnly"} <= {word.strip() for word in browser.cookie.split(";")}
+    assert browser.send("POST", "/api/stop", STOP)[0].status == 200
+    with pytest.raises(ssl.SSLCertVerificationError):
+        http.client.HTTPSConnection("127.0.0.1", port, context=ssl.create_default_context()).connect()
+
+
+def test_nothing_is_served_in_the_clear_where_tls_is(tls_site: tuple[int, str, Path]) -> None:
+    port, _, _ = tls_site
+    with socket.create_connection(("127.0.0.1", port)) as plain:
+        plain.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert b"<html" not in plain.recv(4096)
+
+
+def test_beyond_this_machine_there_is_no_page_without_tls(tmp_path: Path) -> None:
+    """Every other address gets a certificate of its own, if none is given."""
+    said: list[str] = []
+    for listen in ("192.0.2.5", "2001:db8::1"):
+        assert _certificates(SiteOptions(tmp_path, "", listen=listen), said.append) is not None
+    assert _certificates(SiteOptions(tmp_path, ""), said.append) is None
+    assert len(said) == 2 and "SHA-256" in said[0]
+
+
+@pytest.mark.parametrize(("role", "may"), [("viewer", False), ("station", True)])
+def test_who_may_order_follows_the_keys(tmp_path: Path, role: Any, may: bool) -> None:
+    init_site(tmp_path / "keys", now=now_utc())
+    issue(tmp_path / "keys", role, "vera", now=now_utc())
+    port = free_port()
+    options = SiteOptions(tmp_path / "site", "", port=port, keys=tmp_path / "keys" / "vera")
+    with serving_site(options, say=quiet, link=Switchboard().link()) as address:
+        browser = Browser(http.client.HTTPConnection("127.0.0.1", port), address)
+        _, me = browser.send("GET", "/api/me")
+        assert (me["role"], me["commander"]) == ("operator" if may else "viewer", "vera")
+        assert browser.send("POST", "/api/stop", STOP)[0].status == (200 if may else 409)
