@@ -17,6 +17,7 @@ from hypothesis import settings
 from stopgo.mission.console import running_step
 from tests.faults.sizes import FULL, size
 from tests.shell import forget_the_shell
+from tests.workers import file_of
 
 # The same examples every time, and no deadline on a shared machine.
 settings.register_profile(
@@ -83,16 +84,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     The folders that wait are taken from the last one: their longest files are there, and none may end alone.
     """
-    kinds: tuple[list[Path], list[Path]] = [], []
-    for path in dict.fromkeys(item.path for item in items):
-        kinds[not WAITING.isdisjoint(path.parents)].append(path)
+    kinds: tuple[list[object], list[object]] = [], []
+    for file, path in {file_of(item): item.path for item in items}.items():
+        kinds[not WAITING.isdisjoint(path.parents)].append(file)
     computing, waiting = kinds
     place = {
-        path: (number + 0.5) / len(kind)
+        file: (number + 0.5) / len(kind)
         for kind in (computing, waiting[::-1])
-        for number, path in enumerate(kind)
+        for number, file in enumerate(kind)
     }
-    items.sort(key=lambda item: (place[item.path], item.path))
+    items.sort(key=lambda item: (place[file_of(item)], item.path))
 
 
 @pytest.fixture

@@ -10,6 +10,8 @@ import pytest
 from benchmarks import ages
 from benchmarks.ages import Section, digest, marked, sections, stamp
 
+pytestmark = pytest.mark.together("sources")
+
 BLOCKS = """
 ## Growth
 

@@ -11,6 +11,8 @@ import pytest
 
 from tests.test_house import MODULES, tree_of
 
+pytestmark = pytest.mark.together("sources")
+
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md")])
 GUIDES = [ROOT / "README.md", ROOT / "SECURITY.md", *sorted(ROOT.glob("docs/**/*.md"))]

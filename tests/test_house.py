@@ -13,6 +13,8 @@ import pytest
 
 from stopgo.command_line import COMMANDS, front_door, main
 
+pytestmark = pytest.mark.together("sources")
+
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("mission", "planner", "bridge", "recordings")
 FRONT_DOOR = "stopgo.command_line"

@@ -7,7 +7,11 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 
+import pytest
+
 from tests.test_house import MODULES, tree_of
+
+pytestmark = pytest.mark.together("sources")
 
 REASONS = {
     "stopgo": "`import stopgo` loads nothing but itself",

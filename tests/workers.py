@@ -61,7 +61,7 @@ class _Workers:
 
     def __init__(self, session: pytest.Session) -> None:
         self.session = session
-        numbered = groupby(enumerate(session.items), key=lambda numbered: numbered[1].path)
+        numbered = groupby(enumerate(session.items), key=lambda numbered: file_of(numbered[1]))
         self.files = [[number for number, _ in group] for _, group in numbered]
         here = [any(map(self._needs_threads, file)) for file in self.files]
         self.own = [
@@ -168,6 +168,12 @@ class _Workers:
         )
         self.session.config.hook.pytest_runtest_logreport(report=report)
         self._listen(self._start(number, left[1:]))
+
+
+def file_of(item: pytest.Item) -> object:
+    """The item's file, or the name of files that have parsed the same sources for their tests."""
+    together = item.get_closest_marker("together")
+    return together.args if together else item.path
 
 
 class _Teller:

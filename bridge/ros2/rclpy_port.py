@@ -338,6 +338,14 @@ def with_parameters(node: Any, settings: RosSettings) -> RosSettings:
     return changed_settings(settings, changes)
 
 
+def _spin(executor: Any, telemetry: RosTelemetry) -> None:
+    """Run the node's callbacks; an error ends that, and the telemetry says so: the robot is then held."""
+    try:
+        executor.spin()
+    except Exception as error:  # noqa: BLE001 (the thread ends here)
+        telemetry.fault = f"{type(error).__name__}: {error}"
+
+
 @contextmanager
 def open_rclpy(settings: RosSettings, clock: Clock, *, ros_args: Sequence[str] = ()) -> Iterator[RclpyPort]:
     """Run a node for as long as the block lasts; `ros_args` are those after --ros-args."""
@@ -355,8 +363,7 @@ def open_rclpy(settings: RosSettings, clock: Clock, *, ros_args: Sequence[str] =
     executor.add_node(node)
     try:
         port = RclpyPort(node, settings, telemetry, clock)
-        thread = threading.Thread(target=executor.spin, name="ros2", daemon=True)
-        thread.start()
+        threading.Thread(target=_spin, args=(executor, telemetry), name="ros2", daemon=True).start()
         yield port
     finally:
         executor.shutdown(timeout_sec=2.0)

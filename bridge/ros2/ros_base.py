@@ -71,6 +71,11 @@ class RosBase:
         return ""
 
     def not_ready(self) -> str:
+        """Return why the robot must not drive. Commands ask this: who gives one has seen a jump before it."""
+        self._telemetry.jump = None
+        return self._why_not_ready()
+
+    def _why_not_ready(self) -> str:
         return self._telemetry.silence() or self._telemetry.unusable() or self._cannot_drive()
 
     def _cannot_drive(self) -> str:
@@ -110,7 +115,7 @@ class RosBase:
                 raise RosDriveEnded("interrupted")
             if self._clock.now_ns() > gone_ns:
                 raise RosDriveEnded("blocked", why)
-        why = self._jumped() or self.not_ready() or self._off_route()
+        why = self._jumped() or self._why_not_ready() or self._off_route()
         if why:
             raise RosDriveEnded("blocked", why)
 

@@ -71,6 +71,8 @@ class RosTelemetry:
         self._last = Pose(x=0.0, y=0.0, heading=0.0)
         self.jump: PoseJump | None = None
         """The newest jump; whoever has reacted to it sets it to `None`."""
+        self.fault = ""
+        """Error that has ended the thread which brings the samples."""
         self.clock_offset_s: float | None = None
         """Seconds by which the odometry's stamps are behind this computer's time."""
         self.charge: float | None = None
@@ -154,6 +156,8 @@ class RosTelemetry:
 
     def silence(self) -> str:
         """Return what does not arrive at present, in words; empty if everything does."""
+        if self.fault:
+            return f"the ROS 2 node has failed ({self.fault}); restart stopgo robot"
         with self._lock:
             return self._tf_silence() or self._odometry_silence()
 

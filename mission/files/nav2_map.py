@@ -108,7 +108,7 @@ class _Drawing:
         for hole in shape.holes:
             pen.polygon(self._pixels(hole), fill=hole_grey, outline=hole_grey)
 
-    def _pixels(self, points: FloatArray) -> list[tuple[float, float]]:
-        """Return points as columns and rows of pixels."""
-        at = (points - self.low) / self.resolution - 0.5
-        return [(float(column), float(self.size[1] - 1 - row)) for column, row in at]
+    def _pixels(self, points: FloatArray) -> list[tuple[int, int]]:
+        """Return columns and rows of the pixels in which points lie."""
+        at = np.floor((points - self.low) / self.resolution).astype(int)
+        return [(int(column), int(self.size[1] - 1 - row)) for column, row in at]

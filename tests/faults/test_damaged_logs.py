@@ -78,8 +78,8 @@ DAMAGES: tuple[Damage, ...] = (
 
 
 def numbers_for(case: int) -> range:
-    """Numbers of the damages of a case: in the short form the even kinds or the odd ones, by turns."""
-    return range(PLACES) if FULL else range(case % 2, len(DAMAGES), 2)
+    """Numbers of the damages of a case: in the short form every fourth kind, by turns."""
+    return range(PLACES) if FULL else range(case % 4, len(DAMAGES), 4)
 
 
 def damaged(path: Path, target: Path, number: int) -> Path:

@@ -8,7 +8,7 @@ import pytest
 
 from stopgo.bridge.ros2.ros_settings import FrameNames, RosSettings
 from stopgo.mission.document import Mission
-from stopgo.mission.frames.transform import Transform
+from stopgo.mission.frames.transform import SAME, Transform
 from stopgo.mission.run.events import Arrived, Scanned
 from tests.bridge.ros2.world import TICK_S, Killed, RosField, World
 from tests.bridge.world import corridor
@@ -98,6 +98,26 @@ def test_what_goes_wrong_in_a_drive_stops_the_robot_and_is_reported(
     run = field.controller.run
     assert run.state == "HELD"
     assert words in run.reason
+    assert field.world.speed == 0.0
+
+
+def test_a_robot_that_was_localised_again_by_hand_goes_on_with_the_next_command() -> None:
+    field = started(RosField())
+    field.world.later(2.0, lambda: setattr(field.world, "correction", Transform(x=0.0, y=5.0, heading=0.0)))
+    field.work()
+    assert "jumped by 5.00 m" in field.controller.run.reason
+    field.world.correction = SAME
+    field.clock.wait(1.0)
+    assert field.order("retry").outcome == "ok"
+    field.work()
+    assert field.controller.run.state == "FINISHED"
+
+
+def test_a_node_that_fails_holds_the_robot() -> None:
+    field = started(RosField())
+    field.world.later(2.0, lambda: setattr(field.world.telemetry, "fault", "RCLError: context"))
+    field.work()
+    assert "the ROS 2 node has failed (RCLError: context)" in field.controller.run.reason
     assert field.world.speed == 0.0
 
 

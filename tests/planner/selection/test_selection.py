@@ -79,7 +79,7 @@ def check_rows(cover: Cover, rows: np.ndarray) -> None:
 
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
-    for seed, cover, optimum in small_covers(range(size(short=3, full=300))):
+    for seed, cover, optimum in small_covers(range(size(short=2, full=300))):
         rows, bound = METHODS[name](cover, Settings())
         check_rows(cover, rows)
         assert counting_bound(cover) <= bound <= optimum <= len(rows) <= len(greedy(cover)), seed

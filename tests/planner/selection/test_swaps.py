@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 from stopgo.planner.selection import swaps
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.swaps import SwapBoard
+from tests.faults.sizes import size
 
 
 def _cover(seed: int, *, rows: int = 24, columns: int = 70, rooms: int = 5, views: int = 1) -> Cover:
@@ -39,7 +40,7 @@ def _by_trial(cover: Cover, rows: list[int], blocked: list[int], weight: np.ndar
 
 
 @pytest.mark.parametrize("views", [1, 3])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(size(short=2, full=6)))
 def test_after_every_swap_the_next_best_one_is_found(
     seed: int, views: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,6 +11,7 @@ import pytest
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.floors.ifc.georeference import georeference_of
 from stopgo.planner.floors.ifc.model import OnEarth
+from tests.faults.sizes import FULL
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import two_rooms
 
@@ -132,7 +133,7 @@ def test_a_model_hands_its_position_to_the_floor(read: Read) -> None:
     assert (found.lat, found.lon) == pytest.approx((49.1, 8.4))
 
 
-@pytest.mark.skipif(not DATA.exists(), reason="../shared/data is not there")
+@pytest.mark.skipif(not (FULL and DATA.exists()), reason="the long form, with ../shared/data")
 def test_the_real_duplex_is_read_as_by_hand(models: Path) -> None:
     floor = read_floor(DATA / "duplex.ifc", FloorOptions(storey="Level 1"))
     expected = georeference_of(DUPLEX, level=0.0)[0]

@@ -11,6 +11,7 @@ from stopgo.mission.errors import InputError
 from stopgo.planner.geometry.shapes import GRID, to_grid
 from stopgo.planner.visibility.sight.kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
 from stopgo.planner.visibility.sight.sight import scene_of, sight
+from tests.faults.sizes import size
 from tests.planner.kernels import machine_code
 from tests.planner.long_walls import RANGES, told
 from tests.planner.visibility.sight.test_sight import World
@@ -22,9 +23,11 @@ COORDINATE = 2**29
 def test_long_walls_are_seen_as_far_as_the_range_and_no_farther(
     reach: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = [told(seed, reach=reach, places=15, monkeypatch=monkeypatch) for seed in range(4)]
+    found = [
+        told(seed, reach=reach, places=15, monkeypatch=monkeypatch) for seed in range(size(short=2, full=4))
+    ]
     pairs, *wrong = np.sum(found, axis=0)
-    assert pairs > 5000
+    assert pairs > size(short=2500, full=5000)
     assert wrong == [0, 0]
 
 
