@@ -12,7 +12,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import PurePosixPath
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 from starlette.applications import Starlette
@@ -212,8 +212,3 @@ class LivePages:
 
 async def _all(begun: list[Future[OrderRecord]]) -> list[OrderRecord]:
     return list(await asyncio.gather(*(asyncio.wrap_future(one) for one in begun)))
-
-
-def json_answer(value: Any) -> Response:
-    """Return a value as JSON."""
-    return JSONResponse(value)
