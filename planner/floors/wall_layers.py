@@ -221,7 +221,7 @@ def _trial(
 
 
 def _asked(tried: WallLayers, error: UnitAsked) -> WallLayers:
-    """A trial in the most probable unit, which is asked for if there is a floor in it."""
+    """A trial in the most probable unit; if it gives a floor, the user must name the unit."""
     if tried.refusal:
         return tried
     refusal = str(error).partition(": ")[2]
