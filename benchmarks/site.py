@@ -158,9 +158,8 @@ def run_table() -> str:
     with tempfile.TemporaryDirectory() as place, browser() as chromium:
         folder, port, page = Path(place), free_port(), ("--port", str(free_port()))
         mission, endpoint = corridor(stops=LONG_STOPS, scan=LONG_SCAN), f"tcp/127.0.0.1:{port}"
-        with robot_process(
-            folder, port, mission, "--speed-up", str(LONG_SPEED_UP), "--endurance", "0"
-        ) as robot:
+        fast = ("--speed-up", str(LONG_SPEED_UP), "--endurance", "0")
+        with robot_process(folder, port, mission, *fast) as robot:
             with site_process(folder, endpoint, *page) as (_, address):
                 awake = chromium.tab(address)
                 awake.until("document.querySelector('.card .state')?.textContent === 'ready'")
@@ -261,8 +260,7 @@ def load_table() -> str:
 
 def report(link: Any, number: int, hertz: float, stopped: threading.Event, answered: list[float]) -> None:
     """Be a robot that stands, reports, and answers."""
-    keys, boot = KeyExpressions(f"r{number:02}"), "b1"
-    seq = 0
+    keys, boot, seq = KeyExpressions(f"r{number:02}"), "b1", 0
 
     def state() -> StateReport:
         nonlocal seq

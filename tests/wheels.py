@@ -33,6 +33,7 @@ EXTRAS: dict[str, Sequence[tuple[int, str, tuple[str, ...]]]] = {
         (0, "stopgo", ("--help",)),
         (2, 'pip install "stopgo[plan]"', PLAN),
         (0, "valid", ("check", "mission.json")),
+        (2, 'pip install "stopgo[site]"', ("site", "nowhere")),
     ),
     "plan": (
         (0, "mission.json", PLAN),
@@ -41,6 +42,7 @@ EXTRAS: dict[str, Sequence[tuple[int, str, tuple[str, ...]]]] = {
     ),
     "prove": ((0, "mission.json", PLAN), (0, "promise is met", PROVE)),
     "record": ((2, 'pip install "stopgo[plan]"', PLAN), (2, "none.rrd", ("review", "none.rrd"))),
+    "site": ((0, "plan.rrd", PLAN), (2, "nowhere: not a folder", ("site", "nowhere"))),
     "all": ((0, "plan.rrd", PLAN), (0, "FINISHED", FINISHED)),
 }
 """For each extra: the exit code, a word that is printed, and the command."""
@@ -63,7 +65,7 @@ def main(pythons: Sequence[str]) -> int:
     return len(bad)
 
 
-PLANS = ("plan", "prove", "all")
+PLANS = ("plan", "prove", "site", "all")
 """Extras that get the wheel with compiled kernels, where it is of the environment's Python."""
 
 
@@ -100,7 +102,7 @@ def built(folder: Path) -> tuple[Path, Path]:
     ]
     top = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
     assert top == {"stopgo"}, top
-    for needed in (*REFERENCE, "recordings/samples/office.dxf", *TYPED):
+    for needed in (*REFERENCE, "recordings/samples/office.dxf", *PAGES, *TYPED):
         assert f"stopgo/{needed}" in names, needed
     print(f"{archive.name}: {len(held)} files; {wheel.name}: {len(names)} files", flush=True)
     return wheel, pure
@@ -110,6 +112,7 @@ REFERENCE = (
     "mission/mission.schema.json", "mission/canonical.vectors.json",
     "bridge/link/protocol.schema.json", "bridge/link/seal.vectors.json",
 )  # fmt: skip
+PAGES = tuple(f"site/pages/{path.name}" for path in (ROOT / "stopgo" / "site" / "pages").iterdir())
 TYPED = tuple(f"{name}/py.typed" for name in ("mission", "planner", "bridge", "recordings"))
 
 

@@ -9,6 +9,8 @@ import shapely
 
 from stopgo.mission.geometry import FloatArray
 
+_ASIDE = (1.7e-6, 2.9e-6)
+
 
 @dataclass(frozen=True, eq=False)
 class StandingBody:
@@ -24,8 +26,12 @@ class StandingBody:
     """Height in the middle of the robot, metres."""
 
     def encloses(self, x: float, y: float) -> bool:
-        """True if the point at the robot's middle lies in the body: a ray upwards leaves it."""
-        a, b, c = (self.triangles[:, corner] - (x, y, self.height) for corner in range(3))
+        """True if the point at the robot's middle lies in the body: a ray upwards leaves it.
+
+        The ray is moved by micrometres, so that it meets no edge of two triangles: it would count neither.
+        """
+        at = (x + _ASIDE[0], y + _ASIDE[1], self.height)
+        a, b, c = (self.triangles[:, corner] - at for corner in range(3))
         ab, bc, ca = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a)))
         met = ((ab > 0) & (bc > 0) & (ca > 0)) | ((ab < 0) & (bc < 0) & (ca < 0))
         area = np.where(met, ab + bc + ca, 1.0)

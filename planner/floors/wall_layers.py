@@ -209,13 +209,25 @@ def _trial(
         sheet = labelled(sheet_of(drawing, with_layers(options, found), source=source))
         made = derive(sheet)
     except UnitAsked as error:
-        return replace(found, refusal=str(error).partition(": ")[2], units=error.choices)
+        unit = error.choices[0][0].split()[-1]
+        tried = _trial(drawing, replace(options, units=unit), names, derive, source)
+        return _asked(tried, error)
     except InputError as error:
         return replace(found, refusal=str(error).partition(": ")[2])
     area = sum(room.area for room in made.shown.rooms)
     if not _FLOOR_M2[0] <= area <= _FLOOR_M2[1]:
         return replace(found, refusal=f"the walls on {', '.join(names)} enclose {area:.3g} m²", area=area)
     return replace(_weighed(found, made, sheet.words), area=area, sheet=sheet)
+
+
+def _asked(tried: WallLayers, error: UnitAsked) -> WallLayers:
+    """A trial in the most probable unit; if it gives a floor, the user must name the unit."""
+    if tried.refusal:
+        return tried
+    refusal = str(error).partition(": ")[2]
+    return replace(
+        tried, weight=min(tried.weight, ENOUGH - 1), refusal=refusal, units=error.choices, sheet=None
+    )
 
 
 def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLayers:

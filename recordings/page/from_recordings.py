@@ -54,6 +54,7 @@ def subject_of(review: Review) -> ReportSubject:
             if both is None and (lines := what_next(run, item.recording.path))
         },
         together=() if both is None else (*both.sentences, *review.next_together(ids[0])),
+        rooms_together=() if both is None else both.rooms,
         problems=tuple(f"{item.recording.path.name}: {text}" for item in items for text in item.problems),
     )
 

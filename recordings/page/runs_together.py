@@ -14,7 +14,7 @@ from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.acquiring import acquired_together, scanned_positions
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.run_verdict import judge, named
-from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.figures import CoveragePair, percent
 from stopgo.mission.stages.sight import Sight
 
 FIRST_DATE_NS, LAST_DATE_NS = 10**18, 4 * 10**18
@@ -58,6 +58,11 @@ class RunsTogether:
         return tuple(stop.id for stop in newest.stops if (stop.x, stop.y) not in done)
 
     @property
+    def rooms(self) -> tuple[CoveragePair, ...]:
+        """Rooms as planned and as acquired by all runs; empty without visibility data."""
+        return () if self.acquired is None else self.acquired.rooms
+
+    @property
     def verdicts(self) -> tuple[str, ...]:
         """Name and verdict of each run, one line each."""
         names = run_names(self.runs)
@@ -96,6 +101,7 @@ class RunsTogether:
             "required": None if acquired is None else acquired.coverage.whole.required,
             "answer": "unknown" if acquired is None else acquired.answer,
             "left": list(self.left),
+            "rooms": [{"name": group.name, "acquired": group.coverage} for _, group in self.rooms],
         }
 
 

@@ -300,7 +300,9 @@ def _runs_compared(subject: ReportSubject) -> str:
         section("All runs together", tag("ul", *lines) if lines else "")
         + section("Runs", tag("div", grid(header, rows), class_="scroll"))
         + section("Stops of every run", tag("div", grid(header, cells), class_="scroll"))
-        + section("Rooms of every run", tag("div", _rooms_of(runs, header), class_="scroll"))
+        + section(
+            "Rooms of every run", tag("div", _rooms_of(runs, header, subject.rooms_together), class_="scroll")
+        )
     )
 
 
@@ -312,16 +314,21 @@ def _outcome(item: StopComparison | None) -> str:
     return shown(item.outcome) + late + away
 
 
-def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
-    """Return rooms in the plan's order; runs with unknown coverage have empty cells."""
+def _rooms_of(runs: Sequence[Comparison], header: list[str], both: Sequence[CoveragePair]) -> str:
+    """Return rooms in the plan's order, last of all runs together; unknown coverage is an empty cell."""
     known = [run.acquired for run in runs]
     first = next((item for item in known if item is not None), None)
     if first is None:
         return ""
     names = [group.name for group in first.sight.totals.rooms_seen(first.seen)]
     columns = [[] if item is None else item.sight.totals.rooms_seen(item.seen) for item in known]
-    return grid(header, [
-        row([shown(name), *(percent(column[k].coverage) if k < len(column) else "" for column in columns)])
+    union = {group.name: percent(group.coverage) for _, group in both}
+    return grid([*header, *(["together"] if union else [])], [
+        row([
+            shown(name),
+            *(percent(column[k].coverage) if k < len(column) else "" for column in columns),
+            *([tag("b", union.get(name, ""))] if union else []),
+        ])
         for k, name in enumerate(names)
     ])  # fmt: skip
 

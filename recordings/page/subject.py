@@ -9,6 +9,7 @@ from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.run_verdict import Judgement, judge
 from stopgo.mission.document import Mission
 from stopgo.mission.run.run_log import LogSource
+from stopgo.mission.stages.figures import CoveragePair
 from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.mission.stages.sight import Sight
 from stopgo.mission.stages.stop_reasons import StopReason
@@ -44,6 +45,8 @@ class ReportSubject:
 
     together: tuple[str, ...] = ()
     """Coverage that several runs acquired together, what is left, and what to do next."""
+    rooms_together: tuple[CoveragePair, ...] = ()
+    """Rooms as planned and as all runs acquired them together; empty without visibility data."""
 
     def judgement(self, run: Comparison) -> Judgement:
         """Return the verdict on a run, with its reasons."""

@@ -75,7 +75,7 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
     for why in dict.fromkeys(one.why for one in evidence if one.answer == "unknown"):
         stops = [one.item.stop for one in evidence if one.why == why]
         yield f"{named(stops)} {'are' if len(stops) > 1 else 'is'} undecided: {why}."
-    yield from _against(replay, [one.item for one in evidence if one.answer == "no"])
+    yield from _against(replay, [one for one in evidence if one.answer == "no"])
     yield from (f"{line}." for line in apart)
     yield from _floor_sentences(replay)
     if replay.extra:
@@ -89,17 +89,18 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
         yield f"The log is damaged; this is the result of the readable part: {replay.log.lost}."
 
 
-def _against(replay: Replay, against: Sequence[StopComparison]) -> Iterator[str]:
+def _against(replay: Replay, against: Sequence[StopEvidence]) -> Iterator[str]:
     """Yield what is known against stops."""
-    absent = [item.stop for item in against if item.outcome in DONE and item.deviation_m is None]
+    absent = [one.item.stop for one in against if not one.is_placed]
     if absent:
         yield f"{WORDS['skipped']} {named(absent)}."
     for outcome, words in WORDS.items():
-        stops = [item.stop for item in against if item.outcome == outcome]
+        stops = [one.item.stop for one in against if one.item.outcome == outcome]
         if stops:
             yield f"{words if replay.inferred else WORDS_OF_EVENTS.get(outcome, words)} {named(stops)}."
-    for item in against:
-        if item.outside_text:
+    for one in against:
+        item = one.item
+        if one.is_placed and item.outside_text:
             far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
             yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
 

@@ -132,7 +132,10 @@ def _with_standstills(
 def _at_standstill(
     event: Unconfirmed, stop: Stop, standstills: Sequence[Standstill], after_ns: int, settled: Settled | None
 ) -> Unconfirmed:
-    """Return the event with the last standstill at the stop since a time, else with the settled pose."""
+    """Return the event with the last standstill at the stop since a time, else with the settled pose.
+
+    That of the arrival is no evidence: the vehicle still braked.
+    """
     found = [
         item
         for item in standstills
@@ -141,7 +144,7 @@ def _at_standstill(
     ]
     if not found:
         own = settled is not None and settled.stop == event.stop
-        return changed(event, pose=settled.pose) if settled is not None and own else event
+        return changed(event, pose=settled.pose if settled is not None and own else None)
     pose = Pose(x=found[-1].x, y=found[-1].y, heading=found[-1].heading)
     reason = f"{event.reason}; stationary {found[-1].seconds:.1f} s"
     return changed(event, pose=pose, reason=reason)

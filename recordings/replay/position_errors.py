@@ -27,6 +27,8 @@ NEIGHBOURS = 4
 """Number of visits around a stop whose common offset is its uncertainty."""
 COHERENT = 0.5
 """Fraction of the offsets below which their neighbours must predict them, for a frame tied to the site."""
+MEDIAN = 1.2
+"""Root mean square of normal errors in the plane, as a multiple of their median."""
 SIGMAS, STILL_M, LEAST_MEANS = 2.0, 0.1, 4
 """Standard deviations of noise; distance across a gap up to which the robot stood in it; least for a mean."""
 STEP_M = 0.01
@@ -144,7 +146,7 @@ def _with_noise(errors: PositionErrors, replay: Replay) -> PositionErrors:
     That is the uncertainty of the mean of its seconds, or of a few poses with the noise of all standstills.
     """
     spread, moved, few = np.zeros(len(replay.mission.stops)), np.zeros(len(replay.mission.stops)), {}
-    squares = freedom = 0.0
+    noises: list[FloatArray] = []
     for k, match in visits_of(replay):
         standstill = match.standstill
         moved[k] = standstill.moved_m if replay.inferred else 0.0
@@ -155,18 +157,23 @@ def _with_noise(errors: PositionErrors, replay: Replay) -> PositionErrors:
         if len(poses) < 2:
             few[k] = 1
             continue
-        off = poses.xy - poses.xy.mean(axis=0)
+        off = poses.xy - standstill.xy
         means = [off[group].mean(axis=0) for group in _groups(((poses.ns - poses.ns[0]) // 10**9).tolist())]
-        squares, freedom = squares + float((off**2).sum()), freedom + len(off) - 1
-        spread[k] = SIGMAS * float(np.sqrt((np.array(means) ** 2).sum())) / len(means)
+        noises.append(np.hypot(*off.T) * (len(off) / (len(off) - 1)) ** 0.5)
+        spread[k] = SIGMAS * _deviation(np.hypot(*np.array(means).T)) / len(means) ** 0.5
         if len(means) < LEAST_MEANS:
             few[k] = len(poses)
-    noise_m = float(np.sqrt(squares / freedom)) if freedom else 0.0
+    noise_m = _deviation(np.concatenate(noises)) if noises else 0.0
     for k, count in few.items():
         spread[k] = max(spread[k], SIGMAS * noise_m / count**0.5)
     if replay.placed.by_earth:
         spread += STEP_M
     return replace(errors, spread_m=spread, moved_m=moved, noise_m=noise_m)
+
+
+def _deviation(away: FloatArray) -> float:
+    """Return the standard deviation of distances (n,) in the plane, by their median, without jumps."""
+    return MEDIAN * float(np.median(away))
 
 
 def _groups(values: list[int]) -> list[IntArray]:

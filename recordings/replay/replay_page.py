@@ -9,7 +9,7 @@ from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import Review, sights_of
-from stopgo.recordings.page.runs_together import together
+from stopgo.recordings.page.runs_together import RunsTogether, together
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.replay.drive_verdict import drive_verdict, missing, outside
 from stopgo.recordings.replay.path_and_time import lost_times, smoothed_track
@@ -35,7 +35,7 @@ def page_of(replays: Sequence[Replay], plans: Review | None = None) -> ReportSub
     InputError
         When the plans are of another mission.
     """
-    missions = (replays[0].mission,)
+    missions, both = (replays[0].mission,), _together(replays, plans)
     plan = ReportSubject(missions) if plans is None else subject_of(plans)
     return replace(
         plan,
@@ -49,18 +49,19 @@ def page_of(replays: Sequence[Replay], plans: Review | None = None) -> ReportSub
         sight=None
         if any(one.inferred for one in replays)
         else plan.sight,  # else walls would be drawn as scanned
-        together=_together(replays, plans),
+        together=() if both is None else both.sentences,
+        rooms_together=() if both is None else both.rooms,
         judgements={item.run.run_id: drive_verdict(item) for item in replays},
         more={item.run.run_id: tuple(run_texts(item)) for item in replays},
     )
 
 
-def _together(replays: Sequence[Replay], plans: Review | None) -> tuple[str, ...]:
+def _together(replays: Sequence[Replay], plans: Review | None) -> RunsTogether | None:
     """Return what several replays acquired together, if their logs contain scans."""
     if plans is None or len(replays) < 2 or any(one.inferred for one in replays):
-        return ()
+        return None
     sights = sights_of(item.recording for item in plans.recordings)
-    return together([one.comparison for one in replays], sights).sentences
+    return together([one.comparison for one in replays], sights)
 
 
 def _shown(replay: Replay) -> Comparison:

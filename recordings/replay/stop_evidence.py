@@ -18,7 +18,7 @@ from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.comparing.evidence import missing_events
 from stopgo.mission.document import Point
-from stopgo.mission.run.events import JUMPED_OVER, Aborted, AnyEvent, Finished, Settled
+from stopgo.mission.run.events import JUMPED_OVER, Aborted, AnyEvent, Finished, Settled, Unconfirmed
 from stopgo.mission.run.tolerance import is_outside
 from stopgo.recordings.logs.telemetry_log import FORMAT
 from stopgo.recordings.replay.fit_error import fit_error_m
@@ -44,6 +44,8 @@ class StopEvidence:
     why: str = ""
     unsure_m: float | None = None
     """Uncertainty of its position error; infinite where nothing limits it, None without a position."""
+    is_placed: bool = True
+    """True if the log has a pose of a standstill there, or the stop was not visited."""
 
 
 def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
@@ -55,7 +57,8 @@ def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
         evidence = _with_jump(_evidence(replay, k, item, errors), jump_m)
         common_m = float(errors.unsure_m[k] + fit_m[k])
         one = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
-        unsure_m = None if item.deviation_m is None else common_m + jump_m + float(errors.spread_m[k])
+        placed = one.is_placed and item.deviation_m is not None
+        unsure_m = None if not placed else common_m + jump_m + float(errors.spread_m[k])
         found.append(changed(one, unsure_m=unsure_m))
     return tuple(found)
 
@@ -71,8 +74,13 @@ def _with_jump(evidence: StopEvidence, jump_m: float) -> StopEvidence:
 
 
 def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: bool) -> StopEvidence:
-    """Return a yes as undecided if the common error of placing may exceed the tolerance."""
+    """Return a yes as undecided if the common error of placing may exceed the tolerance.
+
+    Without headings nothing limits that error, and a no is undecided too.
+    """
     item = evidence.item
+    if math.isinf(unsure_m) and not headings:
+        return StopEvidence(item, "unknown", NO_HEADINGS)
     if evidence.answer != "yes" or not is_outside(
         (item.deviation_m or 0.0) + unsure_m, item.tolerance_m or 0.0
     ):
@@ -88,16 +96,20 @@ FIT = (
 
 
 def _evidence(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
-    if item.outcome in DONE and item.deviation_m is not None:
+    if item.outcome in DONE and _is_placed(replay, item):
         return _of_visit(replay, number, item, errors)
     if item.outcome in DONE:
         seen = len(replay.run.poses) and not _why_unseen(replay, number, errors)
-        why = "" if seen else NO_POSE
-    elif replay.inferred:
-        why = _why_unseen(replay, number, errors)
-    else:
-        why = _why_not_the_end(replay, number, item)
+        return StopEvidence(item, "no" if seen else "unknown", "" if seen else NO_POSE, is_placed=False)
+    why = _why_unseen(replay, number, errors) if replay.inferred else _why_not_the_end(replay, number, item)
     return StopEvidence(item, "unknown" if why else "no", why)
+
+
+def _is_placed(replay: Replay, item: StopComparison) -> bool:
+    """True if the log has a pose of the standstill; of an unconfirmed stop that of its arrival is none."""
+    ends = [event for event in replay.run.events if getattr(event, "stop", None) == item.stop]
+    unplaced = bool(ends) and isinstance(ends[-1], Unconfirmed) and ends[-1].pose is None
+    return item.deviation_m is not None and not unplaced
 
 
 def _why_unseen(replay: Replay, number: int, errors: PositionErrors, *, halted: bool = False) -> str:
@@ -111,7 +123,7 @@ def _of_visit(replay: Replay, number: int, item: StopComparison, errors: Positio
     if item.disputed_m is not None:
         why = f"{item.disputed_text}; the scan's cloud would show it"
     elif within == "unknown":
-        why = DRIFTS if errors.drifts else NOISE
+        why = DRIFTS if errors.drifts or errors.most_m[number] > 0 else NOISE
     elif within == "yes":
         why = other_storey(replay, number) or _why_unlogged(replay, item.stop)
     elif replay.inferred:
@@ -141,7 +153,7 @@ def _is_trigger(event: AnyEvent, stop: str) -> bool:
 
 RESTARTED = "the robot restarted during its scan; the scanner's files would show it"
 NOISE = "the poses are too noisy, or too few, for the tolerance; give another source of poses"
-NO_POSE = "no pose in the log; the robot's own log may have it"
+NO_POSE = "no pose of its standstill in the log; the robot's own log may have it"
 NO_TRIGGER = (
     "the log shows no trigger of the scanner there, and one elsewhere; the scanner's files would show it"
 )

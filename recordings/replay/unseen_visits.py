@@ -179,7 +179,17 @@ def _before_or_after(replay: Replay) -> str:
     """Return whether the log begins after the run, or ends before it."""
     if not _over(replay):
         return "the log ends before; give a log that continues"
+    blind_s = _blind_at_the_end_s(replay)
+    if blind_s >= min(map(least_stay_s, replay.mission.stops)):
+        return f"{blind_s:.0f} s without poses at the end of the log; give another source of poses"
     return BEGINS_LATE if _begins_late(replay) else ""
+
+
+def _blind_at_the_end_s(replay: Replay) -> float:
+    """Return the time from the last pose to the end of the log; 0 where a set clock hides it."""
+    if replay.placed.source.steps_ns:
+        return 0.0
+    return (replay.log.end_ns + replay.placed.alignment.time_offset_ns - int(replay.run.poses.ns[-1])) / 1e9
 
 
 BEGINS_LATE = "the log begins after the start of the mission; give an earlier log"

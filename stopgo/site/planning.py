@@ -169,7 +169,8 @@ class PlanningRoom:
 
     def read(self, floor: str, options: dict[str, str]) -> WorkAnswer:
         """Read a floor of the folder in a process."""
-        return self.files.answer(ReadTask(self._folder.file(floor), options))
+        found = self.files.answer(ReadTask(self._folder.file(floor), options))
+        return {**found, "trouble": self._folder.plain(found["trouble"])} if "trouble" in found else found
 
     def plan(self, request: VariantRequest) -> int:
         """Begin a plan, and return its number.
@@ -265,7 +266,12 @@ class PlanningRoom:
         if "error" in answer:
             state = "cancelled" if answer["error"] == "cancelled" else "failed"
             drawing = variant.shown.get("drawing")
-            variant.shown = {**kept, "state": state, "error": answer["error"], "drawing": drawing}
+            variant.shown = {
+                **kept,
+                "state": state,
+                "error": self._folder.plain(answer["error"]),
+                "drawing": drawing,
+            }
         else:
             variant.shown = {**kept, "state": "done", **answer}
         self._tell(variant)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shlex
 import signal
 from collections import OrderedDict
 from collections.abc import Callable
@@ -32,6 +33,8 @@ MOST_SHOWN = 3000
 """Candidates that are shown while a plan is made."""
 DRAWING = "drawing.json"
 MOST_KEPT_PLANS = 6
+FLOOR_CHOICES = ("storey", "level", "drawing")
+"""Options by which one floor of a file with several is chosen."""
 
 
 @dataclass(frozen=True)
@@ -141,23 +144,33 @@ def read_work(task: ReadTask, tell: Tell) -> WorkAnswer:
     from stopgo.site.page_drawing import floor_drawing_json, shapes_of
 
     options = options_of(settings_of(task.options))
-    survey = survey_floor(task.floor, options)
+    floors = [item for item in survey_floor(task.floor, options).floors if item.option]
     choices = [
-        {"name": item.name, "level_m": item.level_m, "area_m2": item.area_m2, "aside": item.aside}
-        for item in survey.floors
-        if item.option
+        {"name": item.name, "area_m2": item.area_m2, "aside": item.aside, "options": _choosing(item.option)}
+        for item in floors
     ]
+    chosen = task.options
+    if floors and not set(chosen) & set(FLOOR_CHOICES):
+        usual = next((item for item in floors if not item.aside), floors[0])
+        chosen = {**chosen, **_choosing(usual.option)}
     try:
-        floor = read_floor(task.floor, options)
+        floor = read_floor(task.floor, options_of(settings_of(chosen)))
     except StopgoError as error:
-        return {"storeys": choices, "drawing": None, "trouble": str(error)}
+        return {"storeys": choices, "chosen": chosen, "drawing": None, "trouble": str(error)}
     area = sum(part.area for part in floor.outline)
     about = {"rooms": len(floor.rooms), "openings": len(floor.openings), "area_m2": area}
     return {
         "storeys": choices,
+        "chosen": chosen,
         "drawing": floor_drawing_json(shapes_of(floor), floor.findings),
         "about": about,
     }
+
+
+def _choosing(option: str) -> dict[str, str]:
+    """Return the option by which a floor of a file is chosen, such as `--level 3.2`, by its key."""
+    flag, value = shlex.split(option)
+    return {flag.removeprefix("--"): value}
 
 
 class KeptPlans:

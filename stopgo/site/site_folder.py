@@ -44,6 +44,10 @@ class SiteFiles:
             raise InputError(f"{name[:100]!r}: no such file in the site's folder")
         return path
 
+    def plain(self, text: str) -> str:
+        """Return a text with the folder's files by their names in it: where it lies is nobody's business."""
+        return text.replace(f"{self.root}{os.sep}", "")
+
     def path(self, name: str) -> Path:
         """Return the path of a name in the folder, whether it exists or not; links must stay inside, too."""
         given = Path(name)

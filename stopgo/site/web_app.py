@@ -12,7 +12,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import PurePosixPath
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 from starlette.applications import Starlette
@@ -94,14 +94,14 @@ def web_app(parts: SiteParts) -> RequestChecks:
         Route("/api/robots/{name}/difference", live.difference),
         *parts.more,
     ]
+
+    def refused(request: Request, error: Exception) -> Response:
+        """Answer a request that cannot be carried out with the error's one line."""
+        status = 409 if isinstance(error, NegativeResult) else 400
+        return JSONResponse({"error": parts.folder.plain(str(error))}, status_code=status)
+
     app = Starlette(routes=routes, exception_handlers={StopgoError: refused})
     return RequestChecks(app, address=parts.address, access=parts.access, viewer=parts.viewer)
-
-
-def refused(request: Request, error: Exception) -> Response:
-    """Answer a request that cannot be carried out with the error's one line."""
-    status = 409 if isinstance(error, NegativeResult) else 400
-    return JSONResponse({"error": str(error)}, status_code=status)
 
 
 def page_file(request: Request) -> Response:
@@ -212,8 +212,3 @@ class LivePages:
 
 async def _all(begun: list[Future[OrderRecord]]) -> list[OrderRecord]:
     return list(await asyncio.gather(*(asyncio.wrap_future(one) for one in begun)))
-
-
-def json_answer(value: Any) -> Response:
-    """Return a value as JSON."""
-    return JSONResponse(value)

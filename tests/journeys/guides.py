@@ -10,6 +10,7 @@ from contextlib import ExitStack, chdir, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from subprocess import CompletedProcess
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any, NoReturn
 
@@ -136,8 +137,9 @@ def place(folder: Path) -> Iterator[GuideFolder]:
     """The folder as working folder and home, in time of its own."""
     with stepped_into(), chdir(folder), pytest.MonkeyPatch.context() as patch, ExitStack() as ends:
         made = GuideFolder(folder, patch, ends)
-        for name in ("HOME", "XDG_STATE_HOME"):
-            patch.setenv(name, str(folder))
+        patch.setenv("HOME", str(folder))
+        # A session's socket lies in it, whose path may have 107 bytes.
+        patch.setenv("XDG_STATE_HOME", ends.enter_context(TemporaryDirectory(prefix="stopgo-")))
         made.words = {"~/": f"{folder}/"}
         made.replace_processes()
         try:

@@ -13,12 +13,15 @@ import pytest
 
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.mission_json import read
+from stopgo.planner.floors.ifc import loading
+from stopgo.planner.floors.ifc.extract import main as extract
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest
 from stopgo.site.planning_routes import options_json
 from stopgo.site.planning_work import ReadTask, VariantTask, read_work, settings_of, variant_work
 from stopgo.site.run_pages import RunRoom
 from stopgo.site.site_folder import SiteFiles
+from tests.planner.floors.ifc.house import two_rooms as house_model
 from tests.site.two_rooms import two_rooms
 
 
@@ -51,6 +54,28 @@ def test_a_floor_is_read_with_its_drawing(place: Path) -> None:
     assert found["about"]["area_m2"] == pytest.approx(32.0)
     assert {layer["kind"] for layer in found["drawing"]["layers"]} == {"floor", "walls", "openings"}
     assert [name for name, _, _ in found["drawing"]["names"]] == ["left", "right"]
+
+
+def test_a_model_is_read_at_the_storey_that_people_mean(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first with a floor; the page shows the others and how each is chosen."""
+    monkeypatch.setattr(loading, "cache_folder", lambda: tmp_path / "models")
+    monkeypatch.setattr(loading, "_run", lambda source, out, rest: extract([str(source), str(out), *rest]))
+    path = house_model().write(tmp_path / "house.ifc")
+    found = read_work(ReadTask(path, {}), lambda message: None)
+    assert found["chosen"] == {"storey": "EG"}
+    assert [one["options"] for one in found["storeys"]] == [{"storey": "EG"}, {"storey": "OG"}]
+    assert found["about"]["rooms"] == 2
+    upper = read_work(ReadTask(path, {"storey": "OG"}), lambda message: None)
+    assert upper["chosen"] == {"storey": "OG"}
+
+
+def test_no_answer_names_the_place_of_the_folder(room: PlanningRoom, place: Path) -> None:
+    (place / "empty.dxf").write_bytes(b"0\nEOF\n")
+    with pytest.raises(InputError) as error:
+        room.read("empty.dxf", {})
+    assert SiteFiles.at(place).plain(str(error.value)).startswith("empty.dxf: ")
 
 
 def test_a_plan_is_shown_as_it_grows(place: Path, tmp_path: Path) -> None:

@@ -169,9 +169,8 @@ class OpenVehicle(Station):
         def listen() -> None:
             with opened.waiting("COMMAND_ACK", of=None if peer is None else peer.who) as answers:
                 listening.set()
-                while not over.is_set():
-                    answer = answers.get(LOOK_S)
-                    if answer is not None and _accepts_mode(answer) and not over.is_set():
+                while (answer := answers.get(0.0 if over.is_set() else LOOK_S)) or not over.is_set():
+                    if answer is not None and _accepts_mode(answer):
                         return heard()
 
         listening = threading.Event()
@@ -182,6 +181,7 @@ class OpenVehicle(Station):
             yield
         finally:
             over.set()
+            thread.join()  # an answer that has come is heard
 
     def push(
         self,

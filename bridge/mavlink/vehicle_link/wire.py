@@ -195,7 +195,8 @@ class Wire:
         exact = self._routes.get((system, component))
         if exact is not None:
             return exact
-        return next((at for (known, _), at in self._routes.items() if known == system), None)
+        known = self._routes.copy()  # at once: the thread that reads adds some
+        return next((at for (number, _), at in known.items() if number == system), None)
 
     def _beats(self) -> None:
         while not self._closing.wait(1.0):

@@ -28,6 +28,8 @@ LIKE_LEVEL = 0.3
 OPEN_ABOVE = 3.0
 """Height that is taken above the topmost floor."""
 
+_AS_LARGE = 0.9
+"""Surfaces with this fraction of the greatest area may be layers of one slab: the uppermost is the floor."""
 _OF_ROOMS = ("walls", "doors", "windows", "spaces", "stairs", "slabs")
 """Roles of what makes the rooms of a storey."""
 
@@ -96,7 +98,9 @@ def floor_near(elevation: float, surfaces: tuple[FloatArray, FloatArray]) -> flo
     steps = np.round(z[near] / 0.01).astype(np.int64)
     heights, index = np.unique(steps, return_inverse=True)
     areas = np.bincount(index, weights=area[near])
-    best = heights[int(np.argmax(np.round(areas, 3)))]
+    best = heights[
+        np.flatnonzero(areas >= _AS_LARGE * areas.max())[-1]
+    ]  # layers of a slab lie on one another
     own = steps == best
     return round(float(np.average(z[near][own], weights=area[near][own])), 4)
 

@@ -20,6 +20,11 @@ from stopgo.planner.floors.units.unit_probability import probabilities
 
 BELIEVED = 0.95
 """A unit less probable than this is not used: the user is asked."""
+_AGAINST_HEADER = 0.98
+"""The same for a unit that is not the header's, if nothing of it was measured but texts and the size.
+
+Such a drawing may be in no unit at all, as one that was made from a PDF.
+"""
 _POSSIBLE = (1.0, 2000.0)
 """Least and greatest length in metres of what a given unit may make."""
 _USUAL = (3.0, 400.0)
@@ -51,11 +56,18 @@ def unit_of(
     evidence = evidence_in(drawing, shapes, outlined=outlined)
     header = _header_code(drawing)
     ranked = sorted(probabilities(evidence, header=header).items(), key=lambda item: (-item[1], item[0]))
-    if ranked[0][1] < BELIEVED and max(evidence.size) > 0:
+    if ranked[0][1] < _needed(ranked[0][0], header, evidence) and max(evidence.size) > 0:
         choices = _choices(ranked, evidence)
         raise UnitAsked(f"{source}: {_question(choices, header)}", choices)
     code = header if header in METRES and not max(evidence.size) else ranked[0][0]
     return METRES[code][1], _findings(code, header, ranked[0][1], evidence)
+
+
+def _needed(code: int, header: int, evidence: UnitEvidence) -> float:
+    measured = (
+        evidence.leaves or evidence.across or evidence.dimensions or evidence.areas or evidence.thickness
+    )
+    return BELIEVED if measured or code == header or header not in METRES else _AGAINST_HEADER
 
 
 def given_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:

@@ -27,11 +27,23 @@ export function floorLayers(drawing) {
   return [
     layers.map(({ kind, d, fill: area, stroke }) =>
       svg("path", { d, class: `layer ${kind}`, fill: area || null, stroke: stroke || null, "fill-rule": "evenodd", ...fixed })),
-    names.map(([name, x, y]) => {
-      const [px, py] = place(frame, x, y);
-      return svg("text", { x: px, y: py + 1.5 * size, class: "room", "font-size": size, "text-anchor": "middle" }, name);
-    }),
+    placedNames(frame, names, size).map(({ name, x, y, font }) =>
+      svg("text", { x, y, class: "room", "font-size": font, "text-anchor": "middle" }, name)),
   ];
+}
+
+// Names of rooms, smaller where one would cover another; the last ones are left out where none fits.
+function placedNames(frame, names, size) {
+  const placed = [];
+  const covers = (one, other) => Math.abs(one.x - other.x) < 0.29 * (one.name.length * one.font + other.name.length * other.font)
+    && Math.abs(one.y - other.y) < 0.55 * (one.font + other.font);
+  for (const [name, x, y] of names) {
+    const [px, py] = place(frame, x, y);
+    const sizes = [1, 0.7, 0.5].map((part) => ({ name, x: px, y: py + 1.5 * part * size, font: part * size }));
+    const fits = sizes.find((one) => !placed.some((other) => covers(one, other)));
+    if (fits) placed.push(fits);
+  }
+  return placed;
 }
 
 // Class of a group of targets: seen, lost (no stop left that would see it), still to come, or never visible.

@@ -8,6 +8,7 @@ import { duration, number, percent, t } from "./words.js";
 const FORBIDDEN_M = 0.6;
 const NUDGE_M = 0.1;
 const FINGER_PX = 22;
+const FLOOR_CHOICES = ["storey", "level", "drawing", "date"];
 const chosen = { floor: null, options: {}, shown: null, base: null };
 const drawings = new Map();
 
@@ -38,7 +39,7 @@ export function makePlan(main, me) {
 async function makeForm(view) {
   const [{ floors }, { options }] = await Promise.all([read("/api/folder"), read("/api/plan-options")]);
   if (!floors.length) return say(view.note, t("no_floors"));
-  const floor = h("select", { id: "floor", onchange: () => { chosen.options = {}; readFloor(view, true); } },
+  const floor = h("select", { id: "floor", onchange: () => { chosen.options = {}; fill(view.storeys, h("option", { value: "" })); readFloor(view, true); } },
     floors.map((name) => h("option", { value: name, selected: name === chosen.floor }, name)));
   const fields = options.map((option) => h("label", {}, h("span", {}, t(`option_${option.key}`), option.unit && ` (${option.unit})`), field(view, option)));
   fill(view.form, h("label", {}, h("span", {}, t("floor")), floor), fields,
@@ -69,7 +70,10 @@ function field(view, option) {
 
 function given(view) {
   const options = {};
-  for (const [name, value] of new FormData(view.form)) if (value) options[name] = value;
+  for (const [name, value] of new FormData(view.form)) {
+    if (value && name === "storey") Object.assign(options, JSON.parse(value));
+    else if (value) options[name] = value;
+  }
   chosen.options = options;
   return options;
 }
@@ -77,16 +81,23 @@ function given(view) {
 async function readFloor(view, show) {
   chosen.floor = view.floor.value;
   const options = given(view);
+  const asked = view.asked = {};
   say(view.note, t("reading", { floor: chosen.floor }));
-  const wanted = Object.fromEntries(Object.entries(options).filter(([key]) => ["storey", "date"].includes(key)));
+  const wanted = Object.fromEntries(Object.entries(options).filter(([key]) => FLOOR_CHOICES.includes(key)));
   const found = await send("/api/floors", { floor: chosen.floor, options: wanted }).catch((error) => ({ trouble: error.message, storeys: [] }));
-  const storey = options.storey ?? "";
-  fill(view.storeys, h("option", { value: "" }, t("only_one")), found.storeys.map((one) =>
-    h("option", { value: one.name, selected: one.name === storey }, one.area_m2 ? `${one.name} (${number(one.area_m2)} m²)` : one.name)));
+  if (asked !== view.asked) return; // another floor was chosen meanwhile
+  const isChosen = (one) => Object.entries(one.options).every(([key, value]) => found.chosen[key] === value);
+  fill(view.storeys, found.storeys.length ? null : h("option", { value: "" }, t("only_one")), found.storeys.map((one) =>
+    h("option", { value: JSON.stringify(one.options), selected: isChosen(one) }, one.area_m2 ? `${one.name} (${number(one.area_m2)} m²)` : one.name)));
+  given(view);
   say(view.note, found.trouble ?? t("floor_read", { area: number(found.about.area_m2), rooms: found.about.rooms, openings: found.about.openings }));
   if (show && found.drawing) {
     chosen.shown = null;
     showFloor(view, found.drawing);
+  } else if (show) {
+    chosen.shown = view.drawing = null;
+    for (const layer of Object.values(view.layers)) fill(layer);
+    fill(view.findings);
   }
 }
 
@@ -153,9 +164,9 @@ function card(view, one, variants) {
 }
 
 function defaultName(one) {
-  const storey = one.request.options.storey;
+  const { storey, level, drawing } = one.request.options;
   const stem = one.request.floor.split("/").pop().replace(/\.\w+$/, "");
-  return one.request.replaces?.match(/^plans\/([^/]+)\//)?.[1] ?? (storey ? `${stem}-${storey}` : stem);
+  return one.request.replaces?.match(/^plans\/([^/]+)\//)?.[1] ?? [stem, storey ?? level ?? drawing].filter(Boolean).join("-");
 }
 
 function describe(request) {

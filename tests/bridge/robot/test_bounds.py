@@ -13,8 +13,9 @@ from stopgo.bridge.robot.pages import POSES_KEPT
 from stopgo.bridge.robot.station_contact import MOST_TOKENS
 from stopgo.mission.run.run_commands import Answer
 from tests.bridge.world import Field, corridor
+from tests.faults.sizes import size
 
-ROUNDS = 400
+ROUNDS = size(short=160, full=400)
 LONGEST = "é" * 190
 ANSWER_BYTES = 4000
 

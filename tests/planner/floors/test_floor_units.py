@@ -129,6 +129,17 @@ def test_the_sides_of_a_room_are_an_area_if_both_have_a_unit() -> None:
     assert not is_only_area("30 m² Lager")
 
 
+def test_texts_and_the_size_alone_do_not_overrule_a_header(tmp_path: Path) -> None:
+    drawing = new_drawing()
+    model = drawing.modelspace()
+    rectangle(model, "A-WALL", 0, 0, 780, 600)
+    for k, name in enumerate(("Bedroom", "Kitchen", "Bath", "Living")):
+        model.add_text(name, height=8).set_placement((100 + 138 * k, 300))
+    drawing.saveas(tmp_path / "plan.dxf")
+    with pytest.raises(InputError, match="the unit is not certain"):
+        survey_floor(tmp_path / "plan.dxf")
+
+
 def test_written_areas_between_lines_show_the_unit(tmp_path: Path) -> None:
     drawing = ezdxf.new()
     model = drawing.modelspace()

@@ -168,6 +168,16 @@ def test_one_option_gives_layers_and_unit_where_both_are_missing(tmp_path: Path)
     assert read([far], tmp_path, layers=layers, units=pasted[9]).area > 5
 
 
+def test_no_command_is_offered_that_gives_no_floor(tmp_path: Path) -> None:
+    def open_lines(model: Modelspace) -> None:
+        model.doc.header["$INSUNITS"] = 0
+        for k in range(3):
+            model.add_line((0, 40 * k), (100, 40 * k), dxfattribs={"layer": "L"})
+
+    with pytest.raises(InputError, match="say which one holds the walls"):
+        read([open_lines], tmp_path)
+
+
 def test_walls_are_found_among_layers_of_other_lines(tmp_path: Path) -> None:
     def frame(model: Modelspace) -> None:
         rectangle(model, "SHEET", -3, -3, 13, 9)

@@ -101,6 +101,8 @@ def test_two_runs_are_reported_together_and_need_no_follow_up_for_what_one_of_th
     (both,) = json.loads(capsys.readouterr().out)["together"]
     assert both["coverage"] == pytest.approx(11 / 14)
     assert (both["answer"], both["left"]) == ("yes", [])
+    assert sum(room["acquired"] is not None for room in both["rooms"]) > 0
+    assert page.read_text().count(">together<") == 1
 
 
 def test_two_runs_that_lack_the_same_stop_get_one_follow_up(

@@ -26,6 +26,7 @@ from tests.recordings.truth.disturbances import sensed
 from tests.recordings.truth.drives import (
     about_the_start,
     as_planned,
+    given_up,
     mission_with_return,
     shifted,
     shuffled,
@@ -338,3 +339,27 @@ def test_a_standstill_in_which_the_clock_was_set_back_may_have_been_longer() -> 
     judged = drive_verdict(replay(held(poses), MISSION, THERE))
     assert judged.answer == "unknown"
     assert "s05 is undecided: the clock was set while it was stationary" in judged.text
+
+
+def test_poses_that_end_before_their_log_do_not_show_the_end_of_the_run() -> None:
+    """The robot is back at its start when its localisation fails, and drives on for two minutes."""
+    mission = mission_with_return(1)
+    poses = sensed(given_up(mission, np.random.default_rng(1)))
+    track = Track.of(poses.ns, poses.xy, poses.heading)
+    log = log_of(track)
+    assert drive_verdict(replay(log, mission, THERE)).answer == "no"
+    longer = replace(log, end_ns=log.end_ns + 120 * 10**9)
+    judged = drive_verdict(replay(longer, mission, THERE))
+    assert judged.answer == "unknown"
+    assert "120 s without poses at the end of the log" in judged.text
+
+
+def test_without_headings_a_log_that_places_itself_denies_nothing() -> None:
+    """In another order of the stops the first path has another direction than the planned one."""
+    mission = mission_with_return(1)
+    poses = sensed(shuffled(mission, np.random.default_rng(1)))
+    track = Track.of(poses.ns, poses.xy, np.zeros(len(poses.ns)))
+    blind = replace(log_of(track).poses[0], heading=np.full(len(track), np.nan))
+    judged = drive_verdict(replay(held(blind), mission, FIRST))
+    assert judged.answer == "unknown"
+    assert "the log has no headings" in judged.text

@@ -9,12 +9,13 @@ import pytest
 
 from stopgo.mission.run.events import Held
 from tests.bridge.mavlink.auto.site import ALL, Site, until, watched
+from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
 
-@pytest.mark.parametrize(("profile", "item"), [("ardupilot", 7), ("px4", 6)])
+@pytest.mark.parametrize(("profile", "item"), some([("px4", 6), ("ardupilot", 7)], every=2))
 def test_a_vehicle_that_stands_in_auto_is_held_within_ten_seconds_and_retry_drives_on(
     profile: str, item: int, tmp_path: Path
 ) -> None:

@@ -97,6 +97,8 @@ class Camera:
     def is_changed(self) -> bool:
         return bool(self.switched)
 
+    is_put_on_hold = False
+
     def other_hands(self, within_s: float) -> str:
         return ""
 

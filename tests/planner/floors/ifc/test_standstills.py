@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from stopgo.command_line import main
 from stopgo.planner.floors import FloorOptions, standing_bodies
 from stopgo.planner.floors.ifc import storey_plan
 from stopgo.planner.floors.ifc.solids import solids_on
+from stopgo.planner.floors.standing_body import StandingBody
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 
@@ -51,6 +53,15 @@ def test_a_point_in_a_body_is_in_it(read: Read, tmp_path: Path) -> None:
     assert column.encloses(2.01, 2.17)
     assert not column.encloses(2.21, 2.17)
     assert min(face.distance(face) for face in column.faces) == 0
+
+
+def test_a_point_below_an_edge_of_a_lintel_is_not_in_it() -> None:
+    under = [[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]]
+    above = [[(0, 0), (1, 0), (1, 0.7)], [(0, 0), (1, 0.7), (1, 1)], [(0, 0), (1, 1), (0, 1)]]
+    faces = [[(*xy, z) for xy in face] for z, half in ((2.0, under), (2.5, above)) for face in half]
+    lintel = StandingBody("lintel", (), np.array(faces), height=1.0)
+    assert not lintel.encloses(0.5, 0.35)
+    assert not lintel.encloses(0.5, 0.5)
 
 
 def test_a_plan_that_keeps_its_clearances_passes(

@@ -124,6 +124,15 @@ def test_a_storey_on_another_level_than_its_slab_is_found_by_its_slab(read: Read
     assert area_of(floor, "walls") == pytest.approx(1.2)
 
 
+def test_the_floor_is_the_uppermost_layer_of_its_slab(read: Read) -> None:
+    house = two_rooms()
+    house.box("IfcSlab", "screed", (0, 0, 0, 8.2, 4.4, 0.08), house.storey("Screed", 0.0))
+    house.box("IfcSlab", "blinding", (0, 0, -0.5, 8.2, 4.4, -0.3), house.storey("Blinding", 0.0))
+    floor = read(house, storey="EG")
+    assert floor.ceiling_m == pytest.approx(3.0 - 0.08)
+    assert floor.area == pytest.approx(8.2 * 4.4, rel=1e-3)
+
+
 def test_a_drawn_twice_wall_is_there_once(read: Read) -> None:
     house = two_rooms()
     house.box("IfcWall", "copy", (0, 4.2, 0, 8.2, 4.4, 2.8), house.model.by_type("IfcBuildingStorey")[0])
