@@ -239,7 +239,7 @@ class RclpyPort:
 
     @property
     def guarded(self) -> dict[str, Any]:
-        """What a guard needs to stop the robot, by absolute names."""
+        """Names with which a guard stops the robot, absolute ones."""
         node, topics = self.node, self._settings.topics
         return {
             "node": f"{node.get_name()}_guard",
