@@ -47,7 +47,7 @@ class SimulatedClock:
         self._now_ns = origin_ns
         self._due: list[tuple[int, int, Callable[[], object]]] = []
         self._scheduled = itertools.count()
-        """Number of each scheduled call: those of one moment happen in the order in which they were scheduled."""
+        """Number of each scheduled call; those of one moment happen in that order."""
 
     def now_ns(self) -> int:
         return self._now_ns
