@@ -141,7 +141,7 @@ class GoalDrive:
         if taken:
             self._end_if(goal, taken)
         if goal.status == "canceled":
-            self._end_if(goal, "another client has cancelled the goal")
+            self._end_if(goal, "another client, or the guard of this program, has cancelled the goal")
         self.halt(goal)
         return f"Nav2 has {goal.status} the goal{detail}"
 

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import msgspec
 
 from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.ros2.goal_guard import GoalGuard
 from stopgo.bridge.ros2.ros_port import GoalStatus
 from stopgo.bridge.ros2.ros_settings import RosSettings, changed_settings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
@@ -117,6 +118,9 @@ class RclpyPort:
         self.telemetry = self._telemetry = telemetry
         self.clock = self._clock = clock
         self._ours: set[bytes] = set()
+        self._sent: SentGoal | None = None
+        self.before_goal: Callable[[], None] = lambda: None
+        """Called before a goal is sent."""
         self._active: dict[str, dict[bytes, int]] = {}
         self._zero_until_ns = 0
         self._lock = threading.Lock()
@@ -220,11 +224,29 @@ class RclpyPort:
 
     def _send(self, client: Any, goal: Any) -> SentGoal:
         sent, own_id = SentGoal(), os.urandom(16)
+        self._sent = sent
+        self.before_goal()
         self._ours.add(own_id)
         self._zero_until_ns = 0
         uuid = load("unique_identifier_msgs.msg").UUID(uuid=list(own_id))
         client.send_goal_async(goal, goal_uuid=uuid).add_done_callback(sent.accepted)
         return sent
+
+    @property
+    def drives(self) -> bool:
+        """True while a goal of ours drives the robot, or may."""
+        return self._sent is not None and self._sent.status in ("sent", "active")
+
+    @property
+    def guarded(self) -> dict[str, Any]:
+        """Names with which a guard stops the robot, absolute ones."""
+        node, topics = self.node, self._settings.topics
+        return {
+            "node": f"{node.get_name()}_guard",
+            "cancel": [node.resolve_service_name(f"{name}/_action/cancel_goal") for name in self._driving],
+            "cmd_vel": node.resolve_topic_name(topics.cmd_vel) if topics.cmd_vel else "",
+            "velocity_type": "TwistStamped" if topics.stamped else "Twist",
+        }
 
     def foreign_goals(self) -> tuple[str, ...]:
         return tuple(
@@ -361,10 +383,15 @@ def open_rclpy(settings: RosSettings, clock: Clock, *, ros_args: Sequence[str] =
     telemetry = RosTelemetry(clock, settings.frames, settings.limits)
     executor = load("rclpy.executors").SingleThreadedExecutor(context=context)
     executor.add_node(node)
+    guard: GoalGuard | None = None
     try:
         port = RclpyPort(node, settings, telemetry, clock)
+        guard = GoalGuard(port.guarded, lambda: port.drives)
+        port.before_goal = guard.will_drive
         threading.Thread(target=_spin, args=(executor, telemetry), name="ros2", daemon=True).start()
         yield port
     finally:
+        if guard is not None:
+            guard.close()
         executor.shutdown(timeout_sec=2.0)
         context.try_shutdown()

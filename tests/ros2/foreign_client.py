@@ -11,17 +11,18 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.action import ActionClient
 from rclpy.node import Node
 
-MOVING_M_S = 0.5
+MOVING_M_S = 0.3
 
 
 def main() -> None:
-    """Wait until the robot drives, then send the goal; end when it is over."""
+    """Print `ready`, wait until the robot drives, then send the goal; end when it is over."""
     rclpy.init()
     node = Node("somebody_else")
     client = ActionClient(node, FollowPath, "follow_path")
     assert client.wait_for_server(20.0)
     speeds: list[float] = []
     node.create_subscription(Odometry, "odom", lambda told: speeds.append(told.twist.twist.linear.x), 10)
+    print("ready", flush=True)
     while not speeds or speeds[-1] < MOVING_M_S:
         rclpy.spin_once(node, timeout_sec=0.5)
     pose = PoseStamped()

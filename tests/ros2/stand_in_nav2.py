@@ -4,7 +4,7 @@ They behave as Nav2's controller server does: one goal at a time; a new one ends
 cancelled one ends with zero velocity; a goal succeeds within the checker's tolerance, not exactly at its end;
 without progress it is aborted. The base drives what `cmd_vel` says, and stands 0.5 s after the last command.
 
-Run it with ROS's Python: `stand_in_nav2.py FOLDER` writes its scans to FOLDER, and prints `ready`.
+Run it with ROS's Python: `stand_in_nav2.py FOLDER SPEED` writes its scans to FOLDER, and prints `ready`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 HZ = 50.0
-SPEED, TURN_RATE = 1.5, 2.5
+TURN_RATE = 2.5
 XY_TOLERANCE, YAW_TOLERANCE = 0.02, 0.02
 VELOCITY_TIMEOUT_S = 0.5
 ALLOWANCE_S = 10.0
@@ -88,10 +88,11 @@ class Robot(Node):
 class Servers(Node):
     """FollowPath and Spin of Nav2, and a scanner's service."""
 
-    def __init__(self, robot: Robot, folder: Path) -> None:
+    def __init__(self, robot: Robot, folder: Path, speed: float) -> None:
         super().__init__("nav2")
         self._robot = robot
         self._folder = folder
+        self._speed = speed
         self._current: Any = None
         self._lock = threading.Lock()
         self._velocity = self.create_publisher(Twist, "cmd_vel", 10)
@@ -143,7 +144,7 @@ class Servers(Node):
         left = math.dist((robot.x, robot.y), end)
         if left > XY_TOLERANCE:
             off = math.remainder(math.atan2(end[1] - robot.y, end[0] - robot.x) - robot.heading, math.tau)
-            self._command(min(SPEED, 4 * left) if abs(off) < 0.1 else 0.0, 4 * off)
+            self._command(min(self._speed, 4 * left) if abs(off) < 0.1 else 0.0, 4 * off)
             return left + abs(off)
         off = math.remainder(heading - robot.heading, math.tau)
         if abs(off) <= YAW_TOLERANCE:
@@ -170,11 +171,11 @@ class Servers(Node):
         return response
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, speed: float) -> None:
     """Serve until the process is ended."""
     rclpy.init()
     robot = Robot()
-    servers = Servers(robot, folder)
+    servers = Servers(robot, folder, speed)
     executor = MultiThreadedExecutor(num_threads=4)
     executor.add_node(robot)
     executor.add_node(servers)
@@ -183,4 +184,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), float(sys.argv[2]))

@@ -80,7 +80,10 @@ def test_a_goal_that_a_killed_program_has_left_is_cancelled_at_the_next_start() 
         (lambda world: world.silent.add("odometry"), "no odometry for"),
         (lambda world: setattr(world, "odometry_offset_s", 3600.0), "3600.0 s behind this computer's"),
         (lambda world: world.foreign(3.0, 3.0), "another client drives the robot"),
-        (lambda world: world.end("canceled"), "another client has cancelled the goal"),
+        (
+            lambda world: world.end("canceled"),
+            "another client, or the guard of this program, has cancelled the goal",
+        ),
         (lambda world: world.restart_servers(30.0), "action server is not available"),
         (
             lambda world: setattr(world, "correction", Transform(x=0.0, y=5.0, heading=0.0)),

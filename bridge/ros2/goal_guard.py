@@ -1,0 +1,131 @@
+"""Guard of a robot that Nav2 drives: a process that cancels its goals if the program ends or hangs.
+
+Nav2 ends a goal without the program that sent it. The guard is a node of its own, so that it needs no
+discovery when it must act. Each byte on its input is a sign of life: 1 while the program drives, else 0.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+from stopgo.bridge.ros2.ros_types import load
+
+SIGN_S = 0.1
+SILENT_S = 0.5
+"""Time without a sign of life after which a driving program counts as hung."""
+STOPS_S = 2.0
+END_S = 2.0
+FIRST, LAST = 0, -1
+DRIVES, STANDS = b"1", b"0"
+
+
+class GoalGuard:
+    """The process that guards one robot, and the thread that shows it this program's life."""
+
+    def __init__(self, wanted: dict[str, Any], drives: Callable[[], bool]) -> None:
+        self._drives = drives
+        self._closing = threading.Event()
+        self._lock = threading.Lock()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", __name__, json.dumps(wanted)], stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+        self._thread = threading.Thread(target=self._show_life, name="goal guard", daemon=True)
+        self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        return self._process.poll() is not None
+
+    def close(self) -> None:
+        """End the process: the robot needs no guard any more."""
+        self._closing.set()
+        self._thread.join(END_S)
+        with suppress(OSError):
+            self._write(STANDS)
+            self._pipe.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(END_S)
+
+    @property
+    def _pipe(self) -> Any:
+        assert self._process.stdin is not None
+        return self._process.stdin
+
+    def will_drive(self) -> None:
+        """Say that a goal follows: a program may be killed right after it has sent one."""
+        with suppress(OSError):
+            self._write(DRIVES)
+
+    def _write(self, sign: bytes) -> None:
+        with self._lock:
+            self._pipe.write(sign)
+            self._pipe.flush()
+
+    def _show_life(self) -> None:
+        with suppress(OSError):  # of a guard that has ended; `ended` says so
+            while not self._closing.wait(SIGN_S):
+                self._write(DRIVES if self._drives() else STANDS)
+
+
+class Signs:
+    """Signs of life of a program, and the verdict on them; time comes from outside."""
+
+    def __init__(self, now_s: float) -> None:
+        self._last_s = now_s
+        self._drives = False
+        self.ended = False
+
+    def take(self, data: bytes, now_s: float) -> None:
+        """Take what was read; nothing means that the program has ended."""
+        self.ended = self.ended or not data
+        if data:
+            self._drives, self._last_s = data[LAST:] == DRIVES, now_s
+
+    def must_stop(self, now_s: float) -> bool:
+        """Return True, once, if the robot must be stopped."""
+        must = self._drives and (self.ended or now_s - self._last_s > SILENT_S)
+        if must:
+            self._drives = False
+        return must
+
+
+def guard(wanted: dict[str, Any], source: int) -> None:
+    """Read signs of life from a file descriptor until the program ends, and stop the robot if need be."""
+    rclpy = load("rclpy")
+    rclpy.init(args=[])
+    node = rclpy.create_node(wanted["node"])
+    request = load("action_msgs.srv").CancelGoal
+    clients = [node.create_client(request, name) for name in wanted["cancel"]]
+    kind = getattr(load("geometry_msgs.msg"), wanted["velocity_type"])
+    publisher = node.create_publisher(kind, wanted["cmd_vel"], 10) if wanted["cmd_vel"] else None
+    signs = Signs(time.monotonic())
+    while not signs.ended:
+        if select.select([source], [], [], SIGN_S)[FIRST]:
+            signs.take(os.read(source, 4096), time.monotonic())
+        if signs.must_stop(time.monotonic()):
+            _stop(clients, request, publisher, kind)
+
+
+def _stop(clients: Sequence[Any], request: Any, publisher: Any, kind: Any) -> None:
+    end_s = time.monotonic() + STOPS_S
+    while time.monotonic() < end_s:
+        for client in clients:
+            if client.service_is_ready():
+                client.call_async(request.Request())
+        if publisher is not None:
+            publisher.publish(kind())
+        time.sleep(SIGN_S)
+
+
+if __name__ == "__main__":
+    guard(json.loads(sys.argv[1]), sys.stdin.fileno())
