@@ -53,7 +53,6 @@ from stopgo.mission.run.events import (
     Unconfirmed,
     event_of,
 )
-from stopgo.mission.run.health_text import charge_text
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.known_missions import KnownMission, KnownMissions
 from stopgo.site.shown_run import ShownRun
@@ -203,7 +202,7 @@ class LiveRobot:
         state, lease = self.state, self.station.lease
         value: dict[str, Any] = {} if state is None else msgspec.to_builtins(state)
         value["robot"] = self.name
-        value["charge"] = charge_text(None if state is None else state.battery)
+        value["battery"] = None if state is None else state.charge
         value["trouble"] = self._trouble
         value["vehicle"] = _vehicle_json(self.station)
         value["lease"] = None

@@ -107,6 +107,10 @@ class WorkLane:
     def _work(self, order: WorkOrder) -> WorkAnswer:
         try:
             connection = self._begin_process()
+        except OSError as error:
+            why = error.strerror or error
+            return {"error": f"no process can be started for it ({why}); close other programs, and try again"}
+        try:
             connection.send(order.task)
             while True:
                 while not connection.poll(POLL_S):
@@ -126,9 +130,10 @@ class WorkLane:
         if self._process is None or not self._process.is_alive():
             context = get_context("spawn")
             self._connection, theirs = context.Pipe()
-            self._process = context.Process(target=work_on, args=(theirs,), daemon=True)
-            self._process.start()
-            theirs.close()
+            with theirs:
+                process = context.Process(target=work_on, args=(theirs,), daemon=True)
+                process.start()
+            self._process = process
         return self._connection
 
     def _end_process(self) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import time
 from collections.abc import Iterator
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from stopgo.mission.files.mission_json import read
 from stopgo.planner.floors.ifc import loading
 from stopgo.planner.floors.ifc.extract import main as extract
 from stopgo.site.event_feed import EventFeed
-from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest
+from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest, WorkLane
 from stopgo.site.planning_routes import options_json
 from stopgo.site.planning_work import ReadTask, VariantTask, read_work, settings_of, variant_work
 from stopgo.site.run_pages import RunRoom
@@ -144,6 +146,22 @@ def test_bad_options_and_a_killed_process_are_one_line(room: PlanningRoom, place
     os.kill(room._plans._process.pid, signal.SIGKILL)
     assert waited(room, room.plan(VariantRequest(floor="house.dxf")))["state"] in ("failed", "done")
     assert waited(room, room.plan(VariantRequest(floor="house.dxf")))["state"] == "done"
+
+
+def test_a_process_that_cannot_start_is_one_line_and_the_next_task_is_tried(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = get_context("spawn")
+
+    def refuse(process: object) -> None:
+        raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(context.Process, "start", refuse)
+    lane = WorkLane()
+    for _ in range(2):
+        with pytest.raises(InputError, match="no process can be started for it"):
+            lane.answer(ReadTask(place / "house.dxf", {}))
+    lane.close()
 
 
 def test_a_variant_is_cancelled(room: PlanningRoom) -> None:

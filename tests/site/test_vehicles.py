@@ -13,6 +13,7 @@ import pytest
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.station.roster import RosterVehicle, read_roster, read_roster_vehicles
 from stopgo.mission.errors import InputError
+from stopgo.mission.run.events import UNKNOWN_CHARGE, StateReport
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.robot_orders import OrderRequest, PushRequest, StopRequest
 from stopgo.site.site_folder import SiteFiles
@@ -81,6 +82,18 @@ def test_a_vehicle_is_pushed_to_started_stopped_and_resumed(site: Site, fleet: S
 def test_a_vehicle_that_is_away_is_shown_with_the_reason(fleet: SiteFleet, site: Site) -> None:
     wait_until(lambda: any("no vehicle" in one for one in shown(fleet).get("trouble", ())))
     assert "state" not in shown(fleet)
+
+
+@pytest.mark.parametrize(("charge", "shown_charge"), [(UNKNOWN_CHARGE, None), (0.99, 0.99)])
+def test_a_charge_that_nobody_reports_is_unknown(
+    charge: float, shown_charge: float | None, fleet: SiteFleet, site: Site
+) -> None:
+    report = StateReport(
+        robot="rover", boot_id="b", seq=1, robot_ns=1, state="IDLE", run_id=None, mission_id=None,
+        revision=None, stop=None, stop_state=None, done=(), skipped=(), battery=charge, last_event=0,
+    )  # fmt: skip
+    fleet.orders.robot("rover")._newest(report)
+    assert shown(fleet)["battery"] == shown_charge
 
 
 @pytest.mark.parametrize(

@@ -58,8 +58,9 @@ async function drawFloor(view) {
   const mission = focus && get("mission", focus);
   if (!mission) {
     view.note.hidden = false;
-    const found = focus && get("robot", focus)?.boot_id;
-    say(view.note, t(!focus ? "no_robots" : found ? "no_mission" : "robot_not_found", { robot: focus }));
+    const state = (focus && get("robot", focus)) ?? {};
+    const known = state.mission_id ? "mission_comes" : state.boot_id ? "no_mission" : "robot_not_found";
+    say(view.note, t(focus ? known : "no_robots", { robot: focus }));
     return;
   }
   const drawing = await drawingOf(mission);

@@ -21,6 +21,8 @@ from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 from tests.bridge.mavlink.driving.world import site_mission
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 SHA = hashlib.sha256(b"scan").hexdigest()
 URL = f"scan-1.e57?size=1600&points=100&sha256={SHA}"
 SCAN = Scan(profile="default", duration_s=2.0, timeout_s=1.0)
