@@ -150,7 +150,10 @@ def begin(station: Station, outcome: Outcome) -> None:
 
 
 def see_through(station: Station, chance: random.Random, outcome: Outcome, *, pauses: float) -> int:
-    """Resume, and now and then pause, until the run is finished; how many pauses were carried out."""
+    """Resume, and now and then pause, until the run is finished; how many pauses were carried out.
+
+    A robot whose journal did not answer in time, on a busy machine, is held, and tries again by command.
+    """
     paused = 0
     while True:
         state = stubbornly(station.status, outcome)
@@ -161,6 +164,8 @@ def see_through(station: Station, chance: random.Random, outcome: Outcome, *, pa
             paused += give(station, order, outcome)
         elif state.state == "PAUSED":
             give(station, stubbornly(lambda: station.order("resume", valid_for_s=60.0), outcome), outcome)
+        elif state.state == "HELD":
+            give(station, stubbornly(lambda: station.order("retry", valid_for_s=60.0), outcome), outcome)
         time.sleep(0.05)
 
 
