@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 import time
 from collections.abc import Callable
 from threading import Event
@@ -45,13 +46,15 @@ class SimulatedClock:
     def __init__(self, *, origin_ns: int = 1_700_000_000_000_000_000) -> None:
         self._now_ns = origin_ns
         self._due: list[tuple[int, int, Callable[[], object]]] = []
+        self._scheduled = itertools.count()
+        """Number of each scheduled call; those of one moment happen in that order."""
 
     def now_ns(self) -> int:
         return self._now_ns
 
     def at(self, seconds: float, happens: Callable[[], object]) -> None:
         """Call `happens` in `seconds` from now, in the thread that waits then."""
-        heapq.heappush(self._due, (self._now_ns + round(seconds * 1e9), len(self._due), happens))
+        heapq.heappush(self._due, (self._now_ns + round(seconds * 1e9), next(self._scheduled), happens))
 
     def jump(self, seconds: float) -> None:
         """Set the date forward or back; nothing waits for it, and scheduled calls come no sooner."""
