@@ -75,6 +75,7 @@ class LiveRobot:
         self.pose: PoseReport | None = None
         self.mission: Mission | None = None
         """Mission that the robot holds, once it was read."""
+        self._plan_reader: threading.Thread | None = None
         self.on_change: Callable[[], None] = lambda: None
         """Called after each state and pose, from several threads."""
         self._feed = feed
@@ -101,10 +102,11 @@ class LiveRobot:
             self.follow(stopped)
         except Exception as error:  # noqa: BLE001  where the robot's thread ends
             if not stopped.is_set():
-                name = type(error).__name__
-                self._set_trouble(
-                    (f"unexpected error ({name}: {error}); restart stopgo site, and report it",)
-                )
+                self._set_fault(error)
+
+    def _set_fault(self, error: Exception) -> None:
+        name = type(error).__name__
+        self._set_trouble((f"unexpected error ({name}: {error}); restart stopgo site, and report it",))
 
     def follow(self, stopped: threading.Event) -> None:
         """Follow the robot until `stopped`; the fault of one run does not end it."""
@@ -223,19 +225,32 @@ class LiveRobot:
             self._tell_state(self._true_at)
 
     def _read_mission(self, state: StateReport) -> None:
-        """Read the mission that the robot holds, when it changes."""
+        """Read the mission that the robot holds, when it changes; its plan by another thread.
+
+        A plan takes seconds to read. In that time states go on, and a stop is shown as standing.
+        """
         held = self.mission
         if state.mission_id is None or state.revision is None:
             return
         if held is not None and (held.id, held.revision) == (state.mission_id, state.revision):
             return
         self.mission = self.station.mission(state.mission_id, state.revision)
-        self._tell_mission()
+        self._plan_reader = threading.Thread(target=self._read_plan, daemon=True)
+        self._plan_reader.start()
+
+    def _read_plan(self) -> None:
+        try:
+            self._tell_mission()
+        except Exception as error:  # noqa: BLE001  where a thread ends
+            self._set_fault(error)
 
     def _tell_mission(self) -> None:
-        if self.mission is None:
+        held = self.mission
+        if held is None:
             return
-        known = self._missions.add(self.mission)
+        known = self._missions.add(held)
+        if held is not self.mission:  # the robot holds another one meanwhile, which is told by itself
+            return
         mission = known.mission
         value = {
             "id": mission.id, "revision": mission.revision, "name": mission.name, "stops": len(mission.stops),
@@ -266,6 +281,8 @@ class LiveRobot:
         if not run_id or run_id == self._run_id or isinstance(report, ReportsMissing):
             return
         self._close_recording()
+        if self._plan_reader is not None:
+            self._plan_reader.join()  # the recording begins with the plan
         self._run_id, self._stops = run_id, {}
         self._shown.begin(run_id)
         try:
@@ -283,8 +300,9 @@ class LiveRobot:
 
     def _tell_coverage(self) -> None:
         known = self._known()
+        stops = dict(self._stops)  # another thread may add one
         done, skipped = (
-            tuple(stop for stop, what in self._stops.items() if what == kind) for kind in ("done", "skipped")
+            tuple(stop for stop, what in stops.items() if what == kind) for kind in ("done", "skipped")
         )
         value = None if known is None else known.coverage(done, skipped)
         shown = {"run": self._run_id, "done": done, "skipped": skipped, "coverage": value}

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.planner.floors.ifc.house import two_rooms as house_model
+from tests.planner.floors.ifc.test_status import WORK, scheduled
 from tests.ports import free_port
 from tests.site.browser_world import (
     AS_REAL,
@@ -27,6 +29,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BrowserWorld]:
     with pytest.MonkeyPatch.context() as patch, browser() as chromium:
         place = tmp_path_factory.mktemp("browser")
         patch.setenv("XDG_STATE_HOME", str(place / "state"))
+        patch.setenv("XDG_CACHE_HOME", str(place / "cache"))
         made = BrowserWorld(place, chromium)
         try:
             made.add_robot("r1", FAST, "blocked@2")
@@ -68,6 +71,11 @@ def test_a_day_from_the_floor_to_the_report(world: BrowserWorld) -> None:
         push_on_page(tab, "r1", "is replaced by another mission", file=follow_up)
 
 
+NO_ANSWER = """{ const real = window.fetch; window.fetch = (to, ...rest) => String(to).includes("/api/stop")
+  ? real(to, ...rest).then(() => new Promise(() => {})) : real(to, ...rest); }"""
+"""The server gets a STOP, and its answer takes for ever: what is known comes by the stream of events."""
+
+
 def test_stop_is_sent_heard_and_standing_also_from_the_keyboard(world: BrowserWorld) -> None:
     standing = "/r2: sent .* heard .* standing [0-9]/"
     with world.tab() as tab:
@@ -86,8 +94,10 @@ def test_stop_is_sent_heard_and_standing_also_from_the_keyboard(world: BrowserWo
         world.board.cut = True
         try:
             tab.until(f"document.querySelector('{card('r2')}').classList.contains('old')")
+            tab.run(NO_ANSWER)
             tab.run("document.getElementById('stop').click()")
             tab.shows("UNKNOWN", "#stopped .bad")
+            assert "sending" not in tab.run("document.getElementById('stopped').innerText")
             assert tab.run("document.getElementById('stop').disabled") is False
         finally:
             world.board.cut = False
@@ -229,3 +239,32 @@ def test_a_change_by_hand_shows_its_cost_before_it_is_planned(world: BrowserWorl
         tab.press("Plan with these changes")
         tab.until(f"document.querySelectorAll('.variant.done').length === {variants + 1}")
         tab.shows("Seen twice", ".variant")
+
+
+def pick(tab: Tab, field: str, value: str) -> None:
+    """Choose a value in a field of the planning form."""
+    tab.run(f"{{ const field = document.getElementById('{field}'); field.value = '{value}';"
+            " field.dispatchEvent(new Event('change')); }")  # fmt: skip
+
+
+def test_a_model_is_read_at_a_storey_and_a_day(world: BrowserWorld) -> None:
+    """Both outlast a look at another page; another floor begins without them."""
+    scheduled(house_model(), WORK).write(world.folder / "later.ifc")
+    day = "document.getElementById('option-date')?.value"
+    storey = "document.getElementById('option-storey')?.value"
+    with world.tab("#plan") as tab:
+        tab.until("document.querySelector('#floor option[value=\"later.ifc\"]')")
+        pick(tab, "floor", "later.ifc")
+        tab.shows("36 m², 2 rooms, 1 openings")
+        pick(tab, "option-date", "2024-03-20")
+        tab.shows("on 2024-03-20: 7 built, 2 in progress, 1 not started", ".findings")
+        pick(tab, "option-storey", '{"storey":"OG"}')
+        tab.shows("36 m², 0 rooms, 0 openings")
+        tab.run("location.hash = '#live'")
+        tab.until("document.querySelector('.orders')")
+        tab.run("location.hash = '#plan'")
+        tab.shows("36 m², 0 rooms, 0 openings")
+        assert (tab.run(storey), tab.run(day)) == ('{"storey":"OG"}', "2024-03-20")
+        pick(tab, "floor", "house.dxf")
+        tab.shows("32 m², 2 rooms, 1 openings")
+        assert tab.run(day) == ""

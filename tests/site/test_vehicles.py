@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.station.roster import RosterVehicle, read_roster, read_roster_vehicles
@@ -22,6 +23,10 @@ from tests.bridge.mavlink.auto.site import Site
 
 SPEED_UP = 20.0
 LAST_RESORT_S = 60.0
+REPORT = StateReport(
+    robot="rover", boot_id="b", seq=1, robot_ns=1, state="IDLE", run_id=None, mission_id=None, revision=None,
+    stop=None, stop_state=None, done=(), skipped=(), battery=1.0, last_event=0,
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -88,12 +93,23 @@ def test_a_vehicle_that_is_away_is_shown_with_the_reason(fleet: SiteFleet, site:
 def test_a_charge_that_nobody_reports_is_unknown(
     charge: float, shown_charge: float | None, fleet: SiteFleet, site: Site
 ) -> None:
-    report = StateReport(
-        robot="rover", boot_id="b", seq=1, robot_ns=1, state="IDLE", run_id=None, mission_id=None,
-        revision=None, stop=None, stop_state=None, done=(), skipped=(), battery=charge, last_event=0,
-    )  # fmt: skip
-    fleet.orders.robot("rover")._newest(report)
+    fleet.orders.robot("rover")._newest(replace(REPORT, battery=charge))
     assert shown(fleet)["battery"] == shown_charge
+
+
+def test_states_go_on_while_the_plan_of_a_mission_is_read(
+    fleet: SiteFleet, site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, add, may_read = fleet.orders.robot("rover"), fleet.missions.add, threading.Event()
+    monkeypatch.setattr(fleet.missions, "add", lambda mission: may_read.wait(LAST_RESORT_S) and add(mission))
+    monkeypatch.setattr(robot.station, "mission", lambda mission_id, revision: site.mission)
+    mission = site.mission
+    for seq in (1, 2):
+        robot._newest(replace(REPORT, seq=seq, mission_id=mission.id, revision=mission.revision))
+    assert (shown(fleet)["seq"], fleet.feed.value("mission", "rover")) == (2, None)
+    may_read.set()
+    wait_until(lambda: fleet.feed.value("mission", "rover"))
+    wait_until(lambda: fleet.feed.value("coverage", "rover"))
 
 
 @pytest.mark.parametrize(

@@ -39,9 +39,9 @@ export function makePlan(main, me) {
 async function makeForm(view) {
   const [{ floors }, { options }] = await Promise.all([read("/api/folder"), read("/api/plan-options")]);
   if (!floors.length) return say(view.note, t("no_floors"));
-  const floor = h("select", { id: "floor", onchange: () => { chosen.options = {}; fill(view.storeys, h("option", { value: "" })); readFloor(view, true); } },
+  const floor = h("select", { id: "floor", onchange: () => otherFloor(view) },
     floors.map((name) => h("option", { value: name, selected: name === chosen.floor }, name)));
-  const fields = options.map((option) => h("label", {}, h("span", {}, t(`option_${option.key}`), option.unit && ` (${option.unit})`), field(view, option)));
+  const fields = options.map((option) => h("label", {}, h("span", {}, t(`option_${option.key}`), option.unit && option.key !== "date" && ` (${option.unit})`), field(view, option)));
   fill(view.form, h("label", {}, h("span", {}, t("floor")), floor), fields,
     h("button", { type: "submit", class: "primary", id: "plan" }, t("plan_now")));
   view.form.onsubmit = (event) => {
@@ -52,6 +52,13 @@ async function makeForm(view) {
   await readFloor(view, !chosen.shown);
 }
 
+// Storeys and days are those of one model: another floor begins without them.
+function otherFloor(view) {
+  fill(view.storeys, h("option", { value: "" }));
+  view.form.elements.date.value = "";
+  readFloor(view, true);
+}
+
 function field(view, option) {
   const about = { name: option.key, id: `option-${option.key}`, title: option.help };
   const value = chosen.options[option.key] ?? "";
@@ -59,7 +66,9 @@ function field(view, option) {
   const reread = ["storey", "date"].includes(option.key) ? () => readFloor(view, true) : null;
   const words = option.flag ? ["yes", "no"] : option.choices;
   if (option.key === "storey") {
-    view.storeys = h("select", { ...about, onchange: reread }, h("option", { value: "" }, t("only_one")));
+    const kept = Object.entries(chosen.options).filter(([key]) => key !== "date" && FLOOR_CHOICES.includes(key));
+    const now = kept.length ? { value: JSON.stringify(Object.fromEntries(kept)) } : { value: "" };
+    view.storeys = h("select", { ...about, onchange: reread }, h("option", now, kept[0]?.[1] ?? t("only_one")));
     return view.storeys;
   }
   if (words.length) {
@@ -164,9 +173,9 @@ function card(view, one, variants) {
 }
 
 function defaultName(one) {
-  const { storey, level, drawing } = one.request.options;
+  const { storey, level, drawing, date } = one.request.options;
   const stem = one.request.floor.split("/").pop().replace(/\.\w+$/, "");
-  return one.request.replaces?.match(/^plans\/([^/]+)\//)?.[1] ?? [stem, storey ?? level ?? drawing].filter(Boolean).join("-");
+  return one.request.replaces?.match(/^plans\/([^/]+)\//)?.[1] ?? [stem, storey ?? level ?? drawing, date].filter(Boolean).join("-");
 }
 
 function describe(request) {

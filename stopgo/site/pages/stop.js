@@ -47,11 +47,12 @@ async function pressed() {
 
 function show(list) {
   const lines = [];
-  if (press && press.state !== "answered") {
+  const records = all("stop").map((one) => one.value).sort((a, b) => a.robot.localeCompare(b.robot));
+  const given = press && records.some((record) => record.id === press.id); // robots may brake before the answer comes
+  if (press && press.state !== "answered" && !given) {
     const seconds_ = seconds(performance.now() - press.began);
     lines.push([press.state === "sending" ? "wait" : "bad", t(`stop_${press.state}`, { time: clock(press.at), age: seconds_ })]);
   }
-  const records = all("stop").map((one) => one.value).sort((a, b) => a.robot.localeCompare(b.robot));
   for (const record of records) lines.push(lineOf(record));
   while (list.children.length > lines.length) list.lastChild.remove();
   while (list.children.length < lines.length) list.append(h("li"));
