@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import os
+import signal
 import tempfile
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -94,6 +95,28 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for number, file in enumerate(kind)
     }
     items.sort(key=lambda item: (place[file_of(item)], item.path))
+
+
+LONGEST_S = size(short=240, full=7200)
+"""A test that takes longer waits for what never comes: the last resort, far above any test on a busy machine."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """End a test that hangs, so that the others go on."""
+    if not hasattr(signal, "SIGALRM"):
+        return (yield)
+
+    def hangs(*_: object) -> None:
+        pytest.fail(f"{item.nodeid} did not end within {LONGEST_S} s")
+
+    before = signal.signal(signal.SIGALRM, hangs)
+    signal.alarm(LONGEST_S)
+    try:
+        return (yield)
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 @pytest.fixture
