@@ -98,7 +98,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 LONGEST_S = size(short=240, full=7200)
-"""A test that takes longer waits for what never comes: the last resort, far above any test on a busy machine."""
+"""A test that takes longer waits for what never comes; far above any test on a busy machine."""
 
 
 @pytest.hookimpl(wrapper=True)
