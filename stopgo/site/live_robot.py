@@ -59,6 +59,8 @@ from stopgo.site.shown_run import ShownRun
 
 OpenRecording = Callable[[str, str, KnownMission | None], AbstractContextManager[RunCollector]]
 """Opens the collector of a run, by robot, run id and mission."""
+NO_RUN = ("IDLE", "READY")
+"""States of a robot that has begun no run of its mission."""
 
 
 class LiveRobot:
@@ -175,12 +177,14 @@ class LiveRobot:
     def _newest(self, item: LiveReport | None) -> LiveReport | None:
         """Show a state as soon as it is there, before the events that it counts."""
         if isinstance(item, StateReport):
-            self.state, self._trouble = item, ()
+            before, self.state, self._trouble = self.state, item, ()
             self.state_at = now = time.monotonic()
             boot, offset = self._offset
             known = boot == item.boot_id and math.isfinite(offset)
             self._tell_state(min(now, item.robot_ns / 1e9 + offset) if known else now)
             self._read_mission(item)
+            if before is not None and (before.state in NO_RUN) != (item.state in NO_RUN):
+                self._tell_coverage()
             self.on_change()
         return item
 
@@ -291,6 +295,7 @@ class LiveRobot:
             self._feed.tell(("recording", self.name), {"run": run_id, "trouble": str(error)})
         else:
             self._feed.tell(("recording", self.name), {"run": run_id, "trouble": ""})
+        self._tell_coverage()
 
     def _tell_event(self, event: Any) -> None:
         self._shown.take(event, self.pose)
@@ -300,13 +305,19 @@ class LiveRobot:
 
     def _tell_coverage(self) -> None:
         known = self._known()
-        stops = dict(self._stops)  # another thread may add one
+        stops = dict(self._stops) if self._is_of_its_run else {}  # another thread may add one
         done, skipped = (
             tuple(stop for stop, what in stops.items() if what == kind) for kind in ("done", "skipped")
         )
         value = None if known is None else known.coverage(done, skipped)
         shown = {"run": self._run_id, "done": done, "skipped": skipped, "coverage": value}
         self._feed.tell(("coverage", self.name), shown)
+
+    @property
+    def _is_of_its_run(self) -> bool:
+        """False while the robot has no run, or another than the one whose stops are known."""
+        state = self.state
+        return state is None or (state.state not in NO_RUN and state.run_id == self._run_id)
 
     def _known(self) -> KnownMission | None:
         """Return the mission that the robot holds, with its plan if that is known."""

@@ -18,7 +18,9 @@ OPTIONS = (
     "storey", "date", "targets", "coverage", "range", "scanner", "clearance", "robot_radius", "start", "tour",
     "register", "min_views",
 )  # fmt: skip
-"""The twelve options of the page, by their names in plan.toml."""
+"""The twelve options of the page that people use most, by their names in plan.toml."""
+FOR_AUTOPILOTS = ("origin",)
+"""Options without which no autopilot takes a mission, unless the floor's file has them."""
 
 
 class FloorRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -76,7 +78,8 @@ def planning_routes(room: PlanningRoom) -> list[Route]:
 def options_json() -> list[dict[str, object]]:
     """Return the options of the page, as their declarations have them."""
     by_key = {parameter.key: parameter for parameter in PARAMETERS.values()}
-    missing = [key for key in OPTIONS if key not in by_key]
+    shown = (*OPTIONS, *FOR_AUTOPILOTS)
+    missing = [key for key in shown if key not in by_key]
     if missing:
         raise InputError(f"no such options: {', '.join(missing)}")
     return [
@@ -85,7 +88,7 @@ def options_json() -> list[dict[str, object]]:
             "choices": by_key[key].choices, "flag": by_key[key].plain is bool,
             "default": _shown(by_key[key].default), "undecided": by_key[key].undecided,
         }
-        for key in OPTIONS
+        for key in shown
     ]  # fmt: skip
 
 

@@ -172,18 +172,20 @@ def test_a_variant_is_cancelled(room: PlanningRoom) -> None:
         room.save(number, "cancelled")
 
 
-def test_the_twelve_options_are_options_of_plan() -> None:
+def test_the_twelve_options_and_the_origin_are_options_of_plan() -> None:
     listed = options_json()
-    assert len(listed) == 12
+    assert [one["key"] for one in listed[12:]] == ["origin"]
     given = {
         "min_views": "2",
         "register": "yes",
         "start": "1,2,90",
         "targets": "walls",
         "robot_radius": "0.3",
+        "origin": "47.4,8.5,400,0",
     }
     settings = settings_of(given)
     assert (settings.views, settings.start) == (2, (1.0, 2.0, 90.0))
+    assert settings.origin == (47.4, 8.5, 400.0, 0.0)
     assert given.keys() <= {str(one["key"]) for one in listed}
 
 

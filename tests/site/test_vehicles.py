@@ -112,6 +112,27 @@ def test_states_go_on_while_the_plan_of_a_mission_is_read(
     wait_until(lambda: fleet.feed.value("coverage", "rover"))
 
 
+def test_a_mission_that_was_not_started_has_no_stops_of_the_run_before(
+    fleet: SiteFleet, site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, mission = fleet.orders.robot("rover"), site.mission
+    other = replace(mission, id="another")
+    held = {one.id: one for one in (mission, other)}
+    monkeypatch.setattr(robot.station, "mission", lambda mission_id, revision: held[mission_id])
+    stop = mission.stops[0].id
+    done = replace(REPORT, state="FINISHED", run_id="run", mission_id=mission.id, revision=mission.revision)
+    ready = replace(done, state="READY", seq=2, mission_id=other.id)
+    shown_done: list[tuple[str, ...]] = []
+    for report in (done, ready, replace(done, state="RUNNING", seq=3, run_id="next", mission_id=other.id)):
+        robot._newest(report)
+        robot._run_id, robot._stops = "run", {stop: "done"}
+        assert robot._plan_reader is not None
+        robot._plan_reader.join()
+        robot._tell_coverage()
+        shown_done.append((fleet.feed.value("coverage", "rover") or {})["done"])
+    assert shown_done == [(stop,), (), ()]
+
+
 @pytest.mark.parametrize(
     ("text", "line"),
     [

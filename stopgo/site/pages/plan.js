@@ -52,10 +52,10 @@ async function makeForm(view) {
   await readFloor(view, !chosen.shown);
 }
 
-// Storeys and days are those of one model: another floor begins without them.
+// Storeys, days and the place on Earth are those of one model: another floor begins without them.
 function otherFloor(view) {
   fill(view.storeys, h("option", { value: "" }));
-  view.form.elements.date.value = "";
+  for (const one of ["date", "origin"]) view.form.elements[one].value = "";
   readFloor(view, true);
 }
 
