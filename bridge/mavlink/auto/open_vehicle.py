@@ -169,9 +169,13 @@ class OpenVehicle(Station):
         def listen() -> None:
             with opened.waiting("COMMAND_ACK", of=None if peer is None else peer.who) as answers:
                 listening.set()
-                while (answer := answers.get(0.0 if over.is_set() else LOOK_S)) or not over.is_set():
+                while True:
+                    ended = over.is_set()
+                    answer = answers.get(0.0 if ended else LOOK_S)
                     if answer is not None and _accepts_mode(answer):
                         return heard()
+                    if answer is None and ended:
+                        return None
 
         listening = threading.Event()
         thread = threading.Thread(target=listen, daemon=True)
