@@ -92,6 +92,8 @@ class LiveRobot:
         self._offset: tuple[str, float] = ("", -math.inf)
         """Boot, and lower bound of this clock minus the robot's, seconds."""
         self._stops: dict[str, str] = {}
+        self._coverage_lock = threading.Lock()
+        """Held from reading the stops until their coverage is shown, so that the newest is shown last."""
         self._run_id = ""
         """Run that is followed and recorded."""
         self._open = ExitStack()
@@ -304,6 +306,10 @@ class LiveRobot:
             self._tell_coverage()
 
     def _tell_coverage(self) -> None:
+        with self._coverage_lock:
+            self._tell_coverage_now()
+
+    def _tell_coverage_now(self) -> None:
         known = self._known()
         stops = dict(self._stops) if self._is_of_its_run else {}  # another thread may add one
         done, skipped = (
