@@ -42,10 +42,6 @@ class GoalGuard:
         self._thread = threading.Thread(target=self._show_life, name="goal guard", daemon=True)
         self._thread.start()
 
-    @property
-    def ended(self) -> bool:
-        return self._process.poll() is not None
-
     def close(self) -> None:
         """End the process: the robot needs no guard any more."""
         self._closing.set()
@@ -72,7 +68,7 @@ class GoalGuard:
             self._pipe.flush()
 
     def _show_life(self) -> None:
-        with suppress(OSError):  # of a guard that has ended; `ended` says so
+        with suppress(OSError):  # a guard that has ended is not replaced, and the drive goes on
             while not self._closing.wait(SIGN_S):
                 self._write(DRIVES if self._drives() else STANDS)
 

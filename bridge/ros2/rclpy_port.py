@@ -114,9 +114,9 @@ class RclpyPort:
 
     def __init__(self, node: Any, settings: RosSettings, telemetry: RosTelemetry, clock: Clock) -> None:
         self.node = node
-        self.settings = self._settings = settings
-        self.telemetry = self._telemetry = telemetry
-        self.clock = self._clock = clock
+        self.settings = settings
+        self.telemetry = telemetry
+        self.clock = clock
         self._ours: set[bytes] = set()
         self._sent: SentGoal | None = None
         self.before_goal: Callable[[], None] = lambda: None
@@ -142,7 +142,7 @@ class RclpyPort:
     # What the robot publishes
 
     def _listen(self) -> None:
-        qos, topics = load("rclpy.qos"), self._settings.topics
+        qos, topics = load("rclpy.qos"), self.settings.topics
         newest = qos.QoSProfile(depth=50, reliability=qos.ReliabilityPolicy.BEST_EFFORT)
         kept = qos.QoSProfile(depth=50, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
         nav, tf, geometry = load("nav_msgs.msg"), load("tf2_msgs.msg"), load("geometry_msgs.msg")
@@ -167,7 +167,7 @@ class RclpyPort:
         behind_s = (self.node.get_clock().now().nanoseconds - stamp_ns) / 1e9
         speed, turn = message.twist.twist.linear, message.twist.twist.angular.z
         velocity = math.hypot(speed.x, speed.y)
-        self._telemetry.take_odometry(velocity, turn, stamp_ns=stamp_ns, behind_s=behind_s)
+        self.telemetry.take_odometry(velocity, turn, stamp_ns=stamp_ns, behind_s=behind_s)
 
     def _take_tf(self, message: Any, *, static: bool) -> None:
         for one in message.transforms:
@@ -175,18 +175,18 @@ class RclpyPort:
             transform = Transform(x=at.x, y=at.y, heading=yaw_of(turn.x, turn.y, turn.z, turn.w))
             stamp_ns = _ns(one.header.stamp)
             parent, child = one.header.frame_id, one.child_frame_id
-            self._telemetry.take_transform(parent, child, transform, stamp_ns=stamp_ns, static=static)
+            self.telemetry.take_transform(parent, child, transform, stamp_ns=stamp_ns, static=static)
 
     def _take_battery(self, message: Any) -> None:
         charge = message.percentage
-        self._telemetry.charge = charge if 0.0 <= charge <= 1.0 else None
+        self.telemetry.charge = charge if 0.0 <= charge <= 1.0 else None
 
     def _take_covariance(self, message: Any) -> None:
         covariance = message.pose.covariance
-        self._telemetry.sigma_m = math.sqrt(max(0.0, covariance[0], covariance[7]))
+        self.telemetry.sigma_m = math.sqrt(max(0.0, covariance[0], covariance[7]))
 
     def _take_emergency_stop(self, message: Any) -> None:
-        self._telemetry.emergency_stop = bool(message.data)
+        self.telemetry.emergency_stop = bool(message.data)
         if message.data:
             self.stand()
 
@@ -207,9 +207,9 @@ class RclpyPort:
         return client is not None and bool(client.server_is_ready())
 
     def follow(self, path: Sequence[Pose]) -> SentGoal:
-        drive, nav = self._settings.drive, load("nav_msgs.msg")
+        drive, nav = self.settings.drive, load("nav_msgs.msg")
         goal = self._follow._action_type.Goal()
-        goal.path = path_message(nav.Path(), path, self._settings.frames.map, self.node)
+        goal.path = path_message(nav.Path(), path, self.settings.frames.map, self.node)
         goal.controller_id, goal.goal_checker_id = drive.controller_id, drive.goal_checker_id
         if hasattr(goal, "progress_checker_id"):
             goal.progress_checker_id = drive.progress_checker_id
@@ -240,7 +240,7 @@ class RclpyPort:
     @property
     def guarded(self) -> dict[str, Any]:
         """Names with which a guard stops the robot, absolute ones."""
-        node, topics = self.node, self._settings.topics
+        node, topics = self.node, self.settings.topics
         return {
             "node": f"{node.get_name()}_guard",
             "cancel": [node.resolve_service_name(f"{name}/_action/cancel_goal") for name in self._driving],
@@ -257,7 +257,7 @@ class RclpyPort:
         )
 
     def stand(self) -> None:
-        self._zero_until_ns = self._clock.now_ns() + round(ZERO_S * 1e9)
+        self._zero_until_ns = self.clock.now_ns() + round(ZERO_S * 1e9)
         self._publish_zero()
         every = load("action_msgs.srv").CancelGoal.Request  # no id and no time: every goal
         for client in self._cancel.values():
@@ -265,7 +265,7 @@ class RclpyPort:
                 client.call_async(every())
 
     def _open_velocity(self) -> None:
-        topics, geometry = self._settings.topics, load("geometry_msgs.msg")
+        topics, geometry = self.settings.topics, load("geometry_msgs.msg")
         self._velocity: Any = None
         if not topics.cmd_vel:
             return
@@ -275,26 +275,26 @@ class RclpyPort:
         self.node.create_timer(1.0 / ZERO_HZ, self._publish_while_due)
 
     def _take_command(self, message: Any) -> None:
-        twist = message.twist if self._settings.topics.stamped else message
-        self._telemetry.take_command(math.hypot(twist.linear.x, twist.linear.y), twist.angular.z)
+        twist = message.twist if self.settings.topics.stamped else message
+        self.telemetry.take_command(math.hypot(twist.linear.x, twist.linear.y), twist.angular.z)
 
     def _publish_while_due(self) -> None:
-        if self._clock.now_ns() < self._zero_until_ns:
+        if self.clock.now_ns() < self._zero_until_ns:
             self._publish_zero()
 
     def _publish_zero(self) -> None:
         if self._velocity is None:
             return
         zero = self._zero()
-        if self._settings.topics.stamped:
+        if self.settings.topics.stamped:
             zero.header.stamp = self.node.get_clock().now().to_msg()
-            zero.header.frame_id = self._settings.frames.base
+            zero.header.frame_id = self.settings.frames.base
         self._velocity.publish(zero)
 
     # The scanner
 
     def _open_scanner(self) -> None:
-        scan = self._settings.scan
+        scan = self.settings.scan
         self._is_action = scan.kind == "action"
         self._scan_type = checked_scan_type(scan)
         if self._is_action:
@@ -313,7 +313,7 @@ class RclpyPort:
 
     def found_instead(self) -> str:
         """Return topics of the odometry's type, or the type that its topic has, in words."""
-        wanted, kind = self._settings.topics.odometry, "nav_msgs/msg/Odometry"
+        wanted, kind = self.settings.topics.odometry, "nav_msgs/msg/Odometry"
         topics = dict(self.node.get_topic_names_and_types())
         own = self.node.resolve_topic_name(wanted)
         if own in topics and kind not in topics[own]:

@@ -10,9 +10,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 TOKENS = "@ros2_lv"
-KINDS = {"NN": "node", "MP": "publisher", "MS": "subscriber", "SS": "server", "SC": "client"}
 ACTION = "/_action/send_goal"
 EntityKind = Literal["node", "publisher", "subscriber", "server", "client"]
+KINDS: dict[str, EntityKind] = {
+    "NN": "node",
+    "MP": "publisher",
+    "MS": "subscriber",
+    "SS": "server",
+    "SC": "client",
+}
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ def entity_of(token: str) -> RosEntity | None:
     parts = token.split("/")
     if len(parts) < 9 or parts[0] != TOKENS or parts[5] not in KINDS or not parts[1].isdigit():
         return None
-    kind: EntityKind = KINDS[parts[5]]  # type: ignore[assignment]
+    kind = KINDS[parts[5]]
     node = f"{_name(parts[7]).rstrip('/')}/{parts[8]}"
     if kind == "node":
         return RosEntity(int(parts[1]), kind, node)
