@@ -27,10 +27,11 @@ from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import now_utc
 from stopgo.bridge.link.protocol import encode
 from stopgo.bridge.robot.journal_file import open_journal
+from stopgo.bridge.robot.storage_watchdog import LATE
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
-from stopgo.mission.run.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
+from stopgo.mission.run.events import Finished, Held, Paused, RevisionTaken, RevisionWaits, Scanned, Started
 from stopgo.mission.run.run_commands import FREE_VERBS, RunCommand, Verb
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
@@ -275,6 +276,7 @@ def check(folder: Path, ran: Mission, paused: int) -> None:
     assert [event.stop for event in events if isinstance(event, Scanned)] == stops
     ordered = [event for event in events if isinstance(event, Paused) and event.reason == "pause by trial"]
     assert len(ordered) == paused
+    assert {event.reason for event in events if isinstance(event, Held)} <= {LATE}
     # A boot that died before it could say so leaves no event, but it has scanned nothing either.
     reboots = sum(isinstance(event, Paused) and event.reason == "reboot" for event in events)
     scans = Counter(
