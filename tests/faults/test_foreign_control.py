@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -35,7 +34,7 @@ from tests.faults.test_gateway import (
     switched_off,
     taken_by_hand,
 )
-from tests.own_time import World, stepped_into
+from tests.own_time import World
 
 SEEDS = range(size(short=1, full=100))
 
@@ -74,12 +73,6 @@ def moved(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
 
     monkeypatch.setattr(VehicleScanner, "end", noted)
     return found
-
-
-@pytest.fixture
-def world() -> Iterator[World]:
-    with stepped_into() as stepped:
-        yield stepped
 
 
 @pytest.mark.parametrize("seed", SEEDS)

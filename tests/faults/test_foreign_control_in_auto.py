@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,7 +32,7 @@ from tests.bridge.mavlink.auto.site import KINDS, Site, real_tour
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
 from tests.faults.test_gateway import moment
-from tests.own_time import World, stepped_into
+from tests.own_time import World
 
 SEEDS = range(size(short=2, full=240))
 OTHER = Who(255, 190)
@@ -238,12 +238,6 @@ def true_scans(monkeypatch: pytest.MonkeyPatch) -> list[TrueScan]:
 
     monkeypatch.setattr(VehicleScanner, "end", noted)
     return made
-
-
-@pytest.fixture
-def world() -> Iterator[World]:
-    with stepped_into() as stepped:
-        yield stepped
 
 
 def was_in_place(scan: TrueScan, stop: Stop) -> bool:

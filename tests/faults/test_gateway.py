@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -30,7 +30,7 @@ from tests.bridge.mavlink.driving.world import (
 )
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
-from tests.own_time import World, stepped_into
+from tests.own_time import World
 
 SEEDS = range(size(short=1, full=112))
 ALL = ["s1", "s2", "s3", "s4", "s5"]
@@ -197,12 +197,6 @@ def stood(monkeypatch: pytest.MonkeyPatch) -> list[Pose]:
 
     monkeypatch.setattr(VehicleScanner, "end", noted)
     return found
-
-
-@pytest.fixture
-def world() -> Iterator[World]:
-    with stepped_into() as stepped:
-        yield stepped
 
 
 @pytest.mark.parametrize("seed", SEEDS)
