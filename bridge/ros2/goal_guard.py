@@ -26,21 +26,37 @@ STOPS_S = 2.0
 END_S = 2.0
 FIRST, LAST = 0, -1
 DRIVES, STANDS = b"1", b"0"
+READY = b"ready\n"
+ENDED = "the process that stops the robot if this program ends has ended; it is started again"
 
 
 class GoalGuard:
     """The process that guards one robot, and the thread that shows it this program's life."""
 
-    def __init__(self, wanted: dict[str, Any], drives: Callable[[], bool]) -> None:
+    def __init__(
+        self, wanted: dict[str, Any], drives: Callable[[], bool], report: Callable[[str], None],
+        module: str = __name__,
+    ) -> None:  # fmt: skip
+        """`report` takes why no guard runs, and an empty text once one runs again."""
         self._drives = drives
+        self._report = report
+        self._command = [sys.executable, "-m", module, json.dumps(wanted)]
+        self._is_missing = False
         self._closing = threading.Event()
         self._lock = threading.Lock()
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", __name__, json.dumps(wanted)], stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL, start_new_session=True,
-        )  # fmt: skip
+        self._process = self._started()
         self._thread = threading.Thread(target=self._show_life, name="goal guard", daemon=True)
         self._thread.start()
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+        )
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
 
     def close(self) -> None:
         """End the process: the robot needs no guard any more."""
@@ -59,8 +75,10 @@ class GoalGuard:
 
     def will_drive(self) -> None:
         """Say that a goal follows: a program may be killed right after it has sent one."""
-        with suppress(OSError):
+        try:
             self._write(DRIVES)
+        except OSError:
+            self._report(ENDED)
 
     def _write(self, sign: bytes) -> None:
         with self._lock:
@@ -68,9 +86,36 @@ class GoalGuard:
             self._pipe.flush()
 
     def _show_life(self) -> None:
-        with suppress(OSError):  # a guard that has ended is not replaced, and the drive goes on
-            while not self._closing.wait(SIGN_S):
+        while not self._closing.wait(SIGN_S):
+            try:
                 self._write(DRIVES if self._drives() else STANDS)
+                self._hear_ready()
+            except OSError:
+                self._replace()
+
+    def _hear_ready(self) -> None:
+        """Report a new guard once its node is there; until then the robot must not drive."""
+        out = self._process.stdout
+        if (
+            self._is_missing
+            and out is not None
+            and select.select([out], [], [], 0)[FIRST]
+            and out.readline() == READY
+        ):
+            self._is_missing = False
+            self._report("")
+
+    def _replace(self) -> None:
+        """Start another process, at most one in `END_S`."""
+        self._report(ENDED)
+        if self._is_missing and self._closing.wait(END_S):
+            return
+        self._is_missing = True
+        with self._lock:
+            with suppress(OSError):
+                self._pipe.close()
+            self._process.wait()
+            self._process = self._started()
 
 
 class Signs:
@@ -104,6 +149,7 @@ def guard(wanted: dict[str, Any], source: int) -> None:
     clients = [node.create_client(request, name) for name in wanted["cancel"]]
     kind = getattr(load("geometry_msgs.msg"), wanted["velocity_type"])
     publisher = node.create_publisher(kind, wanted["cmd_vel"], 10) if wanted["cmd_vel"] else None
+    os.write(sys.stdout.fileno(), READY)
     signs = Signs(time.monotonic())
     while not signs.ended:
         if select.select([source], [], [], SIGN_S)[FIRST]:

@@ -386,7 +386,7 @@ def open_rclpy(settings: RosSettings, clock: Clock, *, ros_args: Sequence[str] =
     guard: GoalGuard | None = None
     try:
         port = RclpyPort(node, settings, telemetry, clock)
-        guard = GoalGuard(port.guarded, lambda: port.drives)
+        guard = GoalGuard(port.guarded, lambda: port.drives, lambda why: setattr(telemetry, "unguarded", why))
         port.before_goal = guard.will_drive
         threading.Thread(target=_spin, args=(executor, telemetry), name="ros2", daemon=True).start()
         yield port

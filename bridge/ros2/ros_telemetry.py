@@ -73,6 +73,8 @@ class RosTelemetry:
         """The newest jump; whoever has reacted to it sets it to `None`."""
         self.fault = ""
         """Error that has ended the thread which brings the samples."""
+        self.unguarded = ""
+        """Reason why no process stops the robot if this program ends; empty if one does."""
         self.clock_offset_s: float | None = None
         """Seconds by which the odometry's stamps are behind this computer's time."""
         self.charge: float | None = None
@@ -185,6 +187,8 @@ class RosTelemetry:
 
     def unusable(self) -> str:
         """Return why the robot must not move though everything arrives; empty if it may."""
+        if self.unguarded:
+            return self.unguarded
         offset_s, limits = self.clock_offset_s, self._limits
         if self.emergency_stop:
             return "the emergency stop is pressed"

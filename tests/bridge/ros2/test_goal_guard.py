@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from stopgo.bridge.ros2.goal_guard import DRIVES, SILENT_S, STANDS, Signs
+import os
+import signal
+from queue import Queue
+
+from stopgo.bridge.ros2.goal_guard import DRIVES, ENDED, SILENT_S, STANDS, GoalGuard, Signs
+
+LAST_RESORT_S = 60.0
 
 
 def test_a_program_that_ends_while_it_drives_is_stopped_once() -> None:
@@ -27,3 +33,17 @@ def test_a_program_that_stands_may_end_or_hang() -> None:
     assert not signs.must_stop(9.0)
     signs.take(b"", 9.0)
     assert signs.ended and not signs.must_stop(9.1)
+
+
+def test_a_guard_that_was_killed_is_reported_and_replaced() -> None:
+    reports: Queue[str] = Queue()
+    guard = GoalGuard({}, lambda: True, reports.put, module="tests.bridge.ros2.idle_guard")
+    try:
+        killed = guard.pid
+        os.kill(killed, signal.SIGKILL)
+        assert reports.get(timeout=LAST_RESORT_S) == ENDED
+        while reports.get(timeout=LAST_RESORT_S):
+            pass
+        assert guard.pid != killed
+    finally:
+        guard.close()

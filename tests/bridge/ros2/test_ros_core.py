@@ -149,3 +149,16 @@ def test_a_frame_that_tf_lacks_is_named_with_those_that_it_has() -> None:
     assert telemetry is not None
     told = telemetry.silence()
     assert told == "tf has no transform from site_map to base_link; its frames: base_link, map, odom"
+
+
+def test_a_robot_whose_guard_has_ended_is_held_until_another_one_runs() -> None:
+    field = started(RosField())
+    field.world.later(3.0, lambda: setattr(field.world.telemetry, "unguarded", "no guard"))
+    field.work()
+    assert (field.controller.run.state, field.world.speed) == ("HELD", 0.0)
+    assert "no guard" in field.controller.run.reason
+    assert field.order("retry").outcome != "ok"
+    field.world.telemetry.unguarded = ""
+    assert field.order("retry").outcome == "ok"
+    field.work()
+    assert scanned(field) == ["s1", "s2", "s3"]
