@@ -85,6 +85,11 @@ def test_an_import_inside_a_function_spares_a_library_or_has_a_reason() -> None:
     assert not [name for name in REASONS if name not in idle], "these need no reason any more"
 
 
+@pytest.mark.parametrize("name", ["stopgo.batches", "stopgo.planning_modules"])
+def test_a_batch_and_the_process_that_forks_its_workers_load_no_rerun(name: str) -> None:
+    assert "rerun" not in _libraries(name), "its threads would not outlive a fork"
+
+
 def _sparing_nothing(name: str) -> list[tuple[str, ...]]:
     """Imports inside functions that load no library but those that the module loads anyway."""
     own = _libraries(name)
