@@ -112,7 +112,7 @@ def worker_process(count: int = 1) -> ProcessPoolExecutor:
 
 
 def _context() -> BaseContext:
-    """How processes begin: on Linux as forks of one that has loaded what every plan uses."""
+    """Start method of the processes; on Linux they are forks of one that has loaded what every plan uses."""
     if sys.platform != "linux":
         return get_context("spawn")
     context = get_context("forkserver")
