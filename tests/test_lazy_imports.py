@@ -19,6 +19,7 @@ REASONS = {
     "stopgo.command_line": "`stopgo --version` and a refused argument load no table",
     "stopgo.commands.demo_command": "only the demo starts a robot and unpacks the sample",
     "stopgo.bridge.station.shared_session": "Windows has no fcntl; the options of sessions are read there",
+    "stopgo.site.kept_variants": "Windows has no fcntl; variants are temporary there",
     "stopgo.bridge.link.admission": "Windows has no resource; robots on it use zenoh alone",
     "stopgo.bridge.robot.journal_file": "Windows has no fcntl; everything else of the bridge runs there",
     "stopgo.mission": "the version is looked up when it is asked for",
