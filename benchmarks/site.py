@@ -129,6 +129,9 @@ def _on_the_line(tab: Tab) -> list[object]:
     """Drive, press STOP and resume ten times, and return the delays."""
     tab.until("document.querySelector('.card .state')?.textContent === 'ready'")
     tab.run(EVENTS)
+    tab.until(
+        "store.get('mission', 'r1')"
+    )  # its transfer, once for each revision, would delay the first event
     tab.press("Start")
     pressed, heard = [], []
     for _ in range(PRESSES):

@@ -19,6 +19,7 @@ REASONS = {
     "stopgo.command_line": "`stopgo --version` and a refused argument load no table",
     "stopgo.commands.demo_command": "only the demo starts a robot and unpacks the sample",
     "stopgo.bridge.station.shared_session": "Windows has no fcntl; the options of sessions are read there",
+    "stopgo.site.kept_variants": "Windows has no fcntl; variants are temporary there",
     "stopgo.bridge.link.admission": "Windows has no resource; robots on it use zenoh alone",
     "stopgo.bridge.robot.journal_file": "Windows has no fcntl; everything else of the bridge runs there",
     "stopgo.mission": "the version is looked up when it is asked for",
@@ -83,6 +84,11 @@ def test_an_import_inside_a_function_spares_a_library_or_has_a_reason() -> None:
     unexplained = {name: found for name, found in idle.items() if name not in REASONS}
     assert not unexplained, "import these where the module begins, or say why not"
     assert not [name for name in REASONS if name not in idle], "these need no reason any more"
+
+
+@pytest.mark.parametrize("name", ["stopgo.batches", "stopgo.planning_modules"])
+def test_a_batch_and_the_process_that_forks_its_workers_load_no_rerun(name: str) -> None:
+    assert "rerun" not in _libraries(name), "its threads would not outlive a fork"
 
 
 def _sparing_nothing(name: str) -> list[tuple[str, ...]]:

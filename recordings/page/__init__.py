@@ -25,10 +25,13 @@ Invariants:
 
 from __future__ import annotations
 
-from stopgo.recordings.page.sections import body
+from typing import TYPE_CHECKING
+
 from stopgo.recordings.page.style import STYLE
-from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import shown
+
+if TYPE_CHECKING:
+    from stopgo.recordings.page.subject import ReportSubject
 
 HEAD = """<!doctype html>
 <html lang="en">
@@ -48,6 +51,8 @@ HEAD = """<!doctype html>
 
 def report_html(subject: ReportSubject) -> bytes:
     """Return the page; the same subject gives the same bytes."""
+    from stopgo.recordings.page.sections import body
+
     return whole_page(subject.title, body(subject))
 
 
@@ -56,4 +61,4 @@ def whole_page(title: str, content: str) -> bytes:
     return HEAD.format(title=shown(title), style=STYLE, body=content).encode()
 
 
-__all__ = ["ReportSubject", "report_html", "whole_page"]
+__all__ = ["report_html", "whole_page"]

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.context import BaseContext
 from typing import Protocol
 
 from stopgo.batches.cluster_engine import ClusterEngine
@@ -23,8 +24,11 @@ from stopgo.batches.work import PlanOutcome, PlanTask, work
 
 TRIES = 2
 TICK_S = 0.5
-PLANS_EACH = 5
+PLANS_EACH = 10
 """Plans of one process; its memory grows by some megabytes with each."""
+
+
+PRELOADED = "stopgo.planning_modules"
 
 
 class Engine(Protocol):
@@ -104,19 +108,28 @@ class LocalEngine:
 
 def worker_process(count: int = 1) -> ProcessPoolExecutor:
     """Return processes that work on entries; they end with this one, and leave Ctrl-C to it."""
-    context = get_context("spawn")
-    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=(os.getpid(),))
+    return ProcessPoolExecutor(count, mp_context=_context(), initializer=_begin_worker)
 
 
-def _begin_worker(parent: int) -> None:
+def _context() -> BaseContext:
+    """Start method of the processes; on Linux they are forks of one that has loaded what every plan uses."""
+    if sys.platform != "linux":
+        return get_context("spawn")
+    context = get_context("forkserver")
+    context.set_forkserver_preload([PRELOADED])
+    return context
+
+
+def _begin_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _end_with(parent: int) -> None:
-    """End this process when its parent is gone: its pool would wait for entries for ever."""
-    while os.getppid() == parent or os.name != "posix":
-        time.sleep(1.0)
+def _end_with_parent() -> None:
+    """End this process when the batch's own is gone: its pool would wait for entries for ever."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
     os._exit(1)
 
 
@@ -160,15 +173,20 @@ class Running:
             done, _ = wait(self._now, timeout=TICK_S, return_when=FIRST_COMPLETED)
             self.waiting()
             self.engine.look()
-            for future in done:
-                slot, task = self._now.pop(future)
-                outcome = self._outcome_of(future, slot, task)
-                if outcome is not None:
-                    yield outcome
-                elif self._tries[task.name]:
-                    alone.append(task)
-                else:
-                    queue.append(task)
+            ended = [self._ended(future, queue, alone) for future in done]
+            if not stopped():
+                self._fill(queue)  # the caller may need a while for each outcome
+            yield from (outcome for outcome in ended if outcome is not None)
+
+    def _ended(
+        self, future: Future[PlanOutcome], queue: deque[PlanTask], alone: deque[PlanTask]
+    ) -> PlanOutcome | None:
+        """The outcome of an entry that ended; None if it is put into one of the queues for another try."""
+        slot, task = self._now.pop(future)
+        outcome = self._outcome_of(future, slot, task)
+        if outcome is None:
+            (alone if self._tries[task.name] else queue).append(task)
+        return outcome
 
     def _fill(self, queue: deque[PlanTask]) -> None:
         """Begin entries while there are free slots and memory; one always runs."""

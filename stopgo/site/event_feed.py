@@ -27,7 +27,9 @@ Value = dict[str, Any]
 BEAT_S = 1.0
 """Longest time without a message to a page; a page that hears none for longer says so."""
 LEAST_S = 0.1
-"""Shortest time between two messages to a page: ten each second."""
+"""Time between two messages to a page: ten each second."""
+AT_ONCE_S = 0.02
+"""Time after a message before the next, if that has a value which people wait for."""
 MOST_BYTES = 512 * 1024
 """Size above which a message is divided."""
 
@@ -50,16 +52,20 @@ class EventFeed:
         self._lock = threading.Lock()
         self._values: OrderedDict[Key, Told] = OrderedDict()
         self._number = 0
-        self._waiting: set[tuple[asyncio.AbstractEventLoop, asyncio.Event]] = set()
+        self._streams: set[_Stream] = set()
 
-    def tell(self, key: Key, value: Value, *, at_s: float | None = None) -> None:
-        """Set the value of a key, which was true at `at_s` on the feed's clock."""
+    def tell(self, key: Key, value: Value, *, at_s: float | None = None, at_once: bool = False) -> None:
+        """Set the value of a key, which was true at `at_s` on the feed's clock.
+
+        Values go to the pages ten times a second, those that people wait for `at_once`.
+        """
         with self._lock:
             self._number += 1
             self._values[key] = Told(self._number, value, self._clock() if at_s is None else at_s)
             self._values.move_to_end(key)
-            waiting = list(self._waiting)
-        _wake(waiting)
+            streams = list(self._streams)
+        for stream in streams:
+            stream.wake(at_once=at_once)
 
     def forget(self, *prefix: str) -> None:
         """Remove the keys that begin so; pages learn it by the value that replaces them."""
@@ -70,8 +76,9 @@ class EventFeed:
     def close(self) -> None:
         """Wake every page's stream."""
         with self._lock:
-            waiting = list(self._waiting)
-        _wake(waiting)
+            streams = list(self._streams)
+        for stream in streams:
+            stream.wake(at_once=True)
 
     def value(self, *key: str) -> Value | None:
         """Return the newest value of a key."""
@@ -93,19 +100,17 @@ class EventFeed:
         """Yield server-sent events after the one named `last`, until `ended`."""
         epoch, _, text = last.partition("-")
         number = int(text) if epoch == self.epoch and text.isdecimal() and len(text) < 16 else -1
-        changed = asyncio.Event()
-        entry = (asyncio.get_running_loop(), changed)
-        self._waiting.add(entry)
+        stream = _Stream()
+        self._streams.add(stream)
         try:
             while not ended():
-                changed.clear()
+                stream.begin()
                 for block in self._blocks(number):
                     number, body = block
                     yield body
-                await asyncio.sleep(LEAST_S)
-                await _waited(changed, BEAT_S)
+                await stream.pause()
         finally:
-            self._waiting.discard(entry)
+            self._streams.discard(stream)
 
     def _blocks(self, number: int) -> list[tuple[int, bytes]]:
         """Return messages with all newer values, each below the largest size; one without values at least."""
@@ -131,14 +136,38 @@ class EventFeed:
         return f"id: {self.epoch}-{number}\ndata: {body}\n\n".encode("utf-8", "replace")
 
 
-def _wake(waiting: list[tuple[asyncio.AbstractEventLoop, asyncio.Event]]) -> None:
-    for loop, changed in waiting:
-        if not loop.is_closed():
-            loop.call_soon_threadsafe(changed.set)
+class _Stream:
+    """Stream of messages to one page, in the loop that made it; other threads wake it."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._changed = asyncio.Event()
+        self._awaited = asyncio.Event()
+
+    def begin(self) -> None:
+        """Forget the changes that the next message has."""
+        self._changed.clear()
+        self._awaited.clear()
+
+    async def pause(self) -> None:
+        """Wait until the next message is due."""
+        await asyncio.sleep(AT_ONCE_S)
+        if not await _set_within(self._awaited, LEAST_S - AT_ONCE_S):
+            await _set_within(self._changed, BEAT_S)
+
+    def wake(self, *, at_once: bool) -> None:
+        """Note a change; from any thread."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._set, at_once)
+
+    def _set(self, at_once: bool) -> None:
+        self._changed.set()
+        if at_once:
+            self._awaited.set()
 
 
-async def _waited(changed: asyncio.Event, within_s: float) -> None:
+async def _set_within(event: asyncio.Event, within_s: float) -> bool:
     try:
-        await asyncio.wait_for(changed.wait(), within_s)
+        return await asyncio.wait_for(event.wait(), within_s)
     except TimeoutError:
-        return
+        return False

@@ -16,7 +16,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -38,11 +38,9 @@ from stopgo.bridge.station.follow import (
 )
 from stopgo.bridge.station.logged_run import LoggedReport
 from stopgo.bridge.station.station import Station
-from stopgo.bridge.station.watch import hand_over
-from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
-from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.errors import StopgoError
 from stopgo.mission.run.events import (
     PoseReport,
     PosesMissing,
@@ -55,10 +53,9 @@ from stopgo.mission.run.events import (
 )
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.known_missions import KnownMission, KnownMissions
+from stopgo.site.run_recording import OpenRecording, RunRecording
 from stopgo.site.shown_run import ShownRun
 
-OpenRecording = Callable[[str, str, KnownMission | None], AbstractContextManager[RunCollector]]
-"""Opens the collector of a run, by robot, run id and mission."""
 NO_RUN = ("IDLE", "READY")
 """States of a robot that has begun no run of its mission."""
 
@@ -82,7 +79,7 @@ class LiveRobot:
         """Called after each state and pose, from several threads."""
         self._feed = feed
         self._missions = missions
-        self._recorder = recorder
+        self._recording = RunRecording(self.name, feed, recorder, station.mission)
         self._shown = ShownRun(feed, self.name)
         self._true_at = time.monotonic()
         """Time at which the newest state was true, at the latest known."""
@@ -96,9 +93,6 @@ class LiveRobot:
         """Held from reading the stops until their coverage is shown, so that the newest is shown last."""
         self._run_id = ""
         """Run that is followed and recorded."""
-        self._open = ExitStack()
-        self._collector: RunCollector | None = None
-        self._recorded: set[tuple[str | None, int | None]] = set()
 
     def work(self, stopped: threading.Event) -> None:
         """Follow the robot until `stopped`; a fault that ends this is shown, and STOP works all the same."""
@@ -128,7 +122,7 @@ class LiveRobot:
                 self._set_trouble((str(error),))
                 stopped.wait(SILENCE_S)
             finally:
-                self._close_recording()
+                self._recording.close()
 
     def _follow_run(
         self, received: queue.SimpleQueue[LiveReport], watched: WatchedLink, stopped: threading.Event
@@ -151,10 +145,10 @@ class LiveRobot:
             for fresh in (asked, news):
                 for report in () if fresh is None or follower.ended else follower.take(fresh):
                     self._take(report)
-            if follower.ended and self._collector is not None:
+            if follower.ended and self._recording.is_open:
                 for report in late_poses(received, follower):
                     self._take(report)
-                self._close_recording()
+                self._recording.close()
             elif not follower.ended:
                 self._catch_up(follower, watched, idle=item is None)
 
@@ -280,23 +274,15 @@ class LiveRobot:
             self._shown.add_pose(report)
         elif not isinstance(report, StateReport | PosesMissing | LoggedReport):
             self._tell_event(report)
-        self._record(report)
+        self._recording.take(report)
 
     def _begin_run(self, report: Followed) -> None:
         run_id = getattr(report, "run_id", None)
         if not run_id or run_id == self._run_id or isinstance(report, ReportsMissing):
             return
-        self._close_recording()
-        if self._plan_reader is not None:
-            self._plan_reader.join()  # the recording begins with the plan
         self._run_id, self._stops = run_id, {}
         self._shown.begin(run_id)
-        try:
-            self._collector = self._open.enter_context(self._recorder(self.name, run_id, self._known()))
-        except InputError as error:
-            self._feed.tell(("recording", self.name), {"run": run_id, "trouble": str(error)})
-        else:
-            self._feed.tell(("recording", self.name), {"run": run_id, "trouble": ""})
+        self._recording.begin(run_id, self._plan_reader, self._known)
         self._tell_coverage()
 
     def _tell_event(self, event: Any) -> None:
@@ -329,28 +315,6 @@ class LiveRobot:
         """Return the mission that the robot holds, with its plan if that is known."""
         mission = self.mission
         return None if mission is None else self._missions.get(mission.id, mission.revision)
-
-    def _record(self, report: Followed) -> None:
-        """Hand a report to the recording, its revision of the mission first."""
-        collector = self._collector
-        if collector is None:
-            return
-        revision = (getattr(report, "mission_id", None), getattr(report, "revision", None))
-        if None not in revision and revision not in self._recorded:
-            self._recorded.add(revision)
-            collector.mission(self.station.mission(*revision))  # type: ignore[arg-type]
-        hand_over(collector, report)
-
-    def _close_recording(self) -> None:
-        collector, self._collector = self._collector, None
-        self._recorded = set()
-        if collector is not None:
-            try:
-                self._open.close()
-            except StopgoError as error:
-                self._feed.tell(("recording", self.name), {"run": self._run_id, "trouble": str(error)})
-            else:
-                self._feed.tell(("recording", self.name), {"run": self._run_id, "trouble": "", "over": True})
 
 
 def _vehicle_json(station: Station) -> dict[str, Any] | None:

@@ -1,6 +1,6 @@
 """Planning from the page: variants of plans, made one after another in processes, kept until they are saved.
 
-A variant is a folder of temporary files. Saving copies them into `plans/<name>` of the site's folder, the
+A variant is a folder of files outside the site's folder. Saving copies them into `plans/<name>` there, the
 mission last, as the next revision of the mission that lies there.
 """
 
@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import msgspec
@@ -25,6 +24,7 @@ from stopgo.mission.files.atomic import replacing
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.files.mission_json import next_revision, read
 from stopgo.site.event_feed import EventFeed
+from stopgo.site.kept_variants import KeptVariant, KeptVariants
 from stopgo.site.planning_work import (
     DRAWING,
     CommandTask,
@@ -157,20 +157,34 @@ class PlanVariant:
 class PlanningRoom:
     """Variants of a site, and the processes that make them."""
 
-    def __init__(self, folder: SiteFiles, feed: EventFeed, saved: Callable[[], None]) -> None:
+    def __init__(
+        self, folder: SiteFiles, feed: EventFeed, kept: KeptVariants, saved: Callable[[], None]
+    ) -> None:
         self._folder = folder
         self._feed = feed
+        self._kept = kept
         self._saved = saved
-        self._place = TemporaryDirectory(prefix="stopgo-site-", ignore_cleanup_errors=True)
         self._plans, self.files = WorkLane(), WorkLane()
-        self._numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._variants: dict[int, PlanVariant] = {}
+        for one in kept.finished():
+            self._show_again(one)
+        self._numbers = itertools.count(1 + max(self._variants, default=0))
 
     def close(self) -> None:
         self._plans.close()
         self.files.close()
-        self._place.cleanup()
+
+    def _show_again(self, kept: KeptVariant) -> None:
+        """Show a variant that an earlier server made."""
+        try:
+            request = msgspec.convert(kept.shown.get("request"), VariantRequest)
+        except msgspec.ValidationError:  # of another version
+            self._kept.remove(kept.number)
+            return
+        variant = PlanVariant(kept.number, request, self._kept.folder(kept.number), shown=kept.shown)
+        self._variants[kept.number] = variant
+        self._tell(variant)
 
     def read(self, floor: str, options: dict[str, str]) -> WorkAnswer:
         """Read a floor of the folder in a process."""
@@ -189,7 +203,7 @@ class PlanningRoom:
         replaces = None if request.replaces is None else self._folder.file(request.replaces)
         with self._lock:
             number = next(self._numbers)
-            folder = Path(self._place.name) / str(number)
+            folder = self._kept.folder(number)
             folder.mkdir()
             variant = self._variants[number] = PlanVariant(number, request, folder)
             self._forget_oldest()
@@ -258,6 +272,7 @@ class PlanningRoom:
                 shutil.copyfile(variant.folder / one, path)
         saved = self._folder.name_of(place / "mission.json")
         variant.shown = {**variant.shown, "saved": saved}
+        self._kept.keep(number, variant.shown)
         self._tell(variant)
         self._saved()
         return saved
@@ -279,6 +294,7 @@ class PlanningRoom:
             }
         else:
             variant.shown = {**kept, "state": "done", **answer}
+            self._kept.keep(variant.number, variant.shown)
         self._tell(variant)
 
     def _tell(self, variant: PlanVariant) -> None:
@@ -290,4 +306,4 @@ class PlanningRoom:
             if oldest.order is not None:
                 oldest.order.cancelled.set()
             self._feed.forget("plan", str(oldest.number))
-            shutil.rmtree(oldest.folder, ignore_errors=True)
+            self._kept.remove(oldest.number)

@@ -210,7 +210,7 @@ class RobotOrders:
 
     def _tell(self, record: OrderRecord) -> None:
         kind = "stop" if record.verb in ("pause", "abort") else "order"
-        self._feed.tell((kind, record.robot), asdict(record))
+        self._feed.tell((kind, record.robot), asdict(record), at_once=True)
 
 
 def _stands(robot: LiveRobot, since_s: float) -> bool:

@@ -16,6 +16,7 @@ from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.files.mission_json import read
 from stopgo.recordings.catalog.run_index import RunIndex, index_of, run_cells, stamp_of
+from stopgo.recordings.page import report_html
 from stopgo.site.planning import WorkLane
 from stopgo.site.planning_work import CommandTask
 from stopgo.site.site_folder import SiteFiles
@@ -76,7 +77,6 @@ class RunRoom:
 
     def report(self, key: str) -> bytes:
         """Return the report of a mission's plan and runs together, as one page."""
-        from stopgo.recordings.page import report_html
         from stopgo.recordings.page.from_recordings import subject_of
         from stopgo.recordings.page.reviewed import review
 

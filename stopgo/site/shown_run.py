@@ -115,7 +115,7 @@ class ShownRun:
         value = msgspec.to_builtins(event)
         near = pose is not None and abs(pose.robot_ns - event.robot_ns) < AT_S * 1e9
         value["at"] = [round(pose.pose.x, 2), round(pose.pose.y, 2)] if near and pose is not None else None
-        self._feed.tell(("event", self._robot, str(event.number)), value)
+        self._feed.tell(("event", self._robot, str(event.number)), value, at_once=True)
         self._events[event.number] = None
         if len(self._events) > MOST_EVENTS:
             oldest, _ = self._events.popitem(last=False)

@@ -34,6 +34,7 @@ from stopgo.mission.console.ports import free_port
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.file_name import file_name
 from stopgo.site.event_feed import EventFeed
+from stopgo.site.kept_variants import kept_variants
 from stopgo.site.known_missions import KnownMission, KnownMissions
 from stopgo.site.live_robot import LiveRobot
 from stopgo.site.page_access import PageAccess, read_stored
@@ -112,7 +113,7 @@ def serving_site(
             robots=fleet.robots, orders=fleet.orders, commander=fleet.commander,
             may_command=held is None or held.holder.role == "station", ended=stopped.is_set,
         )  # fmt: skip
-        opened.enter_context(_more_rooms(parts))
+        opened.enter_context(_more_rooms(parts, state_file(options)))
         opened.callback(feed.close)
         opened.callback(stopped.set)
         opened.enter_context(_running(web_app(parts), listener, tls))
@@ -122,7 +123,7 @@ def serving_site(
 
 
 @contextmanager
-def _more_rooms(parts: SiteParts) -> Iterator[None]:
+def _more_rooms(parts: SiteParts, state: Path) -> Iterator[None]:
     """Add the rooms of planning and of looking back, and end their processes with the block."""
     viewer = WebViewer()
 
@@ -132,7 +133,8 @@ def _more_rooms(parts: SiteParts) -> Iterator[None]:
 
     with ExitStack() as opened:
         merged = opened.enter_context(TemporaryDirectory(prefix="stopgo-runs-", ignore_cleanup_errors=True))
-        planning = PlanningRoom(parts.folder, parts.feed, look_again)
+        kept = opened.enter_context(kept_variants(state.with_suffix(".variants")))
+        planning = PlanningRoom(parts.folder, parts.feed, kept, look_again)
         opened.callback(planning.close)
         opened.callback(viewer.close)
         room = RunRoom(parts.folder, Path(merged), planning.files)

@@ -91,3 +91,20 @@ def test_memory_is_bounded_by_the_keys() -> None:
     assert len(feed.since(-1)) == 20
     feed.forget("pose", "r1")
     assert len(feed.since(-1)) == 19
+
+
+def test_an_event_waits_for_no_other_message(monkeypatch: Any) -> None:
+    monkeypatch.setattr(event_feed, "LEAST_S", 1e6)
+
+    async def read() -> bytes:
+        feed = EventFeed()
+        found = feed.messages("", ended=lambda: False)
+        await anext(found)
+        later = asyncio.ensure_future(anext(found))
+        await asyncio.sleep(0)
+        feed.tell(("pose", "r1"), {"n": 1})
+        feed.tell(("event", "r1", "1"), {"n": 1}, at_once=True)
+        return await later
+
+    body = asyncio.run(read()).decode()
+    assert items(json.loads(body.partition("data: ")[2])) == {"pose.r1": 1, "event.r1.1": 1}

@@ -18,6 +18,7 @@ from stopgo.mission.files.mission_json import read
 from stopgo.planner.floors.ifc import loading
 from stopgo.planner.floors.ifc.extract import main as extract
 from stopgo.site.event_feed import EventFeed
+from stopgo.site.kept_variants import kept_variants
 from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest, WorkLane
 from stopgo.site.planning_routes import options_json
 from stopgo.site.planning_work import ReadTask, VariantTask, read_work, settings_of, variant_work
@@ -36,9 +37,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def room(place: Path) -> Iterator[PlanningRoom]:
-    made = PlanningRoom(SiteFiles.at(place), EventFeed(), lambda: None)
-    yield made
-    made.close()
+    with kept_variants(place / "state" / "site.variants") as kept:
+        made = PlanningRoom(SiteFiles.at(place), EventFeed(), kept, lambda: None)
+        yield made
+        made.close()
 
 
 def waited(room: PlanningRoom, number: int) -> dict[str, Any]:

@@ -19,11 +19,12 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import Finished, Paused, Resumed, Skipped
 from stopgo.mission.run.run_log import Alignment
 from stopgo.recordings.embedded.floor_lines import FloorLines
-from stopgo.recordings.page import ReportSubject, report_html
+from stopgo.recordings.page import report_html
 from stopgo.recordings.page.floor_picture import plan_picture
 from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.page.runs_together import run_names, when_and_who
+from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import number, shown
 from tests.mission.comparing.reports import told
 from tests.mission.comparing.test_compare import START, planned, run, visit
