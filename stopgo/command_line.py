@@ -68,6 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
     """
     if arguments is not None:
         return _with_signals(arguments, whole_process=False)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its matrices are small: other threads only wait
     have_output()
     have_plain_output(escaped=not {"--json", "--print-config"}.isdisjoint(sys.argv))
     code = _with_signals(sys.argv[1:], whole_process=True)

@@ -6,14 +6,13 @@ import numpy as np
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.visibility.unit_ranges import ranges
 
 
 class Board:
     """The state of a selection under change: coverage, shortfall, and the gain of every row."""
 
     def __init__(self, cover: Cover, rows: list[int]) -> None:
-        self._cover = cover
+        self._cover, self._worths = cover, cover.worths
         self._covered = cover.covered_by(np.array(rows, dtype=np.int64))
         self._left = cover.asks - self._covered
         """Views that each column still needs; below 1 where the column counts."""
@@ -83,7 +82,7 @@ class Board:
         """Worth to each demand of the columns that only this row covers; cached while they are the same."""
         known = alone.tobytes()
         if out not in self._losses or self._losses[out][0] != known:
-            self._losses[out] = known, self._worth_of(alone)
+            self._losses[out] = known, self._worths.of(alone)
         return self._losses[out][1]
 
     def _regains_after(
@@ -95,48 +94,19 @@ class Board:
         """
         known = b"|".join(part.tobytes() for part in (alone, almost, demands))
         if out not in self._regains or self._regains[out][0] != known:
-            regained = self._regained(alone, demands)
+            regained = self._worths.by_row(alone, demands)
             if len(almost):
-                regained -= self._regained(almost, demands)
+                regained -= self._worths.by_row(almost, demands)
             cells = np.flatnonzero(regained)
             self._regains[out] = known, cells, regained.ravel()[cells]
         return self._regains[out][1:]
 
-    def _worth_of(self, columns: IntArray) -> IntArray:
-        """Worth of columns to each demand (demands,)."""
-        _, demand, worth = self._entries(columns)
-        return np.bincount(demand, worth, len(self._cover.needed)).astype(np.int64)
-
-    def _entries(self, columns: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-        """Number of demands that each column adds to, their indices, and the worth to each."""
-        turned = self._cover.adds_to
-        counts = turned.indptr[columns + 1] - turned.indptr[columns]
-        entry = ranges(turned.indptr[columns], counts)
-        return counts, turned.indices[entry], turned.data[entry]
-
-    def _regained(self, columns: IntArray, demands: IntArray) -> IntArray:
-        """Worth of these columns that each row sees (demands, rows)."""
-        place = np.full(len(self._cover.needed), -1, dtype=np.int64)
-        place[demands] = np.arange(len(demands))
-        column, row = self._seers(columns)
-        counts, demand, worth = self._entries(column)
-        asked = place[demand] >= 0
-        cell = place[demand[asked]] * self._cover.rows + np.repeat(row, counts)[asked]
-        sums = np.bincount(cell, worth[asked], len(demands) * self._cover.rows)
-        return sums.astype(np.int64).reshape(len(demands), self._cover.rows)
-
-    def _seers(self, columns: IntArray) -> tuple[IntArray, IntArray]:
-        """Pairs of a column and a row that sees it."""
-        turned = self._cover.seen_by
-        counts = turned.indptr[columns + 1] - turned.indptr[columns]
-        return np.repeat(columns, counts), turned.indices[ranges(turned.indptr[columns], counts)]
-
     def _reach(self, columns: IntArray, *, sign: int) -> None:
         """Count the worth of these columns as reached (1), or as no longer reached (-1)."""
-        self._reached += sign * self._worth_of(columns)
+        self._reached += sign * self._worths.of(columns)
         self._offer(columns, sign=-sign)
 
     def _offer(self, columns: IntArray, *, sign: int) -> None:
         """Add the worth of these columns to the gain of every row that sees them (1), or remove it (-1)."""
-        demands = np.flatnonzero(self._worth_of(columns))
-        self._adds[demands] += sign * self._regained(columns, demands)
+        demands = np.flatnonzero(self._worths.of(columns))
+        self._adds[demands] += sign * self._worths.by_row(columns, demands)

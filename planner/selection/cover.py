@@ -12,6 +12,7 @@ from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import Visibility
 from stopgo.planner.selection.demands import Demands
+from stopgo.planner.selection.worths import Worths
 from stopgo.planner.visibility.unit_ranges import ranges
 
 
@@ -75,9 +76,18 @@ class Cover:
         """The transpose of `worth` (columns, demands)."""
         return _sorted(self.worth.T)
 
+    @cached_property
+    def worths(self) -> Worths:
+        """What columns add to the demands."""
+        return Worths(self.adds_to, self.seen_by)
+
+    @cached_property
+    def _seen(self) -> IntArray:
+        return np.ascontiguousarray(self.sees.indices, np.int64)
+
     def columns_of(self, row: int) -> IntArray:
         """Columns that a row sees."""
-        return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]]
+        return self._seen[self.sees.indptr[row] : self.sees.indptr[row + 1]]
 
     def covered_by(self, rows: IntArray) -> IntArray:
         """Number of `rows` that see each column (columns,)."""

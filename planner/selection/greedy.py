@@ -9,7 +9,6 @@ import numpy as np
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.visibility.unit_ranges import ranges
 
 
 def greedy(cover: Cover) -> IntArray:
@@ -65,7 +64,4 @@ def _adds(cover: Cover, row: int, covered: IntArray) -> IntArray:
     """Weight that a row adds to each demand, counting columns that still need views (demands,)."""
     columns = cover.columns_of(row)
     new = columns[covered[columns] < cover.asks[columns]]
-    pointer = cover.adds_to.indptr
-    entries = ranges(pointer[new], pointer[new + 1] - pointer[new])
-    demand, worth = cover.adds_to.indices[entries], cover.adds_to.data[entries]
-    return np.bincount(demand, worth, len(cover.needed)).astype(np.int64)
+    return cover.worths.of(new)

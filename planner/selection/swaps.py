@@ -94,24 +94,25 @@ class SwapBoard(Board):
 
     def take(self, row: int) -> None:
         super().take(row)
-        self._note_change(row, (-1, 0, 1))
+        self._note_change(row, -1, 1)
 
     def drop(self, row: int) -> None:
         super().drop(row)
-        self._note_change(row, (0, 1, 2))
+        self._note_change(row, 0, 2)
 
     def raise_penalties(self) -> None:
         super().raise_penalties()
         self._clock += 1
         self._demand_changed[self.missing > 0] = self._clock
 
-    def _note_change(self, row: int, left: tuple[int, ...]) -> None:
-        """Note the rows and demands whose gains depend on columns that now need `left` more views."""
+    def _note_change(self, row: int, fewest: int, most: int) -> None:
+        """Note the rows and demands whose gains depend on columns that now need so many more views."""
         columns = self._cover.columns_of(row)
-        columns = columns[np.isin(self._left[columns], left)]
+        short = self._left[columns]
+        columns = columns[(short >= fewest) & (short <= most)]
         self._clock += 1
-        self._row_changed[self._seers(columns)[1]] = self._clock
-        self._demand_changed[self._entries(columns)[1]] = self._clock
+        self._row_changed[self._worths.seers(columns)] = self._clock
+        self._demand_changed[self._worths.demands(columns)] = self._clock
 
     def best_swap(self, rows: list[int], blocked: list[int]) -> tuple[int, int]:
         """The swap with the least shortfall; of equal ones, the one with the most coverage.
@@ -222,15 +223,15 @@ class SwapBoard(Board):
         """Effects of one row leaving."""
         columns = self._cover.columns_of(out)
         alone, almost = (columns[self._left[columns] == short] for short in (0, 1))
-        lost = self._worth_of(alone)
-        support = np.flatnonzero((lost != 0) | (self._worth_of(almost) != 0))
+        lost = self._worths.of(alone)
+        support = np.flatnonzero((lost != 0) | (self._worths.of(almost) != 0))
         support = support[~self._is_wide[support]]
         asked = self._cover.needed[support] - self._reached[support] + lost[support]
         opened, asked = support[asked > 0], asked[asked > 0]
         demands = np.concatenate([self._wide, opened])
-        regained = self._regained(alone, demands)
+        regained = self._worths.by_row(alone, demands)
         if len(almost):
-            regained -= self._regained(almost, demands)
+            regained -= self._worths.by_row(almost, demands)
         adds = self._adds[opened]
         near = np.flatnonzero((regained != 0).any(axis=0) | (adds != 0).any(axis=0))
         adds, weight, now = adds[:, near], self.weight[opened], self.missing[opened]

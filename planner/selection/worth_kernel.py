@@ -1,0 +1,58 @@
+"""Sums of the worth of columns, for each demand, and for each demand and row.
+
+Plain functions over lists or arrays: the same source runs interpreted and compiled, with the types of
+`worth_kernel_compiled.pxd`. Worths are weights of units, and their sum over a floor is below 2**62.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def add_worth(columns: Any, adds_first: Any, demand: Any, worth: Any, sums: Any) -> None:
+    """Add the worth of columns to each demand.
+
+    Parameters
+    ----------
+    columns
+        Numbers of columns (n,).
+    adds_first
+        First entry of each column in `demand` and `worth`, and their end (columns + 1,).
+    demand, worth
+        Demand of each entry, and what the column adds to it (entries,).
+    sums
+        Receives the sums (demands,).
+    """
+    for k in range(len(columns)):
+        column = columns[k]
+        for entry in range(adds_first[column], adds_first[column + 1]):
+            sums[demand[entry]] += worth[entry]
+
+
+def add_worth_by_row(
+    columns: Any, seen_first: Any, seer: Any, adds_first: Any, demand: Any, worth: Any, place: Any,
+    rows: int, sums: Any,
+) -> None:  # fmt: skip
+    """Add the worth of columns to each demand, for each row that sees them.
+
+    Parameters
+    ----------
+    columns, adds_first, demand, worth
+        As for `add_worth`.
+    seen_first, seer
+        First entry of each column in `seer`, and their end (columns + 1,); rows that see it.
+    place
+        Place of each demand in the result, -1 where it is not asked for (demands,).
+    rows
+        Number of rows.
+    sums
+        Receives the sums, flat (asked demands * rows,).
+    """
+    for k in range(len(columns)):
+        column = columns[k]
+        for entry in range(adds_first[column], adds_first[column + 1]):
+            if place[demand[entry]] < 0:
+                continue
+            begin = place[demand[entry]] * rows
+            for pair in range(seen_first[column], seen_first[column + 1]):
+                sums[begin + seer[pair]] += worth[entry]

@@ -1,0 +1,17 @@
+# Types of worth_kernel.py where it is compiled (setup.py).
+
+cimport cython
+
+ctypedef long long whole
+
+@cython.locals(column=whole, entry=whole, k=whole)
+cpdef void add_worth(
+    const whole[::1] columns, const whole[::1] adds_first, const whole[::1] demand, const whole[::1] worth,
+    whole[::1] sums
+) noexcept nogil
+
+@cython.locals(begin=whole, column=whole, entry=whole, k=whole, pair=whole)
+cpdef void add_worth_by_row(
+    const whole[::1] columns, const whole[::1] seen_first, const whole[::1] seer, const whole[::1] adds_first,
+    const whole[::1] demand, const whole[::1] worth, const whole[::1] place, whole rows, whole[::1] sums
+) noexcept nogil

@@ -1,0 +1,81 @@
+"""Worth of columns: what they add to each demand, in all and for each row that sees them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from stopgo.mission.geometry import IntArray
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.selection.worth_kernel import add_worth, add_worth_by_row
+from stopgo.planner.visibility.unit_ranges import ranges
+
+
+class _Entries(NamedTuple):
+    """Demands or rows of each column of the covering problem, in 64-bit integers."""
+
+    first: IntArray
+    """First entry of each column, and their end (columns + 1,)."""
+    index: IntArray
+    """Demand or row of each entry (entries,)."""
+
+
+class Worths:
+    """What the columns of one covering problem add to its demands."""
+
+    def __init__(self, adds_to: csr_array, seen_by: csr_array) -> None:
+        """`adds_to` has the worth of columns (columns, demands), `seen_by` who sees them (columns, rows)."""
+        self._demands, self._rows = int(adds_to.shape[1]), int(seen_by.shape[1])
+        self._adds, self._seen = _entries(adds_to), _entries(seen_by)
+        self._worth = np.ascontiguousarray(adds_to.data, np.int64)
+
+    def of(self, columns: IntArray) -> IntArray:
+        """Worth of columns to each demand (demands,)."""
+        kernel = compiled(add_worth, large=False)
+        if kernel is None:
+            _, demand, worth = self._entries(columns)
+            return np.bincount(demand, worth, self._demands).astype(np.int64)
+        sums = np.zeros(self._demands, dtype=np.int64)
+        kernel(columns, *self._adds, self._worth, sums)
+        return sums
+
+    def by_row(self, columns: IntArray, demands: IntArray) -> IntArray:
+        """Worth of those of the columns that each row sees (demands, rows)."""
+        place = np.full(self._demands, -1, dtype=np.int64)
+        place[demands] = np.arange(len(demands))
+        kernel = compiled(add_worth_by_row, large=False)
+        if kernel is None:
+            return self._by_row(columns, place, len(demands))
+        sums = np.zeros(len(demands) * self._rows, dtype=np.int64)
+        kernel(columns, *self._seen, *self._adds, self._worth, place, self._rows, sums)
+        return sums.reshape(len(demands), self._rows)
+
+    def _by_row(self, columns: IntArray, place: IntArray, asked: int) -> IntArray:
+        counts = self._seen.first[columns + 1] - self._seen.first[columns]
+        row = self.seers(columns)
+        counts, demand, worth = self._entries(np.repeat(columns, counts))
+        is_asked = place[demand] >= 0
+        cell = place[demand[is_asked]] * self._rows + np.repeat(row, counts)[is_asked]
+        sums = np.bincount(cell, worth[is_asked], asked * self._rows)
+        return sums.astype(np.int64).reshape(asked, self._rows)
+
+    def _entries(self, columns: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+        """Number of demands that each column adds to, their indices, and the worth to each."""
+        counts = self._adds.first[columns + 1] - self._adds.first[columns]
+        entry = ranges(self._adds.first[columns], counts)
+        return counts, self._adds.index[entry], self._worth[entry]
+
+    def demands(self, columns: IntArray) -> IntArray:
+        """Demands that the columns add to, once for each column (n,)."""
+        return self._entries(columns)[1]
+
+    def seers(self, columns: IntArray) -> IntArray:
+        """Rows that see the columns, once for each column (n,)."""
+        counts = self._seen.first[columns + 1] - self._seen.first[columns]
+        return self._seen.index[ranges(self._seen.first[columns], counts)]
+
+
+def _entries(by_column: csr_array) -> _Entries:
+    return _Entries(*(np.ascontiguousarray(part, np.int64) for part in (by_column.indptr, by_column.indices)))

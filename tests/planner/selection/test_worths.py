@@ -1,0 +1,33 @@
+"""Worth of columns: the same sums in numpy, by the kernels as written, and by the compiled ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from stopgo.mission.geometry import IntArray
+from stopgo.planner.selection import worths
+from stopgo.planner.selection.worths import Worths
+from tests.planner.kernels import machine_code
+
+
+def _sums(adds_to: csr_array, seen_by: csr_array, columns: IntArray, demands: IntArray) -> list[list]:
+    sums = Worths(adds_to, seen_by)
+    return [sums.of(columns).tolist(), sums.by_row(columns, demands).tolist()]
+
+
+@pytest.mark.parametrize("count", [0, 1, 9])
+def test_sums_are_the_same_in_numpy_as_written_and_compiled(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for seed in range(5):
+        random = np.random.default_rng(seed)
+        worth = random.integers(0, 9, (30, 6)) * (random.random((30, 6)) < 0.4)
+        sees = (random.random((30, 11)) < 0.3).astype(np.int64)
+        columns = np.sort(random.choice(30, count, replace=False))
+        demands = np.flatnonzero(random.random(6) < 0.5)
+        counted = [worth[columns].sum(axis=0).tolist(), (worth[columns].T @ sees[columns])[demands].tolist()]
+        for kernels in (lambda kernel: None, lambda kernel: kernel, machine_code):
+            monkeypatch.setattr(worths, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
+            assert _sums(csr_array(worth), csr_array(sees), columns, demands) == counted
