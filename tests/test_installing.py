@@ -195,8 +195,10 @@ def test_only_three_modules_know_of_file_locks() -> None:
     """Where there are none, the first two are refused in one line, and a site's variants are temporary."""
     knows = [name for name, path in MODULES.items() if "import fcntl" in path.read_text(encoding="utf-8")]
     assert sorted(knows) == [
-        "stopgo.bridge.robot.journal_file", "stopgo.bridge.station.shared_session", "stopgo.site.kept_variants",
-    ]  # fmt: skip
+        "stopgo.bridge.robot.journal_file",
+        "stopgo.bridge.station.shared_session",
+        "stopgo.site.kept_variants",
+    ]
 
 
 def test_every_folder_is_typed_and_every_extra_of_a_user_is_in_all() -> None:
