@@ -18,7 +18,7 @@ class _Entries(NamedTuple):
 
     first: IntArray
     """First entry of each column, and their end (columns + 1,)."""
-    index: IntArray
+    to: IntArray
     """Demand or row of each entry (entries,)."""
 
 
@@ -65,7 +65,7 @@ class Worths:
         """Number of demands that each column adds to, their indices, and the worth to each."""
         counts = self._adds.first[columns + 1] - self._adds.first[columns]
         entry = ranges(self._adds.first[columns], counts)
-        return counts, self._adds.index[entry], self._worth[entry]
+        return counts, self._adds.to[entry], self._worth[entry]
 
     def demands(self, columns: IntArray) -> IntArray:
         """Demands that the columns add to, once for each column (n,)."""
@@ -74,7 +74,7 @@ class Worths:
     def seers(self, columns: IntArray) -> IntArray:
         """Rows that see the columns, once for each column (n,)."""
         counts = self._seen.first[columns + 1] - self._seen.first[columns]
-        return self._seen.index[ranges(self._seen.first[columns], counts)]
+        return self._seen.to[ranges(self._seen.first[columns], counts)]
 
 
 def _entries(by_column: csr_array) -> _Entries:
