@@ -78,7 +78,7 @@ class Cover:
 
     @cached_property
     def worths(self) -> Worths:
-        """What columns add to the demands."""
+        """Sums of what columns add to the demands."""
         return Worths(self.adds_to, self.seen_by)
 
     @cached_property

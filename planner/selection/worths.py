@@ -23,7 +23,7 @@ class _Entries(NamedTuple):
 
 
 class Worths:
-    """What the columns of one covering problem add to its demands."""
+    """Sums of what the columns of one covering problem add to its demands."""
 
     def __init__(self, adds_to: csr_array, seen_by: csr_array) -> None:
         """`adds_to` has the worth of columns (columns, demands), `seen_by` who sees them (columns, rows)."""
