@@ -76,13 +76,12 @@ def rigid_fit(first: FloatArray, second: FloatArray) -> RigidFit:
 
 def least_squares(first: FloatArray, second: FloatArray, weight: FloatArray | None = None) -> Transform:
     """Return the rotation and shift of least squared distances, each with its weight if given (n,)."""
-    a, b = (points - np.average(points, axis=0, weights=weight) for points in (first, second))
-    along, across = _products(a if weight is None else a * weight[:, None], b)
-    heading = math.atan2(across, along)
-    turned = Transform(x=0.0, y=0.0, heading=heading).points(first)
-    middles = (np.average(points, axis=0, weights=weight) for points in (second, turned))
-    x, y = np.subtract(*middles).tolist()
-    return Transform(x=x, y=y, heading=heading)
+    share = np.full((len(first), 1), 1 / len(first)) if weight is None else (weight / weight.sum())[:, None]
+    middle, other = ((share * points).sum(axis=0) for points in (first, second))
+    along, across = _products(share * (first - middle), second - other)
+    turned = Transform(x=0.0, y=0.0, heading=math.atan2(across, along))
+    x, y = turned.point(tuple(middle.tolist()))
+    return Transform(x=float(other[0]) - x, y=float(other[1]) - y, heading=turned.heading)
 
 
 def _products(a: FloatArray, b: FloatArray) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.replay.stop_evidence import stop_evidence
 from stopgo.recordings.replay.unseen_visits import possible_s
+from tests.faults.sizes import size
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 from tests.recordings.replay.test_replaying import held, log_of
 from tests.recordings.truth.disturbances import sensed
@@ -58,7 +59,7 @@ def test_a_tour_that_was_turned_or_stretched_is_never_a_yes(
     turn: float, scale: float, placing: Placing
 ) -> None:
     """The robot's map lies so far off the drawing; at its start both agree."""
-    for seed in range(1, 4):
+    for seed in range(1, 1 + size(short=1, full=3)):
         mission = mission_with_return(seed)
         tour = about_the_start(mission, turn, scale)
         assert not all(tour.good)
@@ -68,7 +69,7 @@ def test_a_tour_that_was_turned_or_stretched_is_never_a_yes(
             assert drive_verdict(replay(log_of(track, frame=frame), mission, placing)).answer != "yes"
 
 
-@pytest.mark.parametrize("seed", range(1, 4))
+@pytest.mark.parametrize("seed", range(1, 1 + size(short=1, full=3)))
 @pytest.mark.parametrize("by", [(0.9, -0.7), (0.1, 0.06), (-0.06, 0.02)])
 def test_a_tour_that_was_shifted_is_no_yes_by_a_fit_to_its_stops(seed: int, by: tuple[float, float]) -> None:
     mission = mission_with_return(seed)
