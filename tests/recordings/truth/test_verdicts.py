@@ -21,7 +21,7 @@ MOST_UNTOLD = 0.1
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("part", range(PARTS))
 def test_no_verdict_on_a_log_is_false(part: int, tmp_path: Path) -> None:
-    chosen = list(cases())[part :: PARTS * size(short=43, full=1)]
+    chosen = list(cases())[part :: PARTS * size(short=29, full=1)]
     found = []
     for number, case in enumerate(chosen):
         folder = tmp_path / str(number)
