@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray
@@ -19,6 +21,12 @@ BRAKING, FEW = 1.2, 0.95
 """Change of speed in a step, as a multiple of the usual speed, and the fraction of steps below that."""
 LONGEST_S, RESTART_NS = 1.0, 10**9
 """Longest step between poses that tells of a speed, and time around a restart in which a jump is its own."""
+FASTER = 1.5
+"""Speed in a longer step, as a multiple of the usual one, up to which the robot may have driven it."""
+DRIVES_M_S, UNSTEADY, BENDS = 0.1, 0.1, 1.02
+"""Least speed of driving, its change that is still steady, and the route's length by the straight step's."""
+MISSING_STEPS = 3
+"""Number of usual steps above which poses are missing, and may hide a jump."""
 
 
 def lasting_jump(track: Track) -> tuple[int, float] | None:
@@ -47,15 +55,16 @@ def lasting_error_m(track: Track) -> float:
     """Return the size of the greatest step aside of the path that lasts; 0 without one.
 
     The robot's speed around a step predicts the next pose. Steps aside that follow each other within HEALED_S
-    count together, so that a jump away and back counts nothing. Where the robot restarted it may have been
-    moved, and a longer time without poses predicts nothing.
+    count together, so that a jump away and back counts nothing. A longer time without poses predicts nothing,
+    but limits how far the robot came. Where it restarted it may have been moved.
     """
     if len(track) <= 2 * STEPS:
         return 0.0
     aside, seconds = _aside(track), np.diff(track.ns) / 1e9
     size = np.hypot(*aside.T)
     least = max(LEAST_CORRECTION_M, SIGMAS * float(np.median(size)))
-    steps = np.flatnonzero(size > least + BRAKING * _usual_speed(track) * seconds)
+    speed, long = _usual_speed(track), seconds > LONGEST_S
+    steps = np.flatnonzero(size > least + np.where(long, FASTER, BRAKING) * speed * seconds)
     if not len(steps):
         return 0.0
     apart = np.flatnonzero(np.diff(track.ns[steps]) > HEALED_S * 1e9) + 1
@@ -82,8 +91,46 @@ def _aside(track: Track) -> FloatArray:
     padded = np.pad(speed, ((STEPS, STEPS), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * STEPS + 1, axis=0)
     aside = step - np.median(windows, axis=-1) * seconds[:, None]
-    aside[(seconds > LONGEST_S) | _near_restart(track)] = 0.0
+    aside = np.where((seconds > LONGEST_S)[:, None], step, aside)
+    aside[_near_restart(track)] = 0.0
     return np.asarray(aside)
+
+
+def hidden_jump(
+    track: Track, off_m: FloatArray, route_m: FloatArray, least_m: float
+) -> tuple[int, float] | None:
+    """Return the time and size of the greatest step aside that a time without poses hides; None without one.
+
+    It begins on the route and ends off it, or the robot drives the same way before and after and should be
+    elsewhere: by a jump of the poses, or by a detour that nobody saw. `off_m` and `route_m` (n,) are the
+    distance from the route and along it. Up to `least_m` is noise.
+    """
+    steps = np.diff(track.ns)
+    if not len(steps) or len(off_m) != len(track):
+        return None
+    away, found = np.abs(off_m), (0, 0.0)
+    for k in np.flatnonzero((steps > MISSING_STEPS * np.median(steps)) & ~_near_restart(track)).tolist():
+        left = away[k] <= least_m < away[k + 1]
+        size = math.dist(track.xy[k], track.xy[k + 1]) if left else _unpredicted_m(track, route_m, k)
+        if size > max(least_m, found[1]):
+            found = (int(track.ns[k + 1]), size)
+    return found if found[1] else None
+
+
+def _unpredicted_m(track: Track, route_m: FloatArray, k: int) -> float:
+    """Return how far the pose after a step is from where steady driving leads; 0 where it is not steady."""
+    if not STEPS <= k < len(track) - 1 - STEPS:
+        return 0.0
+    xy, seconds = track.xy, track.ns / 1e9 - track.ns[k] / 1e9
+    before = (xy[k] - xy[k - STEPS]) / max(seconds[k] - seconds[k - STEPS], 1e-3)
+    after = (xy[k + 1 + STEPS] - xy[k + 1]) / max(seconds[k + 1 + STEPS] - seconds[k + 1], 1e-3)
+    speed, step = math.hypot(*before), xy[k + 1] - xy[k]
+    steady = speed > DRIVES_M_S and math.dist(before, after) <= UNSTEADY * speed
+    bends = route_m[k + 1] - route_m[k] > BENDS * math.hypot(*step)
+    if not steady or bends or seconds[k + 1] > HEALED_S or math.hypot(*step) <= LEAST_CORRECTION_M:
+        return 0.0
+    aside = math.hypot(*(step - (before + after) / 2 * seconds[k + 1]))
+    return aside if aside > LEAST_CORRECTION_M + UNSTEADY / 2 * speed * seconds[k + 1] else 0.0
 
 
 def _near_restart(track: Track) -> BoolArray:

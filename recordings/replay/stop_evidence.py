@@ -23,7 +23,13 @@ from stopgo.mission.run.tolerance import is_outside
 from stopgo.recordings.logs.telemetry_log import FORMAT
 from stopgo.recordings.replay.fit_error import fit_error_m
 from stopgo.recordings.replay.fitting import STRETCH
-from stopgo.recordings.replay.jumps import lasting_error_m, lasting_jump
+from stopgo.recordings.replay.jumps import (
+    LEAST_CORRECTION_M,
+    SIGMAS,
+    hidden_jump,
+    lasting_error_m,
+    lasting_jump,
+)
 from stopgo.recordings.replay.matching import long_enough
 from stopgo.recordings.replay.position_errors import PositionErrors, position_errors, visits_of
 from stopgo.recordings.replay.replayed import Replay
@@ -51,16 +57,46 @@ class StopEvidence:
 def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
     """Return the evidence for each stop, in the mission's order."""
     errors, fit_m = position_errors(replay), fit_error_m(replay)
-    jump_m = lasting_error_m(replay.run.poses)
+    jump_m, hidden = lasting_error_m(replay.run.poses), _hidden_jump(replay, errors.noise_m)
+    hidden_m = 0.0 if hidden is None else hidden[1]
     found = []
     for k, item in enumerate(replay.comparison.asked):
         evidence = _with_jump(_evidence(replay, k, item, errors), jump_m)
+        evidence = _with_hidden_jump(replay, k, evidence, hidden_m)
         common_m = float(errors.unsure_m[k] + fit_m[k])
         one = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
         placed = one.is_placed and item.deviation_m is not None
-        unsure_m = None if not placed else common_m + jump_m + float(errors.spread_m[k])
+        unsure_m = None if not placed else common_m + max(jump_m, hidden_m) + float(errors.spread_m[k])
         found.append(changed(one, unsure_m=unsure_m))
     return tuple(found)
+
+
+def _hidden_jump(replay: Replay, noise_m: float) -> tuple[int, float] | None:
+    """Return the time and size of the step off the route that a time without poses hides."""
+    track, cross_track = replay.run.poses, replay.comparison.cross_track
+    if not len(cross_track.ns):
+        return None
+    poses = track.between(int(cross_track.ns[0]), int(cross_track.ns[-1]))
+    return hidden_jump(
+        poses, cross_track.metres, cross_track.route, max(LEAST_CORRECTION_M, SIGMAS * noise_m)
+    )
+
+
+def _with_hidden_jump(replay: Replay, number: int, evidence: StopEvidence, hidden_m: float) -> StopEvidence:
+    """Return a yes or no as undecided if a jump in a time without poses may have made it."""
+    item, stop = evidence.item, replay.mission.stops[number]
+    if not hidden_m or evidence.answer == "unknown":
+        return evidence
+    if evidence.answer == "yes":
+        doubtful = is_outside((item.deviation_m or 0.0) + hidden_m, stop.tolerance_m)
+    else:
+        whole = [match.standstill for match in replay.matches if long_enough(match.standstill, stop)]
+        away = [math.dist(standstill.xy, (stop.x, stop.y)) for standstill in whole]
+        doubtful = bool(away) and not is_outside(min(away) - hidden_m, stop.tolerance_m)
+    if not doubtful:
+        return evidence
+    why = f"a time without poses hides a step aside of {hidden_m:.2f} m; give another source of poses"
+    return changed(evidence, answer="unknown", why=why)
 
 
 def _with_jump(evidence: StopEvidence, jump_m: float) -> StopEvidence:
@@ -244,7 +280,7 @@ def apart_from_plan(replay: Replay) -> Iterator[str]:
     unseen, and no gap or jump is between them.
     """
     track = replay.run.poses
-    jump = lasting_jump(track)
+    jump = lasting_jump(track) or _hidden_jump(replay, 0.0)
     for (a, one), (b, other) in pairwise(visits_of(replay)):
         between = track.between(one.standstill.end_ns, other.standstill.begin_ns)
         jumped = jump is not None and one.standstill.end_ns <= jump[0] <= other.standstill.begin_ns

@@ -364,3 +364,25 @@ def test_without_headings_a_log_that_places_itself_denies_nothing() -> None:
     judged = drive_verdict(replay(held(blind), mission, FIRST))
     assert judged.answer == "unknown"
     assert "the log has no headings" in judged.text
+
+
+@pytest.mark.parametrize("follows", [True, False], ids=["robot follows its poses", "robot is right"])
+@pytest.mark.parametrize(
+    "jump, gap_s", [((0.2, 0.2), 0.5), ((0.5, 0.4), 1.5), ((0.2, 0.2), 4.0), ((3.0, 0.0), 1.5)]
+)
+def test_a_jump_of_the_poses_that_a_gap_hides_leaves_the_stops_undecided(
+    jump: tuple[float, float], gap_s: float, follows: bool
+) -> None:
+    """A robot that follows its poses steers back to the route, and is off it; else only its poses are."""
+    mission = mission_with_return(1)
+    tour = as_planned(mission, np.random.default_rng(1))
+    poses, halts = sensed(tour), tour.drive.halts
+    at, end = (halts[4].end_s + halts[5].begin_s) / 2, halts[5].begin_s - 0.5
+    left = np.where(poses.true_s > at, 1.0, 0.0)
+    if follows:
+        left *= 1 - np.clip((poses.true_s - at - gap_s) / (end - at - gap_s), 0, 1)
+    kept = np.abs(poses.true_s - at) >= gap_s / 2
+    xy = poses.xy + left[:, None] * jump
+    track = Track.of(poses.ns[kept], xy[kept], poses.heading[kept])
+    judged = drive_verdict(replay(log_of(track), mission, THERE))
+    assert judged.answer == "unknown", judged.text
