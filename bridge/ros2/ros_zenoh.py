@@ -82,14 +82,15 @@ class RosListener:
         self.entities: tuple[RosEntity, ...] = ()
         self.telemetry = RosTelemetry(self._clock, settings.frames, settings.limits)
         self.state: dict[str, Any] | None = None
-        """The newest state that stopgo's node has published."""
+        """The newest state that stopgo's node has published; `None` while there is no such node."""
         base = f"/{namespace.strip('/')}".rstrip("/")
+        self._state_topic = f"{base}/{settings.node}/state"
         self.wanted = {
             f"{base}/{settings.topics.odometry}": ("nav_msgs/msg/Odometry", self._take_odometry),
             "/tf": ("tf2_msgs/msg/TFMessage", self._take_tf),
             "/tf_static": ("tf2_msgs/msg/TFMessage", self._take_tf_static),
             f"{base}/{settings.topics.battery}": ("sensor_msgs/msg/BatteryState", self._take_battery),
-            f"{base}/{settings.node}/state": ("std_msgs/msg/String", self._take_state),
+            self._state_topic: ("std_msgs/msg/String", self._take_state),
         }
         self.topics: dict[str, HeardTopic] = {}
 
@@ -102,6 +103,9 @@ class RosListener:
         for one in self.entities:
             if one.kind == "publisher" and one.name in self.wanted and one.name not in self.topics:
                 self.topics[one.name] = self._heard(one)
+        published = {one.name for one in self.entities if one.kind == "publisher"}
+        if self._state_topic not in published:
+            self.state = None
 
     def _heard(self, one: RosEntity) -> HeardTopic:
         kind, take = self.wanted[one.name]
