@@ -27,6 +27,7 @@ from stopgo.bridge.commands.connection import (
     with_connection,
 )
 from stopgo.bridge.commands.ros_checks import ros_status_text
+from stopgo.bridge.commands.ros_watch import watch_ros
 from stopgo.bridge.commands.run_control_commands import status_json
 from stopgo.bridge.console import print_json, print_line, print_text, say
 
@@ -111,7 +112,6 @@ def _or_ros2(watch: Callable[..., None]) -> Callable[..., None]:
 
 def watch_topics(ros2: str, endpoint: str, *, as_json: bool) -> None:
     """Print a robot's state at each change of its topics; its scans are not proved by them."""
-    from stopgo.bridge.commands.ros_watch import watch_ros
     from stopgo.mission.comparing.run_verdict import EXIT_CODES
 
     def show(found: dict[str, Any]) -> None:
