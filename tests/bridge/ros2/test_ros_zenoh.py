@@ -118,6 +118,7 @@ def test_a_domain_is_a_number(text: str) -> None:
     with pytest.raises(InputError, match="0 to 232"):
         read_domain(text)
     assert read_domain("7/fleet/r1") == (7, "fleet/r1")
+    assert read_domain("dds/r1") == (None, "r1")
 
 
 def state_message(**state: Any) -> bytes:
@@ -211,3 +212,29 @@ def test_what_cannot_be_watched_is_one_line(
     monkeypatch.setattr(ros_checks, "LISTENS_S", 0.2)
     assert stopgo(["watch", "--ros2", "12/r1", "--connect", endpoint, *more]) == 2
     assert capsys.readouterr().err == f"stopgo: {said}\n"
+
+
+def test_a_robot_behind_a_dds_bridge_is_read_with_what_the_bridge_has_kept(sessions: tuple[Any, Any]) -> None:
+    """The bridge is played as its source describes it: plain keys, and a queryable for late listeners."""
+    robot, station = sessions
+    lively = robot.liveliness()
+    kept = state_message(state="PAUSED", done_count=3)
+    cache = robot.declare_queryable(
+        "@/12ab/@ros2_pub_cache/r1/stopgo/state", lambda query: query.reply("r1/stopgo/state", kept)
+    )
+    tokens = [
+        lively.declare_token("@/12ab/@ros2_lv/MP/r1§odom/nav_msgs§msg§Odometry/:1:0:0,10"),
+        lively.declare_token("@/12ab/@ros2_lv/MP/r1§tf/tf2_msgs§msg§TFMessage/:1:0:0,10"),
+        lively.declare_token("@/12ab/@ros2_lv/MP/r1§stopgo§state/std_msgs§msg§String/:1:1:0,1"),
+    ]
+    listener = RosListener(station, *read_domain("dds/r1"), RosSettings())
+    while not {"/r1/odom", "/tf", "/r1/stopgo/state"} <= listener.topics.keys():
+        listener.look()
+    assert listener.topics["/tf"].entity.key == "r1/tf"
+    heard = threading.Event()
+    listener.telemetry.take_odometry = lambda *_, **named: heard.set()  # type: ignore[method-assign]
+    while not heard.wait(0.02):
+        robot.put("r1/odom", odometry(0.5))
+    assert state_of(listener, "dds/r1")["state"] == "PAUSED"
+    for made in (cache, *tokens):
+        made.undeclare()
