@@ -92,7 +92,8 @@ def _bridged(parts: list[str]) -> RosEntity | None:
         return RosEntity(None, BRIDGED_ACTIONS[of], node, f"{name}{ACTION}", f"{type_}_SendGoal")
     if of not in KINDS or type_.count("/") != 2:
         return None
-    _, reliability, durability, _, told, *_ = [*(parts[6].split(":") if len(parts) > 6 else ()), *[""] * 5]
+    policies = parts[6].split(":") if len(parts) > 6 else []
+    _, reliability, durability, _, told, *_ = [*policies, *[""] * 5]
     qos = f"{'2' if reliability == '0' else '1'}:{'1' if durability == '1' else '2'}"
     return RosEntity(
         None, KINDS[of], node, name, type_, told.partition("typehash=")[2].partition(";")[0], qos
