@@ -114,7 +114,7 @@ RosDomain = Annotated[
         "--ros2",
         metavar="DOMAIN[/NS]",
         rich_help_panel=CONNECTION,
-        help="Topics of a ROS 2 robot (rmw_zenoh) instead, at --connect.",
+        help="Topics of a ROS 2 robot instead, over rmw_zenoh at --connect; behind a DDS bridge: dds/NS.",
     ),
 ]
 RequiredMavlinkUrl = Annotated[

@@ -80,19 +80,22 @@ def _topic_check(name: str, kind: str, topic: HeardTopic | None) -> Check:
 def ros_status(text: str, endpoint: str) -> dict[str, Any]:
     """Return the state, position and battery of a robot, as its topics have them; `None` if unknown."""
     with listened(text, endpoint) as listener:
-        told = listener.telemetry
-        silent, pose, state = told.silence(), told.pose(), listener.state or {}
-        return {
-            "robot": text,
-            "refused": [
-                f"{name}: {topic.refused}" for name, topic in listener.topics.items() if topic.refused
-            ],
-            "silent": silent,
-            "pose": None if silent else {"x": pose.x, "y": pose.y, "heading": pose.heading},
-            "speed": None if silent else told.speed(),
-            "battery": told.charge,
-            **{key: state.get(key) for key in ("state", "run_id", "stop", "stop_state", "done_count")},
-        }
+        return state_of(listener, text)
+
+
+def state_of(listener: RosListener, text: str) -> dict[str, Any]:
+    """Return the same of what a listener has heard so far."""
+    told = listener.telemetry
+    silent, pose, state = told.silence(), told.pose(), listener.state or {}
+    return {
+        "robot": text,
+        "refused": [f"{name}: {topic.refused}" for name, topic in listener.topics.items() if topic.refused],
+        "silent": silent,
+        "pose": None if silent else {"x": pose.x, "y": pose.y, "heading": pose.heading},
+        "speed": None if silent else told.speed(),
+        "battery": told.charge,
+        **{key: state.get(key) for key in ("state", "run_id", "stop", "stop_state", "done_count")},
+    }
 
 
 def ros_status_text(found: dict[str, Any]) -> str:

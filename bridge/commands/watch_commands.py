@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import typer
 
-from stopgo.bridge.commands.bridge_options import FinishedRun, Json, PlanRecordingFile, RunRecordingFile, View
-from stopgo.bridge.commands.connection import Connection, reached, with_connection
+from stopgo.bridge.commands.bridge_options import (
+    FinishedRun,
+    Json,
+    PlanRecordingFile,
+    RosDomain,
+    RunRecordingFile,
+    View,
+)
+from stopgo.bridge.commands.connection import (
+    Connection,
+    given_options,
+    reached,
+    refuse_options,
+    with_connection,
+)
+from stopgo.bridge.commands.ros_checks import ros_status_text
+from stopgo.bridge.commands.ros_watch import watch_ros
 from stopgo.bridge.commands.run_control_commands import status_json
 from stopgo.bridge.console import print_json, print_line, print_text, say
 
@@ -49,7 +65,12 @@ Example: stopgo watch --robot r1 --plan plan.rrd --rrd field.rrd
 Example: stopgo watch --robot r1 --run 424b529f524b --rrd field.rrd
 
 Example: stopgo watch --mavlink udpout:127.0.0.1:14550 --rrd field.rrd
+
+Example: stopgo watch --ros2 0/r1 --connect tcp/10.1.2.3:7447
 """
+
+WITHOUT_ROS2 = ("--robot", "--mavlink", "--site", "--keys", "--rrd", "--plan", "--run", "--view")
+"""Options that have no meaning with `--ros2`."""
 
 
 def watch_command(recorder: Recorder) -> Callable[..., None]:
@@ -68,7 +89,40 @@ def watch_command(recorder: Recorder) -> Callable[..., None]:
             follow_and_judge(connection, collector, run, as_json=json_)
 
     watch.__doc__ = WATCH_HELP
-    return with_connection()(watch)
+    return _or_ros2(with_connection()(watch))
+
+
+def _or_ros2(watch: Callable[..., None]) -> Callable[..., None]:
+    """Add `--ros2` to the command, with which it follows a robot's topics instead."""
+
+    def chosen(context: typer.Context, *, ros2: RosDomain = None, **values: Any) -> None:
+        if ros2 is None:
+            return watch(context, **values)
+        refuse_options(given_options(context), "--ros2", *WITHOUT_ROS2)
+        return watch_topics(ros2, values["connect"], as_json=values["json_"])
+
+    whole = inspect.signature(watch)
+    added = inspect.Parameter("ros2", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=RosDomain)
+    everything = [*whole.parameters.values(), added]
+    chosen.__name__, chosen.__doc__ = watch.__name__, watch.__doc__
+    chosen.__signature__ = whole.replace(parameters=everything)  # type: ignore[attr-defined]
+    chosen.__annotations__ = {one.name: one.annotation for one in everything}
+    return chosen
+
+
+def watch_topics(ros2: str, endpoint: str, *, as_json: bool) -> None:
+    """Print a robot's state at each change of its topics; its scans are not proved by them."""
+    from stopgo.mission.comparing.run_verdict import EXIT_CODES
+
+    def show(found: dict[str, Any]) -> None:
+        if as_json:
+            print_json(found)
+        else:
+            print_line(ros_status_text(found), flush=True)
+
+    state = watch_ros(ros2, endpoint, show)
+    say(f"the robot reports {state}; its topics do not prove its scans: review its recording")
+    raise typer.Exit(EXIT_CODES["unknown"])
 
 
 def follow_and_judge(

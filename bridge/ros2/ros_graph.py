@@ -1,6 +1,7 @@
-"""The graph of a ROS 2 network over rmw_zenoh: who publishes, subscribes and serves, from liveliness tokens.
+"""The graph of a ROS 2 network over zenoh: who publishes, subscribes and serves, from liveliness tokens.
 
-A token names domain, session, node, kind, namespace, name, type, hash of the type's definition, and QoS.
+A token of rmw_zenoh names domain, session, node, kind, namespace, name, type, hash of the type's definition,
+and QoS. A token of zenoh-bridge-ros2dds names its session, kind, key, type and QoS; it knows no node.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 TOKENS = "@ros2_lv"
+BRIDGED_TOKENS = f"@/*/{TOKENS}"
+"""Those of zenoh-bridge-ros2dds."""
 ACTION = "/_action/send_goal"
 EntityKind = Literal["node", "publisher", "subscriber", "server", "client"]
 KINDS: dict[str, EntityKind] = {
@@ -19,16 +22,18 @@ KINDS: dict[str, EntityKind] = {
     "SS": "server",
     "SC": "client",
 }
+BRIDGED_ACTIONS: dict[str, EntityKind] = {"AS": "server", "AC": "client"}
 
 
 @dataclass(frozen=True)
 class RosEntity:
     """A node, or what it publishes, subscribes or serves."""
 
-    domain: int
+    domain: int | None
+    """`None` behind zenoh-bridge-ros2dds."""
     kind: EntityKind
     node: str
-    """With its namespace, such as /r1/nav2."""
+    """With its namespace, such as /r1/nav2; the bridge's, where only that is known."""
     name: str = ""
     """With its namespace, such as /r1/odom."""
     type: str = ""
@@ -39,6 +44,8 @@ class RosEntity:
     @property
     def key(self) -> str:
         """Key expression of its data."""
+        if self.domain is None:
+            return self.name.strip("/")
         package, group, kind = self.type.split("/")
         return f"{self.domain}/{self.name.strip('/')}/{package}::{group}::dds_::{kind}_/{self.hash}"
 
@@ -57,8 +64,10 @@ class RosEntity:
 
 
 def entity_of(token: str) -> RosEntity | None:
-    """Return what a liveliness token says; `None` if it is no token of rmw_zenoh."""
+    """Return what a liveliness token says; `None` if it is no token of a ROS 2 network."""
     parts = token.split("/")
+    if parts[0] == "@":
+        return _bridged(parts)
     if len(parts) < 9 or parts[0] != TOKENS or parts[5] not in KINDS or not parts[1].isdigit():
         return None
     kind = KINDS[parts[5]]
@@ -71,6 +80,24 @@ def entity_of(token: str) -> RosEntity | None:
     if type_.count("/") != 2:
         return None
     return RosEntity(int(parts[1]), kind, node, _name(parts[9]), type_, parts[11], parts[12])
+
+
+def _bridged(parts: list[str]) -> RosEntity | None:
+    """Return what a token of zenoh-bridge-ros2dds says, in its parts."""
+    if len(parts) < 6 or parts[2] != TOKENS:
+        return None
+    of, name, type_ = parts[3], "/" + parts[4].replace("§", "/"), parts[5].replace("§", "/")
+    node = f"zenoh-bridge-ros2dds {parts[1][:8]}"
+    if of in BRIDGED_ACTIONS:
+        return RosEntity(None, BRIDGED_ACTIONS[of], node, f"{name}{ACTION}", f"{type_}_SendGoal")
+    if of not in KINDS or type_.count("/") != 2:
+        return None
+    policies = parts[6].split(":") if len(parts) > 6 else []
+    _, reliability, durability, _, told, *_ = [*policies, *[""] * 5]
+    qos = f"{'2' if reliability == '0' else '1'}:{'1' if durability == '1' else '2'}"
+    return RosEntity(
+        None, KINDS[of], node, name, type_, told.partition("typehash=")[2].partition(";")[0], qos
+    )
 
 
 def _name(mangled: str) -> str:
@@ -100,7 +127,7 @@ def discords(entities: Iterable[RosEntity]) -> Iterator[str]:
 def _discord(giver: RosEntity, taker: RosEntity) -> str:
     if giver.type != taker.type:
         return f"types {giver.type} and {taker.type}"
-    if giver.hash != taker.hash:
+    if giver.hash and taker.hash and giver.hash != taker.hash:
         return hash_text(giver.type, giver.hash, taker.hash)
     if giver.kind == "server":
         return ""

@@ -1,6 +1,7 @@
-"""Listening to a ROS 2 network over rmw_zenoh's keys, without ROS: nothing is published or called.
+"""Listening to a ROS 2 network over zenoh, without ROS: nothing is published or called.
 
-Messages are decoded by the definitions of ROS 2 Jazzy. A topic whose definition has another hash is not read.
+The keys are those of rmw_zenoh, or of zenoh-bridge-ros2dds. Messages are decoded by the definitions of ROS 2
+Jazzy. A topic whose definition has another hash is not read.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import zenoh
 
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.zenoh_link import COMMON
-from stopgo.bridge.ros2.ros_graph import TOKENS, RosEntity, entity_of, hash_text
+from stopgo.bridge.ros2.ros_graph import BRIDGED_TOKENS, TOKENS, RosEntity, entity_of, hash_text
 from stopgo.bridge.ros2.ros_settings import RosSettings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
 from stopgo.mission.errors import InputError, RobotUnreachable
@@ -27,6 +28,11 @@ from stopgo.mission.frames.transform import Transform
 
 ATTACHMENT = struct.Struct("<qq")
 """Sequence number and source time in nanoseconds; a GID follows."""
+REPLIES_S = 2.0
+BRIDGED = "dds"
+"""Word for the domain of a robot behind zenoh-bridge-ros2dds, whose keys have none."""
+BRIDGES_CACHE = "@ros2_pub_cache"
+"""Part of the key below which zenoh-bridge-ros2dds keeps messages for late subscribers."""
 
 
 @dataclass
@@ -67,7 +73,12 @@ class RosListener:
     """One robot in a ROS 2 network: its topics below a namespace, and the graph of the whole domain."""
 
     def __init__(
-        self, session: Any, domain: int, namespace: str, settings: RosSettings, clock: Clock | None = None
+        self,
+        session: Any,
+        domain: int | None,
+        namespace: str,
+        settings: RosSettings,
+        clock: Clock | None = None,
     ) -> None:
         from rosbags.serde import SerdeError
         from rosbags.typesys import Stores, get_typestore
@@ -82,34 +93,44 @@ class RosListener:
         self.entities: tuple[RosEntity, ...] = ()
         self.telemetry = RosTelemetry(self._clock, settings.frames, settings.limits)
         self.state: dict[str, Any] | None = None
-        """The newest state that stopgo's node has published."""
+        """The newest state that stopgo's node has published; `None` while there is no such node."""
         base = f"/{namespace.strip('/')}".rstrip("/")
+        self._own_tf = {f"{base}/tf": "/tf", f"{base}/tf_static": "/tf_static"}
+        self._state_topic = f"{base}/{settings.node}/state"
         self.wanted = {
             f"{base}/{settings.topics.odometry}": ("nav_msgs/msg/Odometry", self._take_odometry),
             "/tf": ("tf2_msgs/msg/TFMessage", self._take_tf),
             "/tf_static": ("tf2_msgs/msg/TFMessage", self._take_tf_static),
             f"{base}/{settings.topics.battery}": ("sensor_msgs/msg/BatteryState", self._take_battery),
-            f"{base}/{settings.node}/state": ("std_msgs/msg/String", self._take_state),
+            self._state_topic: ("std_msgs/msg/String", self._take_state),
         }
         self.topics: dict[str, HeardTopic] = {}
 
     def look(self) -> None:
         """Read the graph, and subscribe to what is new of the robot."""
-        replies = self._session.liveliness().get(f"{TOKENS}/{self._domain}/**", timeout=2.0)
+        tokens_of = BRIDGED_TOKENS if self._domain is None else f"{TOKENS}/{self._domain}"
+        replies = self._session.liveliness().get(f"{tokens_of}/**", timeout=REPLIES_S)
         tokens = {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
         found = (entity_of(token) for token in sorted(tokens))
         self.entities = tuple(one for one in found if one is not None)
         for one in self.entities:
-            if one.kind == "publisher" and one.name in self.wanted and one.name not in self.topics:
-                self.topics[one.name] = self._heard(one)
+            name = self._name_of(one)
+            if one.kind == "publisher" and name in self.wanted and name not in self.topics:
+                self.topics[name] = self._heard(one, *self.wanted[name])
+        published = {one.name for one in self.entities if one.kind == "publisher"}
+        if self._state_topic not in published:
+            self.state = None
 
-    def _heard(self, one: RosEntity) -> HeardTopic:
-        kind, take = self.wanted[one.name]
+    def _name_of(self, one: RosEntity) -> str:
+        """Return a topic's name for the robot: a bridge puts its namespace before tf as well."""
+        return self._own_tf.get(one.name, one.name) if one.domain is None else one.name
+
+    def _heard(self, one: RosEntity, kind: str, take: Any) -> HeardTopic:
         topic = HeardTopic(one)
         own = self._types.hash_rihs01(kind)
         if one.type != kind:
             topic.refused = f"it is of type {one.type}, not {kind}"
-        elif one.hash != own:
+        elif one.hash != own and (one.hash or one.domain is not None):
             topic.refused = hash_text(kind, f"{one.hash} there", f"{own} here")
         else:
             self._subscribe(topic, kind, take)
@@ -129,9 +150,18 @@ class RosListener:
         if topic.entity.kept:
             past = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
             made = zenoh.ext.declare_advanced_subscriber(self._session, key, heard, history=past)
+            if topic.entity.domain is None:
+                self._take_cached(key, heard, topic)
         else:
             made = self._session.declare_subscriber(key, heard)
         self._subscribed.append(made)
+
+    def _take_cached(self, key: str, heard: Any, topic: HeardTopic) -> None:
+        """Take what a bridge has kept of a topic, unless something newer has come."""
+        kept, own_key = f"@/*/{BRIDGES_CACHE}/{key}", zenoh.ReplyKeyExpr.ANY
+        for reply in self._session.get(kept, timeout=REPLIES_S, accept_replies=own_key):
+            if reply.ok is not None and not topic.count:
+                heard(reply.ok)
 
     def _take_odometry(self, message: Any) -> None:
         speed, stamp_ns = message.twist.twist.linear, _stamp_ns(message.header.stamp)
@@ -166,17 +196,22 @@ def _stamp_ns(stamp: Any) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
-def read_domain(text: str) -> tuple[int, str]:
-    """Read DOMAIN or DOMAIN/NAMESPACE, such as 0/r1."""
+def read_domain(text: str) -> tuple[int | None, str]:
+    """Read DOMAIN or DOMAIN/NAMESPACE, such as 0/r1; the domain is `None` for `dds`."""
     domain, _, namespace = text.partition("/")
+    if domain == BRIDGED:
+        return None, namespace
     if not domain.isdigit() or int(domain) > 232:
-        raise InputError(f"--ros2 {text}: write the domain's number, 0 to 232, or DOMAIN/NAMESPACE, as 0/r1")
+        raise InputError(
+            f"--ros2 {text}: write the domain's number, 0 to 232, or DOMAIN/NAMESPACE, as 0/r1;"
+            f" behind zenoh-bridge-ros2dds, {BRIDGED}/r1"
+        )
     return int(domain), namespace
 
 
 @contextmanager
 def ros_listener(
-    endpoints: Sequence[str], domain: int, namespace: str, settings: RosSettings
+    endpoints: Sequence[str], domain: int | None, namespace: str, settings: RosSettings
 ) -> Iterator[RosListener]:
     """Listen at a zenoh router, as a client, for as long as the block lasts.
 

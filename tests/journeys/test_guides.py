@@ -48,7 +48,7 @@ ELSEWHERE = {
     r"stopgo site .*--listen": "needs an address of a local network: tests/site/test_web_server.py",
     r"python docs/query_runs.py": "tests/recordings/test_query.py runs it",
     r"(sudo apt|python3 -m venv|source) ": "prepares a computer with ROS 2",
-    r"~/stopgo/bin/stopgo robot|stopgo (status|doctor) --ros2": "needs ROS 2: tests/ros2, in make ros2",
+    r"~/stopgo/bin/stopgo robot|stopgo (status|watch|doctor) --ros2": "needs ROS 2: tests/ros2, in make ros2",
     r"cat ": "prints a file of the guide",
 }
 """Commands that do not run here, and the reason."""

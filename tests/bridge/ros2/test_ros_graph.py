@@ -56,3 +56,27 @@ def test_an_action_is_known_by_its_goal_service() -> None:
     one = entity_of(goal)
     assert one is not None
     assert actions_of([one]) == {"/follow_path": "nav2_msgs/action/FollowPath"}
+
+
+def bridged(
+    kind: str, key: str = "r1§odom", type_: str = "nav_msgs§msg§Odometry", qos: str = ":1:0:0,10"
+) -> str:
+    return f"@/12ab34cd56/@ros2_lv/{kind}/{key}/{type_}/{qos}"
+
+
+def test_a_bridges_token_names_key_type_and_qos() -> None:
+    one = entity_of(bridged("MP", qos=":0:1:0,1:typehash=RIHS01_aa;"))
+    assert one is not None
+    assert (one.domain, one.kind, one.name, one.key) == (None, "publisher", "/r1/odom", "r1/odom")
+    assert (one.type, one.hash, one.reliable, one.kept) == ("nav_msgs/msg/Odometry", "RIHS01_aa", False, True)
+    assert one.node == "zenoh-bridge-ros2dds 12ab34cd"
+    action = entity_of("@/12ab/@ros2_lv/AS/r1§follow_path/nav2_msgs§action§FollowPath")
+    assert action is not None
+    assert actions_of([action]) == {"/r1/follow_path": "nav2_msgs/action/FollowPath"}
+
+
+def test_what_is_no_bridges_token() -> None:
+    for text in ("@/12ab/router", "@/12ab/@ros2_lv/XX/a/b", bridged("MP", type_="Odometry"), "@"):
+        assert entity_of(text) is None
+    bare = entity_of("@/12ab/@ros2_lv/MP/odom/nav_msgs§msg§Odometry")
+    assert bare is not None and (bare.hash, bare.reliable, bare.kept) == ("", True, False)

@@ -6,6 +6,7 @@ import json
 import struct
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,12 @@ import pytest
 import zenoh
 from rosbags.typesys import Stores, get_typestore
 
-from stopgo.bridge.commands.ros_checks import graph_checks
+from stopgo.bridge.commands import ros_checks
+from stopgo.bridge.commands.ros_checks import graph_checks, state_of
+from stopgo.bridge.commands.ros_watch import followed
 from stopgo.bridge.ros2.ros_settings import RosSettings
 from stopgo.bridge.ros2.ros_zenoh import HeardTopic, RosListener, read_domain
+from stopgo.command_line import main as stopgo
 from stopgo.mission.errors import InputError
 from tests.ports import free_port
 
@@ -24,9 +28,13 @@ ODOMETRY = "nav_msgs::msg::dds_::Odometry_"
 
 
 @pytest.fixture(scope="module")
-def sessions() -> Iterator[tuple[Any, Any]]:
+def endpoint() -> str:
+    return f"tcp/127.0.0.1:{free_port()}"
+
+
+@pytest.fixture(scope="module")
+def sessions(endpoint: str) -> Iterator[tuple[Any, Any]]:
     """A robot's session, and a station's."""
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
 
     def opened(mode: str, key: str) -> Any:
         config = zenoh.Config()
@@ -110,3 +118,123 @@ def test_a_domain_is_a_number(text: str) -> None:
     with pytest.raises(InputError, match="0 to 232"):
         read_domain(text)
     assert read_domain("7/fleet/r1") == (7, "fleet/r1")
+    assert read_domain("dds/r1") == (None, "r1")
+
+
+def state_message(**state: Any) -> bytes:
+    made = TYPES.types["std_msgs/msg/String"](data=json.dumps(state))
+    return bytes(TYPES.serialize_cdr(made, "std_msgs/msg/String"))
+
+
+@contextmanager
+def stating(robot: Any, domain: int) -> Iterator[Any]:
+    """A publisher of the robot's state, which late listeners get as well."""
+    hash_, kind = TYPES.hash_rihs01("std_msgs/msg/String"), "std_msgs::msg::dds_::String_"
+    tail = f"%r1%stopgo%state/{kind}/{hash_}/1:1:,1:,:,:,,"
+    token = robot.liveliness().declare_token(f"@ros2_lv/{domain}/abc/0/5/MP/%/%r1/stopgo/{tail}")
+    cache = zenoh.ext.CacheConfig(max_samples=1)
+    publisher = zenoh.ext.declare_advanced_publisher(
+        robot, f"{domain}/r1/stopgo/state/{kind}/{hash_}", cache=cache
+    )
+    yield publisher
+    publisher.undeclare()
+    token.undeclare()
+
+
+def test_each_change_of_a_run_is_shown_until_it_is_over(sessions: tuple[Any, Any]) -> None:
+    robot, station = sessions
+    states = [
+        {"state": "READY"},
+        {"state": "RUNNING", "stop": "s01", "stop_state": "DRIVING"},
+        {"state": "RUNNING", "stop": "s01", "stop_state": "DRIVING", "battery": 0.5},
+        {"state": "RUNNING", "stop": "s02", "stop_state": "SCANNING", "done_count": 1},
+        {"state": "FINISHED", "done_count": 2},
+    ]
+    with stating(robot, 9) as publisher:
+        listener = RosListener(station, 9, "r1", RosSettings())
+        while not listener.topics:
+            listener.look()
+        shown: list[dict[str, Any]] = []
+        sent: list[dict[str, Any] | None] = [None]
+
+        def robot_goes_on(_: float) -> None:
+            """The next state, once the last one was heard."""
+            if listener.state == sent[-1]:
+                sent.append({"stop": None, "stop_state": None, **states[len(sent) - 1]})
+                publisher.put(state_message(**sent[-1]))
+
+        assert followed(listener, "9/r1", shown.append, wait=robot_goes_on) == "FINISHED"
+    said = [(one["state"], one["stop"], one["done_count"]) for one in shown]
+    assert said == [
+        (None, None, None), ("READY", None, None), ("RUNNING", "s01", None), ("RUNNING", "s02", 1),
+        ("FINISHED", None, 2),
+    ]  # fmt: skip
+
+
+def test_the_state_of_a_node_that_has_ended_is_not_shown(sessions: tuple[Any, Any]) -> None:
+    robot, station = sessions
+    listener = RosListener(station, 10, "r1", RosSettings())
+    with stating(robot, 10) as publisher:
+        publisher.put(state_message(state="RUNNING"))
+        while listener.state is None:
+            listener.look()
+    while listener.state is not None:
+        listener.look()
+    assert state_of(listener, "10/r1")["state"] is None
+
+
+def test_the_command_ends_as_undecided_when_the_run_is_over(
+    endpoint: str,
+    sessions: tuple[Any, Any],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(ros_checks, "LISTENS_S", 0.2)
+    with stating(sessions[0], 11) as publisher:
+        publisher.put(state_message(state="FINISHED", done_count=2))
+        assert stopgo(["watch", "--ros2", "11/r1", "--connect", endpoint]) == 3
+    said = capsys.readouterr()
+    assert said.out.splitlines()[-1].startswith("11/r1: FINISHED")
+    assert said.err == "the robot reports FINISHED; its topics do not prove its scans: review its recording\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--rrd", "field.rrd"], "--rrd has no meaning with --ros2; leave it out"),
+        ([], "--ros2 12/r1: nothing of this robot is published; stopgo doctor --ros2 12/r1 lists what is"),
+    ],
+)
+def test_what_cannot_be_watched_is_one_line(
+    more: list[str], said: str, endpoint: str, sessions: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setattr(ros_checks, "LISTENS_S", 0.2)
+    assert stopgo(["watch", "--ros2", "12/r1", "--connect", endpoint, *more]) == 2
+    assert capsys.readouterr().err == f"stopgo: {said}\n"
+
+
+def test_a_robot_behind_a_dds_bridge_is_read_with_what_the_bridge_has_kept(sessions: tuple[Any, Any]) -> None:
+    """The bridge is played as its source describes it: plain keys, and a queryable for late listeners."""
+    robot, station = sessions
+    lively = robot.liveliness()
+    kept = state_message(state="PAUSED", done_count=3)
+    cache = robot.declare_queryable(
+        "@/12ab/@ros2_pub_cache/r1/stopgo/state", lambda query: query.reply("r1/stopgo/state", kept)
+    )
+    tokens = [
+        lively.declare_token("@/12ab/@ros2_lv/MP/r1§odom/nav_msgs§msg§Odometry/:1:0:0,10"),
+        lively.declare_token("@/12ab/@ros2_lv/MP/r1§tf/tf2_msgs§msg§TFMessage/:1:0:0,10"),
+        lively.declare_token("@/12ab/@ros2_lv/MP/r1§stopgo§state/std_msgs§msg§String/:1:1:0,1"),
+    ]
+    listener = RosListener(station, *read_domain("dds/r1"), RosSettings())
+    while not {"/r1/odom", "/tf", "/r1/stopgo/state"} <= listener.topics.keys():
+        listener.look()
+    assert listener.topics["/tf"].entity.key == "r1/tf"
+    heard = threading.Event()
+    listener.telemetry.take_odometry = lambda *_, **named: heard.set()  # type: ignore[method-assign]
+    while not heard.wait(0.02):
+        robot.put("r1/odom", odometry(0.5))
+    assert state_of(listener, "dds/r1")["state"] == "PAUSED"
+    for made in (cache, *tokens):
+        made.undeclare()
