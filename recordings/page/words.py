@@ -24,7 +24,7 @@ def tag(name: str, *content: str, **attributes: Any) -> str:
 
 
 def row(cells: Iterable[str], *, cell: str = "td", **attributes: Any) -> str:
-    """Return a row of HTML cells; cells with only a number are right-aligned."""
+    """Return a row of HTML cells; cells with only a number, or its limit, are right-aligned."""
     return tag("tr", *(_cell(content, cell) for content in cells), **attributes)
 
 
@@ -32,7 +32,7 @@ def _cell(content: str, cell: str) -> str:
     return tag(cell, content, **({"class_": "number"} if _NUMBER.fullmatch(content) else {}))
 
 
-_NUMBER = re.compile(r"[+−-]?[\d.:]+( %| mm)?( / \d+)?|-")
+_NUMBER = re.compile(r"(≤ )?[+−-]?[\d.:]+( %| mm)?( / \d+)?|-")
 
 
 def grid(header: Sequence[str], rows: Iterable[str], **attributes: Any) -> str:

@@ -25,7 +25,7 @@ from stopgo.recordings.page.from_recordings import subject_of
 from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.page.runs_together import run_names, when_and_who
 from stopgo.recordings.page.subject import ReportSubject
-from stopgo.recordings.page.words import number, shown
+from stopgo.recordings.page.words import number, row, shown
 from tests.mission.comparing.reports import told
 from tests.mission.comparing.test_compare import START, planned, run, visit
 from tests.recordings.run import BEGAN_NS
@@ -240,3 +240,9 @@ def test_a_name_is_left_out_where_its_room_has_no_space_for_a_readable_one() -> 
     assert sizes["hall"] == pytest.approx(2.5 / 170 * 8 * 1.04, rel=1e-2)
     assert sizes.get(long, sizes["hall"]) == sizes["hall"]
     assert endless not in sizes
+
+
+def test_a_number_and_its_limit_are_aligned_alike() -> None:
+    assert row(["7.3 mm", "≤ 7.1 mm", "at most 7"]) == (
+        '<tr><td class="number">7.3 mm</td><td class="number">≤ 7.1 mm</td><td>at most 7</td></tr>'
+    )
