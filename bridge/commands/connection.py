@@ -186,10 +186,16 @@ def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandB
         return command(connection_of(given, **chosen), **values)
 
     context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
-    everything = [context, *options, *own]
+    return with_parameters(called, command, [context, *options, *own])
+
+
+def with_parameters(
+    called: CommandBody, command: CommandBody, parameters: list[inspect.Parameter]
+) -> CommandBody:
+    """Give `called` the name and the help of `command`, and these parameters for its options."""
     called.__name__, called.__doc__ = command.__name__, command.__doc__
-    called.__signature__ = inspect.Signature(everything)  # type: ignore[attr-defined]
-    called.__annotations__ = {parameter.name: parameter.annotation for parameter in everything}
+    called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    called.__annotations__ = {one.name: one.annotation for one in parameters}
     return called
 
 

@@ -25,6 +25,7 @@ from stopgo.bridge.commands.connection import (
     reached,
     refuse_options,
     with_connection,
+    with_parameters,
 )
 from stopgo.bridge.commands.ros_checks import ros_status_text
 from stopgo.bridge.commands.ros_watch import watch_ros
@@ -101,24 +102,25 @@ def _or_ros2(watch: Callable[..., None]) -> Callable[..., None]:
         refuse_options(given_options(context), "--ros2", *WITHOUT_ROS2)
         return watch_topics(ros2, values["connect"], as_json=values["json_"])
 
-    whole = inspect.signature(watch)
     added = inspect.Parameter("ros2", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=RosDomain)
-    everything = [*whole.parameters.values(), added]
-    chosen.__name__, chosen.__doc__ = watch.__name__, watch.__doc__
-    chosen.__signature__ = whole.replace(parameters=everything)  # type: ignore[attr-defined]
-    chosen.__annotations__ = {one.name: one.annotation for one in everything}
-    return chosen
+    return with_parameters(chosen, watch, [*inspect.signature(watch).parameters.values(), added])
 
 
 def watch_topics(ros2: str, endpoint: str, *, as_json: bool) -> None:
     """Print a robot's state at each change of its topics; its scans are not proved by them."""
     from stopgo.mission.comparing.run_verdict import EXIT_CODES
 
+    refused: list[str] = []
+
     def show(found: dict[str, Any]) -> None:
         if as_json:
             print_json(found)
-        else:
-            print_line(ros_status_text(found), flush=True)
+            return
+        for line in found["refused"]:
+            if line not in refused:
+                say(line)
+        refused[:] = found["refused"]
+        print_line(ros_status_text(found), flush=True)
 
     state = watch_ros(ros2, endpoint, show)
     say(f"the robot reports {state}; its topics do not prove its scans: review its recording")
