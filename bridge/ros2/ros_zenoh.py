@@ -89,7 +89,7 @@ class RosListener:
         self._domain = domain
         self._clock = clock or WallClock()
         self._lock = threading.Lock()
-        self._subscribed: list[Any] = []
+        self._subscribed: dict[str, Any] = {}
         self.entities: tuple[RosEntity, ...] = ()
         self.telemetry = RosTelemetry(self._clock, settings.frames, settings.limits)
         self.state: dict[str, Any] | None = None
@@ -107,16 +107,18 @@ class RosListener:
         self.topics: dict[str, HeardTopic] = {}
 
     def look(self) -> None:
-        """Read the graph, and subscribe to what is new of the robot."""
+        """Read the graph, subscribe to what is new of the robot, and drop topics whose publisher has gone."""
         tokens_of = BRIDGED_TOKENS if self._domain is None else f"{TOKENS}/{self._domain}"
         replies = self._session.liveliness().get(f"{tokens_of}/**", timeout=REPLIES_S)
         tokens = {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
         found = (entity_of(token) for token in sorted(tokens))
         self.entities = tuple(one for one in found if one is not None)
+        for name in [name for name, topic in self.topics.items() if topic.entity not in self.entities]:
+            self._drop(name)
         for one in self.entities:
             name = self._name_of(one)
             if one.kind == "publisher" and name in self.wanted and name not in self.topics:
-                self.topics[name] = self._heard(one, *self.wanted[name])
+                self.topics[name] = self._heard(name, one)
         published = {one.name for one in self.entities if one.kind == "publisher"}
         if self._state_topic not in published:
             self.state = None
@@ -125,18 +127,24 @@ class RosListener:
         """Return a topic's name for the robot: a bridge puts its namespace before tf as well."""
         return self._own_tf.get(one.name, one.name) if one.domain is None else one.name
 
-    def _heard(self, one: RosEntity, kind: str, take: Any) -> HeardTopic:
-        topic = HeardTopic(one)
+    def _drop(self, name: str) -> None:
+        """Forget a topic, so that its next publisher is checked and its kept message is asked for."""
+        del self.topics[name]
+        if name in self._subscribed:
+            self._subscribed.pop(name).undeclare()
+
+    def _heard(self, name: str, one: RosEntity) -> HeardTopic:
+        topic, (kind, take) = HeardTopic(one), self.wanted[name]
         own = self._types.hash_rihs01(kind)
         if one.type != kind:
             topic.refused = f"it is of type {one.type}, not {kind}"
         elif one.hash != own and (one.hash or one.domain is not None):
             topic.refused = hash_text(kind, f"{one.hash} there", f"{own} here")
         else:
-            self._subscribe(topic, kind, take)
+            self._subscribed[name] = self._subscribe(topic, kind, take)
         return topic
 
-    def _subscribe(self, topic: HeardTopic, kind: str, take: Any) -> None:
+    def _subscribe(self, topic: HeardTopic, kind: str, take: Any) -> Any:
         def heard(sample: Any) -> None:
             attachment = b"" if sample.attachment is None else bytes(sample.attachment)
             with self._lock:
@@ -154,7 +162,7 @@ class RosListener:
                 self._take_cached(key, heard, topic)
         else:
             made = self._session.declare_subscriber(key, heard)
-        self._subscribed.append(made)
+        return made
 
     def _take_cached(self, key: str, heard: Any, topic: HeardTopic) -> None:
         """Take what a bridge has kept of a topic, unless something newer has come."""

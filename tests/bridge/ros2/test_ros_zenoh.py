@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 import zenoh
 from rosbags.typesys import Stores, get_typestore
 
-from stopgo.bridge.commands import ros_checks
+from stopgo.bridge.commands import ros_checks, watch_commands
 from stopgo.bridge.commands.ros_checks import graph_checks, state_of
 from stopgo.bridge.commands.ros_watch import followed
 from stopgo.bridge.ros2.ros_settings import RosSettings
@@ -181,6 +182,44 @@ def test_the_state_of_a_node_that_has_ended_is_not_shown(sessions: tuple[Any, An
     while listener.state is not None:
         listener.look()
     assert state_of(listener, "10/r1")["state"] is None
+
+
+def test_a_publisher_that_comes_back_is_checked_and_asked_for_its_state_again(
+    sessions: tuple[Any, Any],
+) -> None:
+    robot, station = sessions
+    wrong = robot.liveliness().declare_token(
+        "@ros2_lv/13/abc/0/5/MP/%/%r1/stopgo/%r1%stopgo%state/std_msgs::msg::dds_::String_/RIHS01_00ff/1:1:,1:,:,:,,"
+    )
+    listener = RosListener(station, 13, "r1", RosSettings())
+    while not listener.topics:
+        listener.look()
+    assert "RIHS01_00ff there" in listener.topics["/r1/stopgo/state"].refused
+    wrong.undeclare()
+    for state in ("RUNNING", "PAUSED"):
+        with stating(robot, 13) as publisher:
+            publisher.put(state_message(state=state))
+            while listener.state is None or listener.state["state"] != state:
+                listener.look()
+        while listener.topics:
+            listener.look()
+
+
+def test_a_refused_topic_is_named_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    empty = dict.fromkeys(("stop", "stop_state", "battery", "pose"))
+    found = {"robot": "0/r1", "refused": ["/r1/odom: two versions"], "silent": "no tf", **empty}
+
+    def watched(_text: str, _endpoint: str, show: Any) -> str:
+        for state in ("RUNNING", "FINISHED"):
+            show({**found, "state": state})
+        return "FINISHED"
+
+    monkeypatch.setattr(watch_commands, "watch_ros", watched)
+    with pytest.raises(typer.Exit):
+        watch_commands.watch_topics("0/r1", "", as_json=False)
+    assert capsys.readouterr().err.splitlines()[:-1] == ["/r1/odom: two versions"]
 
 
 def test_the_command_ends_as_undecided_when_the_run_is_over(
