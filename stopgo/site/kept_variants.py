@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, Any
+from typing import Any
 
 import msgspec
 
@@ -44,13 +44,13 @@ class KeptVariants:
         """Return the finished variants of an earlier server, by number; folders of all others are removed."""
         found = []
         for folder in sorted(self._place.iterdir()):
-            try:
+            kept = None
+            with suppress(OSError, msgspec.DecodeError):
                 kept = msgspec.json.decode((folder / FILE).read_bytes(), type=KeptVariant)
-            except (OSError, msgspec.DecodeError):
-                shutil.rmtree(folder, ignore_errors=True)
-                continue
-            if folder.name == str(kept.number):
+            if kept is not None and folder.name == str(kept.number):
                 found.append(kept)
+            else:
+                shutil.rmtree(folder, ignore_errors=True)
         return sorted(found, key=lambda one: one.number)
 
     def remove(self, number: int) -> None:
@@ -61,27 +61,22 @@ class KeptVariants:
 @contextmanager
 def kept_variants(place: Path) -> Iterator[KeptVariants]:
     """Yield the variants of a place; of a temporary one if another server has it, or if it cannot be made."""
-    lock = _lock_of(place)
-    if lock is None:
-        with TemporaryDirectory(prefix="stopgo-site-", ignore_cleanup_errors=True) as temporary:
-            yield KeptVariants(Path(temporary))
-    else:
-        with lock:
-            yield KeptVariants(place)
+    with ExitStack() as opened:
+        if not _locked(place, opened):
+            place = Path(
+                opened.enter_context(TemporaryDirectory(prefix="stopgo-site-", ignore_cleanup_errors=True))
+            )
+        yield KeptVariants(place)
 
 
-def _lock_of(place: Path) -> IO[bytes] | None:
-    """File that locks the place until it is closed or this process ends; None if that is impossible."""
+def _locked(place: Path, opened: ExitStack) -> bool:
+    """Lock the place until `opened` is closed or this process ends; false if that is impossible."""
     try:
         import fcntl
 
         place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        lock = open(place.with_suffix(".lock"), "ab")  # noqa: SIM115  the caller closes it
-    except (ModuleNotFoundError, OSError):
-        return None
-    try:
+        lock = opened.enter_context(place.with_suffix(".lock").open("ab"))
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        lock.close()
-        return None
-    return lock
+    except (ModuleNotFoundError, OSError):
+        return False
+    return True

@@ -26,13 +26,14 @@ def server(folder: Path, feed: EventFeed) -> Iterator[tuple[PlanningRoom, KeptVa
 
 def test_a_finished_variant_is_shown_by_the_next_server(tmp_path: Path) -> None:
     with server(tmp_path, EventFeed()) as (_, kept):
-        for number in (3, 4, 5, 6):
+        for number in (3, 4, 5, 6, 7):
             kept.folder(number).mkdir()
         (kept.folder(3) / DRAWING).write_text('{"stops": []}')
         kept.keep(3, SHOWN)
         kept.keep(4, {**SHOWN, "number": 4, "request": {"floor": 7}})
         (kept.folder(5) / "variant.json").write_bytes(b'{"number": 5')
-        unfinished = kept.folder(6)
+        unfinished, misnamed = kept.folder(6), kept.folder(7)
+        (misnamed / "variant.json").write_text('{"number": 8, "shown": {}}')
     feed = EventFeed()
     with server(tmp_path, feed) as (room, kept):
         assert feed.value("plan", "3") == SHOWN
@@ -40,6 +41,7 @@ def test_a_finished_variant_is_shown_by_the_next_server(tmp_path: Path) -> None:
         assert room.variant(3).request.options == {"range": "8"}
         assert [key for key, _ in feed.since(-1)] == [("plan", "3")]
         assert not unfinished.exists()
+        assert not misnamed.exists()
         assert next(room._numbers) == 4
 
 
