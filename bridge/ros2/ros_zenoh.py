@@ -128,7 +128,7 @@ class RosListener:
         return self._own_tf.get(one.name, one.name) if one.domain is None else one.name
 
     def _drop(self, name: str) -> None:
-        """Forget a topic, so that its next publisher is checked and its kept message is asked for."""
+        """Forget a topic, so that its next publisher is checked and its kept message is queried."""
         del self.topics[name]
         if name in self._subscribed:
             self._subscribed.pop(name).undeclare()
