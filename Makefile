@@ -57,7 +57,7 @@ wheels: $(STAMP)
 
 # The guides as a site, in build/site; a link that leads nowhere is an error.
 docs: $(STAMP)
-	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check mkdocs-material
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 clean:
