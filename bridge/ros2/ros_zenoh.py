@@ -119,9 +119,6 @@ class RosListener:
             name = self._name_of(one)
             if one.kind == "publisher" and name in self.wanted and name not in self.topics:
                 self.topics[name] = self._heard(name, one)
-        published = {one.name for one in self.entities if one.kind == "publisher"}
-        if self._state_topic not in published:
-            self.state = None
 
     def _name_of(self, one: RosEntity) -> str:
         """Return a topic's name for the robot: a bridge puts its namespace before tf as well."""
@@ -132,6 +129,8 @@ class RosListener:
         del self.topics[name]
         if name in self._subscribed:
             self._subscribed.pop(name).undeclare()
+        if name == self._state_topic:
+            self.state = None
 
     def _heard(self, name: str, one: RosEntity) -> HeardTopic:
         topic, (kind, take) = HeardTopic(one), self.wanted[name]

@@ -26,6 +26,8 @@ from tests.ports import free_port
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 ODOMETRY = "nav_msgs::msg::dds_::Odometry_"
+WRONG_STATE = "@ros2_lv/{}/abc/0/5/MP/%/%r1/stopgo/%r1%stopgo%state/std_msgs::msg::dds_::String_/RIHS01_00ff/1:1:,1:,:,:,,"
+"""Token of a state of another version."""
 
 
 @pytest.fixture(scope="module")
@@ -184,13 +186,25 @@ def test_the_state_of_a_node_that_has_ended_is_not_shown(sessions: tuple[Any, An
     assert state_of(listener, "10/r1")["state"] is None
 
 
+def test_the_state_is_not_shown_once_its_topic_is_refused(sessions: tuple[Any, Any]) -> None:
+    robot, station = sessions
+    listener = RosListener(station, 14, "r1", RosSettings())
+    with stating(robot, 14) as publisher:
+        publisher.put(state_message(state="RUNNING"))
+        while listener.state is None:
+            listener.look()
+        wrong = robot.liveliness().declare_token(WRONG_STATE.format(14))
+    while not listener.topics["/r1/stopgo/state"].refused:
+        listener.look()
+    assert listener.state is None
+    wrong.undeclare()
+
+
 def test_a_publisher_that_comes_back_is_checked_and_asked_for_its_state_again(
     sessions: tuple[Any, Any],
 ) -> None:
     robot, station = sessions
-    wrong = robot.liveliness().declare_token(
-        "@ros2_lv/13/abc/0/5/MP/%/%r1/stopgo/%r1%stopgo%state/std_msgs::msg::dds_::String_/RIHS01_00ff/1:1:,1:,:,:,,"
-    )
+    wrong = robot.liveliness().declare_token(WRONG_STATE.format(13))
     listener = RosListener(station, 13, "r1", RosSettings())
     while not listener.topics:
         listener.look()
