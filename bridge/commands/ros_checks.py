@@ -29,10 +29,11 @@ def listened(text: str, endpoint: str) -> Iterator[RosListener]:
     domain, namespace = read_domain(text)
     with ros_listener(endpoints_in(endpoint), domain, namespace, RosSettings()) as listener:
         end_s = time.monotonic() + LISTENS_S
-        listener.look()
-        while time.monotonic() < end_s:
-            time.sleep(LOOKS_S)
+        while True:
             listener.look()
+            time.sleep(LOOKS_S)
+            if time.monotonic() >= end_s:
+                break
         yield listener
 
 
