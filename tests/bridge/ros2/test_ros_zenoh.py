@@ -25,9 +25,7 @@ from stopgo.mission.errors import InputError
 from tests.ports import free_port
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
-ODOMETRY = "nav_msgs::msg::dds_::Odometry_"
-WRONG_STATE = "@ros2_lv/{}/abc/0/5/MP/%/%r1/stopgo/%r1%stopgo%state/std_msgs::msg::dds_::String_/RIHS01_00ff/1:1:,1:,:,:,,"
-"""Token of a state of another version."""
+ODOMETRY, STRING = "nav_msgs::msg::dds_::Odometry_", "std_msgs::msg::dds_::String_"
 
 
 @pytest.fixture(scope="module")
@@ -129,15 +127,19 @@ def state_message(**state: Any) -> bytes:
     return bytes(TYPES.serialize_cdr(made, "std_msgs/msg/String"))
 
 
+def state_announced(robot: Any, hash_: str, domain: int) -> Any:
+    tail = f"%r1%stopgo%state/{STRING}/{hash_}/1:1:,1:,:,:,,"
+    return robot.liveliness().declare_token(f"@ros2_lv/{domain}/abc/0/5/MP/%/%r1/stopgo/{tail}")
+
+
 @contextmanager
 def stating(robot: Any, domain: int) -> Iterator[Any]:
     """A publisher of the robot's state, which late listeners get as well."""
-    hash_, kind = TYPES.hash_rihs01("std_msgs/msg/String"), "std_msgs::msg::dds_::String_"
-    tail = f"%r1%stopgo%state/{kind}/{hash_}/1:1:,1:,:,:,,"
-    token = robot.liveliness().declare_token(f"@ros2_lv/{domain}/abc/0/5/MP/%/%r1/stopgo/{tail}")
+    hash_ = TYPES.hash_rihs01("std_msgs/msg/String")
+    token = state_announced(robot, hash_, domain)
     cache = zenoh.ext.CacheConfig(max_samples=1)
     publisher = zenoh.ext.declare_advanced_publisher(
-        robot, f"{domain}/r1/stopgo/state/{kind}/{hash_}", cache=cache
+        robot, f"{domain}/r1/stopgo/state/{STRING}/{hash_}", cache=cache
     )
     yield publisher
     publisher.undeclare()
@@ -193,7 +195,7 @@ def test_the_state_is_not_shown_once_its_topic_is_refused(sessions: tuple[Any, A
         publisher.put(state_message(state="RUNNING"))
         while listener.state is None:
             listener.look()
-        wrong = robot.liveliness().declare_token(WRONG_STATE.format(14))
+        wrong = state_announced(robot, "RIHS01_00ff", 14)
     while not listener.topics["/r1/stopgo/state"].refused:
         listener.look()
     assert listener.state is None
@@ -204,7 +206,7 @@ def test_a_publisher_that_comes_back_is_checked_and_asked_for_its_state_again(
     sessions: tuple[Any, Any],
 ) -> None:
     robot, station = sessions
-    wrong = robot.liveliness().declare_token(WRONG_STATE.format(13))
+    wrong = state_announced(robot, "RIHS01_00ff", 13)
     listener = RosListener(station, 13, "r1", RosSettings())
     while not listener.topics:
         listener.look()
