@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +20,8 @@ from stopgo.planner.floors.units.unit_probability import probabilities
 
 BELIEVED = 0.95
 """A unit less probable than this is not used: the user is asked."""
-_AGAINST_HEADER = 0.98
-"""The same for a unit that is not the header's, if nothing of it was measured but texts and the size.
+_UNMEASURED = 0.98
+"""The same for a unit that the header does not name, if nothing of it was measured but texts and the size.
 
 Such a drawing may be in no unit at all, as one that was made from a PDF.
 """
@@ -64,10 +64,9 @@ def unit_of(
 
 
 def _needed(code: int, header: int, evidence: UnitEvidence) -> float:
-    measured = (
-        evidence.leaves or evidence.across or evidence.dimensions or evidence.areas or evidence.thickness
-    )
-    return BELIEVED if measured or code == header or header not in METRES else _AGAINST_HEADER
+    things = (evidence.leaves, evidence.across, evidence.thickness, evidence.furniture, evidence.going)
+    texts = (evidence.dimensions, evidence.areas, evidence.sides)
+    return BELIEVED if any(things) or any(texts) or code == header else _UNMEASURED
 
 
 def given_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:
@@ -141,20 +140,23 @@ def _has_doors(evidence: UnitEvidence, factor: float) -> bool:
 
 def _seen(evidence: UnitEvidence, factor: float) -> str:
     """The evidence that was weighed, in words."""
-    words = []
-    if evidence.dimensions:
-        words.append(f"{len(evidence.dimensions)} dimensions")
-    if evidence.areas:
-        words.append(f"{len(evidence.areas)} areas in rooms")
+    kinds: tuple[tuple[Sized, str], ...] = (
+        (evidence.dimensions, "dimensions"),
+        (evidence.areas, "areas in rooms"),
+        (evidence.sides, "rooms with written sides"),
+        (evidence.furniture, "pieces of furniture"),
+    )
+    words = [f"{len(items)} {kind}" for items, kind in kinds if items]
     for widths, kind in ((evidence.leaves, "leaves"), (evidence.across, "doors")):
         if widths:
             words.append(f"{len(widths)} {kind} of {float(np.median(widths)) * factor:.2g} m")
-    if evidence.thickness:
-        words.append(f"walls {evidence.thickness * factor:.2g} m thick")
-    if evidence.text_height:
-        words.append(f"texts {evidence.text_height * factor:.2g} m high")
-    if evidence.names_apart:
-        words.append(f"names of rooms {evidence.names_apart * factor:.2g} m apart")
+    lengths = (
+        (evidence.thickness, "walls {:.2g} m thick"),
+        (evidence.going, "treads {:.2g} m apart"),
+        (evidence.text_height, "texts {:.2g} m high"),
+        (evidence.names_apart, "names of rooms {:.2g} m apart"),
+    )
+    words += [text.format(length * factor) for length, text in lengths if length]
     return ", ".join([*words, "its size"])
 
 

@@ -134,6 +134,11 @@ def test_names_of_layers_are_read_with_either_end_of_line(tmp_path: Path, versio
         ("A-WALL-PATT", "walls"),
         ("A-DOOR-IDEN", "ignore"),
         ("A-AREA-IDEN", "names"),
+        ("Doors/Windows", "openings"),
+        ("Fenster_Türen", "openings"),
+        ("Stahlträger", "beams"),
+        ("Shelves", "furniture"),
+        ("X_ramka_przekroj_sciany", "ignore"),
     ],
 )
 def test_a_layers_name_is_read_whole_and_its_last_thing_decides(name: str, role: str) -> None:
@@ -399,6 +404,17 @@ def test_walls_that_enclose_nothing_are_refused(tmp_path: Path) -> None:
     drawing = new_drawing()
     rectangle(drawing.modelspace(), "A-WALL", 0, 0, 6, 0.2)
     with pytest.raises(InputError, match="the walls on A-WALL enclose no floor; draw its outline"):
+        read(drawing, tmp_path)
+
+
+def test_walls_left_open_without_a_room_or_a_door_are_refused(tmp_path: Path) -> None:
+    """A line from end to end of three walls is no fourth one."""
+    drawing = new_drawing()
+    outside, inside = ((-0.1, 0), (-0.1, 6.1), (3.1, 6.1), (3.1, 0)), ((3, 0), (3, 6), (0, 6), (0, 0))
+    ring = [*outside, *inside, outside[0]]
+    for a, b in pairwise(ring):
+        drawing.modelspace().add_line(a, b, dxfattribs={"layer": "A-WALL"})
+    with pytest.raises(InputError, match="the walls on A-WALL enclose no floor"):
         read(drawing, tmp_path)
 
 
