@@ -16,15 +16,21 @@ from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.units.unit_evidence import UnitEvidence, evidence_in, extent_of
 from stopgo.planner.floors.units.unit_lengths import CODES, METRES, SHORT
-from stopgo.planner.floors.units.unit_probability import probabilities
+from stopgo.planner.floors.units.unit_probability import measured, probabilities
 
 BELIEVED = 0.95
 """A unit less probable than this is not used: the user is asked."""
 _UNMEASURED = 0.98
-"""The same for a unit that the header does not name, if nothing of it was measured but texts and the size.
+"""The same for a unit that the header does not name, if no measure is for it rather than for the next one.
 
 Such a drawing may be in no unit at all, as one that was made from a PDF.
 """
+_DISPUTED = 0.995
+"""The same for one that a measure contradicts which fits another unit."""
+_RATHER = 2.0
+"""Measures are for a unit if they are this many times as likely in it …"""
+_CONTRADICTS = 5.0
+"""… and one contradicts it if it is this many times as likely in another."""
 _POSSIBLE = (1.0, 2000.0)
 """Least and greatest length in metres of what a given unit may make."""
 _USUAL = (3.0, 400.0)
@@ -56,17 +62,21 @@ def unit_of(
     evidence = evidence_in(drawing, shapes, outlined=outlined)
     header = _header_code(drawing)
     ranked = sorted(probabilities(evidence, header=header).items(), key=lambda item: (-item[1], item[0]))
-    if ranked[0][1] < _needed(ranked[0][0], header, evidence) and max(evidence.size) > 0:
+    if ranked[0][1] < _needed(ranked, header, evidence) and max(evidence.size) > 0:
         choices = _choices(ranked, evidence)
         raise UnitAsked(f"{source}: {_question(choices, header)}", choices)
     code = header if header in METRES and not max(evidence.size) else ranked[0][0]
     return METRES[code][1], _findings(code, header, ranked[0][1], evidence)
 
 
-def _needed(code: int, header: int, evidence: UnitEvidence) -> float:
-    things = (evidence.leaves, evidence.across, evidence.thickness, evidence.furniture, evidence.going)
-    texts = (evidence.dimensions, evidence.areas, evidence.sides)
-    return BELIEVED if any(things) or any(texts) or code == header else _UNMEASURED
+def _needed(ranked: Sequence[tuple[int, float]], header: int, evidence: UnitEvidence) -> float:
+    """The probability that the first unit of a ranking needs."""
+    own, *others = (measured(evidence, METRES[code][1]) for code, _ in ranked)
+    if ranked[0][0] == header:
+        return BELIEVED
+    if any(max(fits) >= _CONTRADICTS * mine for mine, *fits in zip(own, *others, strict=True)):
+        return _DISPUTED
+    return BELIEVED if math.prod(own) >= _RATHER * math.prod(others[0]) else _UNMEASURED
 
 
 def given_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:

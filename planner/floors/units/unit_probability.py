@@ -77,16 +77,23 @@ def _likelihood(evidence: UnitEvidence, factor: float) -> float:
     return math.prod(
         [
             _size(evidence, factor),
-            _measures(evidence.leaves, factor, _LEAF, "leaves"),
-            _measures(evidence.across, factor, _ACROSS, "across"),
-            _measures(_one(evidence.thickness), factor, _THICKNESS, "thickness"),
             _measures(_one(evidence.text_height), factor, _TEXT, "text"),
             _measures(_one(evidence.names_apart), factor, _NAMES, "names"),
-            _dimensions(evidence.dimensions, factor),
-            _rooms(evidence, factor),
-            _measures(evidence.furniture, factor, _FURNITURE, "furniture"),
-            _measures(_one(evidence.going), factor, _GOING, "going"),
+            *measured(evidence, factor),
         ]
+    )
+
+
+def measured(evidence: UnitEvidence, factor: float) -> tuple[float, ...]:
+    """Likelihood by each kind of measure of built things, and by what texts say of lengths and areas."""
+    return (
+        _measures(evidence.leaves, factor, _LEAF, "leaves"),
+        _measures(evidence.across, factor, _ACROSS, "across"),
+        _measures(_one(evidence.thickness), factor, _THICKNESS, "thickness"),
+        _dimensions(evidence.dimensions, factor),
+        _rooms(evidence, factor),
+        _measures(evidence.furniture, factor, _FURNITURE, "furniture"),
+        _measures(_one(evidence.going), factor, _GOING, "going"),
     )
 
 

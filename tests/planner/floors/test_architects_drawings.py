@@ -113,6 +113,39 @@ def test_names_of_layers_are_read_with_either_end_of_line(tmp_path: Path, versio
         is_the_flat(read_floor(path))
 
 
+@pytest.mark.parametrize("version", ["R12", "R2000"])
+@pytest.mark.parametrize(
+    ("walls", "doors", "encoding", "codepage"),
+    [
+        ("WÄNDE", "TÜREN", "cp1252", "ANSI_1252"),
+        ("WÄNDE", "TÜREN", "cp1252", None),
+        ("СТЕНА", "ДВЕРЬ", "cp1251", "ANSI_1251"),
+        ("ŚCIANA", "DRZWI", "cp1250", "ANSI_1250"),
+        ("墙体", "门", "gbk", "ANSI_936"),
+        ("壁", "ドア", "cp932", "ANSI_932"),
+        ("壁", "ドア", "cp932", None),
+        ("СТЕНА", "ДВЕРЬ", "utf-8", None),
+        ("壁", "ドア", "utf-8", "ANSI_1252"),
+    ],
+)
+def test_names_are_read_in_the_encoding_of_the_file(
+    tmp_path: Path, version: str, walls: str, doors: str, encoding: str, codepage: str | None
+) -> None:
+    """Before R2007 a header names the codepage; scripts write UTF-8 all the same, and some name none."""
+    drawing = ezdxf.new(version)
+    drawing.header["$INSUNITS"] = 6
+    flat(drawing.modelspace(), walls="WALLNAME", doors="DOORNAME")
+    path = saved(drawing, tmp_path)
+    text = path.read_text("cp1252").replace("WALLNAME", walls).replace("DOORNAME", doors)
+    named = "  9\n$DWGCODEPAGE\n  3\nANSI_1252\n"
+    assert named in text
+    text = text.replace(named, named.replace("ANSI_1252", codepage) if codepage else "")
+    path.write_bytes(text.encode(encoding))
+    floor = read_floor(path)
+    is_the_flat(floor)
+    assert any(f"layer {walls} is taken for walls" in item.message for item in floor.findings)
+
+
 @pytest.mark.parametrize(
     ("name", "role"),
     [

@@ -216,6 +216,30 @@ def test_a_size_and_texts_show_no_unit_of_a_drawing_made_from_a_page(tmp_path: P
         survey_floor(tmp_path / "plan.dxf")
 
 
+def test_treads_that_contradict_the_walls_leave_the_unit_open(tmp_path: Path) -> None:
+    """Walls of 16 and a floor of 16 by 10 m would be centimetres, but treads 10 apart are inches."""
+    drawing = new_drawing(0)
+    model = drawing.modelspace()
+    for x0, y0, x1, y1 in ((0, 0, 1600, 1000), (16, 16, 792, 984), (808, 16, 1584, 984)):
+        rectangle(model, "A-WALL", x0, y0, x1, y1)
+    for k in range(12):
+        model.add_line((100, 100 + 9.8 * k), (140, 100 + 9.8 * k), dxfattribs={"layer": "A-FLOR-STRS"})
+    drawing.saveas(tmp_path / "plan.dxf")
+    with pytest.raises(InputError, match=r"the unit is not certain .*--units cm"):
+        survey_floor(tmp_path / "plan.dxf")
+
+
+def test_walls_as_thick_in_feet_as_in_metres_leave_the_unit_open(tmp_path: Path) -> None:
+    """Walls of 0.33 are 10 or 33 cm thick: only the size tells feet from metres, and needs more."""
+    drawing = new_drawing(0)
+    model = drawing.modelspace()
+    for x0, y0, x1, y1 in ((0, 0, 12.5, 10.2), (0.33, 0.33, 6, 9.87), (6.33, 0.33, 12.17, 9.87)):
+        rectangle(model, "A-WALL", x0, y0, x1, y1)
+    drawing.saveas(tmp_path / "plan.dxf")
+    with pytest.raises(InputError, match=r"the unit is not certain .*--units m .*--units ft"):
+        survey_floor(tmp_path / "plan.dxf")
+
+
 def test_a_door_swing_has_a_leaf_or_ends_at_jambs_and_a_round_corner_has_neither() -> None:
     arc = np.array([(np.cos(t), np.sin(t)) for t in np.linspace(0, np.pi / 2, 13)])
     on = [np.array([(1.0, -3.0), (1.0, 0.0)]), np.array([(0.0, 1.0), (-3.0, 1.0)])]
