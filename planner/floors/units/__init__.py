@@ -26,11 +26,11 @@ _UNMEASURED = 0.98
 Such a drawing may be in no unit at all, as one that was made from a PDF.
 """
 _DISPUTED = 0.995
-"""The same for one that a measure contradicts which fits another unit."""
+"""The same for one where the measures are for another unit."""
 _RATHER = 2.0
-"""Measures are for a unit if they are this many times as likely in it …"""
+"""Measures are for a unit rather than for another if they are this many times as likely in it."""
 _CONTRADICTS = 5.0
-"""… and one contradicts it if it is this many times as likely in another."""
+"""One measure contradicts a unit if it is this many times as likely in another."""
 _POSSIBLE = (1.0, 2000.0)
 """Least and greatest length in metres of what a given unit may make."""
 _USUAL = (3.0, 400.0)
@@ -71,12 +71,14 @@ def unit_of(
 
 def _needed(ranked: Sequence[tuple[int, float]], header: int, evidence: UnitEvidence) -> float:
     """The probability that the first unit of a ranking needs."""
-    own, *others = (measured(evidence, METRES[code][1]) for code, _ in ranked)
-    if ranked[0][0] == header:
-        return BELIEVED
-    if any(max(fits) >= _CONTRADICTS * mine for mine, *fits in zip(own, *others, strict=True)):
+    measures = [measured(evidence, METRES[code][1]) for code, _ in ranked]
+    # Distances between lines that are no walls are too often taken for the thickness to contradict others.
+    own, *others = (without_thickness for _, *without_thickness in measures)
+    if max(map(math.prod, others)) >= _RATHER * math.prod(own):
         return _DISPUTED
-    return BELIEVED if math.prod(own) >= _RATHER * math.prod(others[0]) else _UNMEASURED
+    is_contradicted = any(max(fits) >= _CONTRADICTS * mine for mine, *fits in zip(own, *others, strict=True))
+    is_measured = math.prod(measures[0]) >= _RATHER * math.prod(measures[1])
+    return BELIEVED if ranked[0][0] == header or (is_measured and not is_contradicted) else _UNMEASURED
 
 
 def given_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:

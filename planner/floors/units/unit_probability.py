@@ -85,11 +85,11 @@ def _likelihood(evidence: UnitEvidence, factor: float) -> float:
 
 
 def measured(evidence: UnitEvidence, factor: float) -> tuple[float, ...]:
-    """Likelihood by each kind of measure of built things, and by what texts say of lengths and areas."""
+    """Likelihood by the thickness of walls, each other measure of things, and texts on lengths and areas."""
     return (
+        _measures(_one(evidence.thickness), factor, _THICKNESS, "thickness"),
         _measures(evidence.leaves, factor, _LEAF, "leaves"),
         _measures(evidence.across, factor, _ACROSS, "across"),
-        _measures(_one(evidence.thickness), factor, _THICKNESS, "thickness"),
         _dimensions(evidence.dimensions, factor),
         _rooms(evidence, factor),
         _measures(evidence.furniture, factor, _FURNITURE, "furniture"),
