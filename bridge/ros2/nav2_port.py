@@ -261,7 +261,7 @@ def take_transforms(telemetry: RosTelemetry, message: Any, *, static: bool) -> N
 
 
 def charge_of(message: Any) -> float | None:
-    """Return the charge that a sensor_msgs/msg/BatteryState tells, 0 to 1; `None` if it does not."""
+    """Return the charge that a sensor_msgs/msg/BatteryState has, 0 to 1; `None` if it has none."""
     charge = float(message.percentage)
     return charge if 0.0 <= charge <= 1.0 else None
 

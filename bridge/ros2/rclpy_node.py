@@ -19,7 +19,7 @@ import msgspec
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.ros2.goal_guard import GoalGuard, guard
 from stopgo.bridge.ros2.nav2_port import Nav2Port
-from stopgo.bridge.ros2.ros_port import GoalEvents, Quality
+from stopgo.bridge.ros2.ros_port import GoalEvents, RosQuality
 from stopgo.bridge.ros2.ros_settings import RosSettings, changed_settings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
 from stopgo.bridge.ros2.ros_types import MessageKind, RosFields
@@ -161,12 +161,12 @@ class RclpyNode:
         self._node.create_timer(seconds, happens)
 
     def subscribe(
-        self, kind: str, topic: str, take: Callable[[Any], None], quality: Quality, depth: int = 50
+        self, kind: str, topic: str, take: Callable[[Any], None], quality: RosQuality, depth: int = 50
     ) -> None:
         self._node.create_subscription(loaded_type(kind), topic, take, _profile(quality, depth))
 
     def publisher(
-        self, kind: str, topic: str, quality: Quality = "reliable", depth: int = 10
+        self, kind: str, topic: str, quality: RosQuality = "reliable", depth: int = 10
     ) -> RclpyPublisher:
         cls = loaded_type(kind)
         return RclpyPublisher(self._node.create_publisher(cls, topic, _profile(quality, depth)), cls)
@@ -201,7 +201,7 @@ class RclpyNode:
         return f"topics of type {kind}: {', '.join(sorted(same)) or 'none'}"
 
 
-def _profile(quality: Quality, depth: int) -> Any:
+def _profile(quality: RosQuality, depth: int) -> Any:
     qos = load("rclpy.qos")
     if quality == "kept":
         return qos.QoSProfile(depth=depth, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)

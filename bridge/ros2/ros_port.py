@@ -64,8 +64,8 @@ class RosPort(Protocol):
         """Call the scanner."""
 
 
-Quality = Literal["best effort", "reliable", "kept"]
-"""Quality of service; with `kept`, late subscribers get what was published before."""
+RosQuality = Literal["best effort", "reliable", "kept"]
+"""RosQuality of service; with `kept`, late subscribers get what was published before."""
 
 
 class RosPublisher(Protocol):
@@ -116,7 +116,7 @@ class RosNode(Protocol):
     namespace: str
 
     def now_ns(self) -> int:
-        """Return the node's time, a simulated one if it was told so."""
+        """Return the node's time; simulated time if it uses that."""
 
     def resolved(self, name: str) -> str:
         """Return the absolute name of a topic or service."""
@@ -124,11 +124,11 @@ class RosNode(Protocol):
     def every(self, seconds: float, happens: Callable[[], None]) -> None: ...
 
     def subscribe(
-        self, kind: str, topic: str, take: Callable[[Any], None], quality: Quality, depth: int = 50
+        self, kind: str, topic: str, take: Callable[[Any], None], quality: RosQuality, depth: int = 50
     ) -> None: ...
 
     def publisher(
-        self, kind: str, topic: str, quality: Quality = "reliable", depth: int = 10
+        self, kind: str, topic: str, quality: RosQuality = "reliable", depth: int = 10
     ) -> RosPublisher:
         """Return a publisher; subscribers see it at once."""
 
