@@ -31,7 +31,7 @@ COMMANDS = {
     "prove_command": ("prove",),
     "demo_command": ("demo",),
     "bridge_commands": (
-        "robot", "push", "fetch-mission", "clear", "doctor", "start", "pause", "resume", "skip", "retry",
+        "robot", "guard", "push", "fetch-mission", "clear", "doctor", "start", "pause", "resume", "skip", "retry",
         "abort", "home", "status", "session", "watch", "simulate", "keys", "conform", "tunnel",
     ),
     "review_command": ("review",),

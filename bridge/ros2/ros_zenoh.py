@@ -20,12 +20,12 @@ from typing import Any
 import zenoh
 
 from stopgo.bridge.link.clock import Clock, WallClock
-from stopgo.bridge.link.zenoh_link import COMMON
 from stopgo.bridge.ros2.nav2_port import ODOMETRY, TF, charge_of, ns_of, take_transforms
 from stopgo.bridge.ros2.ros_graph import BRIDGED_TOKENS, TOKENS, RosEntity, entity_of, hash_text
 from stopgo.bridge.ros2.ros_settings import RosSettings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
-from stopgo.mission.errors import InputError, RobotUnreachable
+from stopgo.bridge.ros2.zenoh_node import open_network
+from stopgo.mission.errors import InputError
 
 ATTACHMENT = struct.Struct("<qq")
 """Sequence number and source time in nanoseconds; a GID follows."""
@@ -209,12 +209,5 @@ def ros_listener(
     RobotUnreachable
         If there is no router.
     """
-    config = zenoh.Config()
-    for key, value in {**COMMON, "mode": "client", "connect/endpoints": list(endpoints)}.items():
-        config.insert_json5(key, json.dumps(value))
-    try:
-        session = zenoh.open(config)
-    except zenoh.ZError:
-        raise RobotUnreachable(f"{','.join(endpoints)}: no zenoh router answers there") from None
-    with session:
+    with open_network(endpoints) as session:
         yield RosListener(session, domain, namespace, settings)
