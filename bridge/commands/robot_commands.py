@@ -172,7 +172,7 @@ def body_of(
 
 def ros_body_of(controller: str, given: GivenOptions, simulated: SimulatedOptions, ros_args: str) -> OpenBody:
     """Return the base and scanner of a robot that speaks ROS 2."""
-    from stopgo.bridge.ros2.rclpy_port import open_rclpy
+    from stopgo.bridge.ros2.rclpy_node import open_rclpy
     from stopgo.bridge.ros2.ros_body import RosBody
     from stopgo.bridge.ros2.ros_settings import read_ros_settings
     from stopgo.bridge.ros2.run_topics import RunTopics

@@ -125,7 +125,7 @@ class GoalDrive:
 
     def _end_of_patience(self, goal: RosGoal, watch: _Watch) -> str:
         now_ns, limits = self._clock.now_ns(), self._settings.limits
-        watch.look(now_ns, self._telemetry.pose(), server=self._port.is_ready("drive"))
+        watch.look(now_ns, self._telemetry.pose(), server=not self._port.missing("drive"))
         if goal.status == "sent" and watch.since_begin_s(now_ns) > ANSWER_S:
             return f"Nav2 does not answer a goal within {ANSWER_S:g} s"
         if watch.without_server_s(now_ns) > GONE_S:

@@ -13,11 +13,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from stopgo.bridge.ros2.ros_types import load
+from stopgo.bridge.ros2.ros_port import RosNode
 
 SIGN_S = 0.1
 SILENT_S = 0.5
@@ -27,6 +27,7 @@ END_S = 2.0
 FIRST, LAST = 0, -1
 DRIVES, STANDS = b"1", b"0"
 READY = b"ready\n"
+CANCEL = "action_msgs/srv/CancelGoal"
 ENDED = "the process that stops the robot if this program ends has ended; it is started again"
 
 
@@ -35,9 +36,9 @@ class GoalGuard:
 
     def __init__(
         self, wanted: dict[str, Any], drives: Callable[[], bool], report: Callable[[str], None],
-        module: str = __name__,
+        module: str,
     ) -> None:  # fmt: skip
-        """`report` takes why no guard runs, and an empty text once one runs again."""
+        """`report` takes why no guard runs, and an empty text once one runs again; `module` is run."""
         self._drives = drives
         self._report = report
         self._command = [sys.executable, "-m", module, json.dumps(wanted)]
@@ -140,34 +141,36 @@ class Signs:
         return must
 
 
-def guard(wanted: dict[str, Any], source: int) -> None:
-    """Read signs of life from a file descriptor until the program ends, and stop the robot if need be."""
-    rclpy = load("rclpy")
-    rclpy.init(args=[])
-    node = rclpy.create_node(wanted["node"])
-    request = load("action_msgs.srv").CancelGoal
-    clients = [node.create_client(request, name) for name in wanted["cancel"]]
-    kind = getattr(load("geometry_msgs.msg"), wanted["velocity_type"])
-    publisher = node.create_publisher(kind, wanted["cmd_vel"], 10) if wanted["cmd_vel"] else None
+def guard(node: RosNode, wanted: dict[str, Any], source: int) -> None:
+    """Read signs of life from a file descriptor until the program ends, and stop the robot if need be.
+
+    `wanted` names the services that cancel, and the topic that takes velocities.
+    """
+    robot = GoalStop(node, wanted)
     os.write(sys.stdout.fileno(), READY)
     signs = Signs(time.monotonic())
     while not signs.ended:
         if select.select([source], [], [], SIGN_S)[FIRST]:
             signs.take(os.read(source, 4096), time.monotonic())
         if signs.must_stop(time.monotonic()):
-            _stop(clients, request, publisher, kind)
+            robot.stop()
 
 
-def _stop(clients: Sequence[Any], request: Any, publisher: Any, kind: Any) -> None:
-    end_s = time.monotonic() + STOPS_S
-    while time.monotonic() < end_s:
-        for client in clients:
-            if client.service_is_ready():
-                client.call_async(request.Request())
-        if publisher is not None:
-            publisher.publish(kind())
-        time.sleep(SIGN_S)
+class GoalStop:
+    """Cancels a robot's goals, and commands zero velocity."""
 
+    def __init__(self, node: RosNode, wanted: dict[str, Any]) -> None:
+        self._clients = [node.client(CANCEL, name) for name in wanted["cancel"]]
+        topic = wanted["cmd_vel"]
+        self._velocity = node.publisher(wanted["velocity_type"], topic) if topic else None
 
-if __name__ == "__main__":
-    guard(json.loads(sys.argv[1]), sys.stdin.fileno())
+    def stop(self) -> None:
+        """Do so for `STOPS_S`, whatever is answered."""
+        end_s = time.monotonic() + STOPS_S
+        while time.monotonic() < end_s:
+            for client in self._clients:
+                if not client.missing():
+                    client.call({})  # no id and no time: every goal
+            if self._velocity is not None:
+                self._velocity.publish({})
+            time.sleep(SIGN_S)

@@ -33,6 +33,8 @@ class TopicNames(RosSection, frozen=True):
     """Topics that the robot publishes, and the one that takes velocities."""
 
     odometry: NeededName = "odom"
+    tf: NeededName = "/tf"
+    tf_static: NeededName = "/tf_static"
     battery: Name = "battery_state"
     localisation: Name = ""
     """geometry_msgs/msg/PoseWithCovarianceStamped, such as amcl_pose."""

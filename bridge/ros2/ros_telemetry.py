@@ -82,6 +82,10 @@ class RosTelemetry:
         self.sigma_m: float | None = None
         """Standard deviation of the position."""
 
+    def say_unguarded(self, why: str) -> None:
+        """Take the reason why no process stops the robot; empty if one does."""
+        self.unguarded = why
+
     # From the node's thread
 
     def take_transform(
