@@ -21,6 +21,7 @@ import zenoh
 
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.ros2.nav2_port import ODOMETRY, TF, charge_of, ns_of, take_transforms
+from stopgo.bridge.ros2.ros_definitions import Undecodable, message_type
 from stopgo.bridge.ros2.ros_graph import BRIDGED_TOKENS, TOKENS, RosEntity, entity_of, hash_text
 from stopgo.bridge.ros2.ros_settings import RosSettings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
@@ -81,11 +82,6 @@ class RosListener:
         settings: RosSettings,
         clock: Clock | None = None,
     ) -> None:
-        from rosbags.serde import SerdeError
-        from rosbags.typesys import Stores, get_typestore
-
-        self._undecodable = (SerdeError, ValueError, KeyError, IndexError, struct.error)
-        self._types = get_typestore(Stores.ROS2_JAZZY)
         self._session = session
         self._domain = domain
         self._clock = clock or WallClock()
@@ -135,7 +131,7 @@ class RosListener:
 
     def _heard(self, name: str, one: RosEntity) -> HeardTopic:
         topic, (kind, take) = HeardTopic(one), self.wanted[name]
-        own = self._types.hash_rihs01(kind)
+        own = message_type(kind).hash
         if one.type != kind:
             topic.refused = f"it is of type {one.type}, not {kind}"
         elif one.hash != own and (one.hash or one.domain is not None):
@@ -150,8 +146,8 @@ class RosListener:
             with self._lock:
                 topic.take(attachment, self._clock.now_ns() / 1e9)
                 try:
-                    take(self._types.deserialize_cdr(bytes(sample.payload), kind))
-                except self._undecodable as error:
+                    take(message_type(kind).decode(bytes(sample.payload)))
+                except Undecodable as error:
                     topic.wrong = f"a message cannot be decoded ({error})"
 
         key = topic.entity.key
