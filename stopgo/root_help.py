@@ -40,6 +40,7 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
     },
     "Robots and upkeep": {
         "robot": "Run the robot agent",
+        "guard": "Stop a ROS 2 robot whose link is cut",
         "simulate": "Simulate a MAVLink vehicle",
         "fetch-mission": "Read the mission of a MAVLink vehicle",
         "clear": "Clear the mission of a MAVLink vehicle",

@@ -7,4 +7,6 @@ ros_base       `RosBase`: the base of a robot's controller
 ros_scanner    `RosScanner`: its scanner
 nav2_port      goals, scans and telemetry of a robot with Nav2, on any node
 rclpy_node     the node by rclpy; the only module that imports ROS
+zenoh_node     the node over zenoh, without ROS; ros_definitions has its types
+zenoh_robot    opens it for a robot, with its guard; drive_lease is the guard at the robot
 """

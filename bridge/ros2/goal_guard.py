@@ -122,8 +122,9 @@ class GoalGuard:
 class Signs:
     """Signs of life of a program, and the verdict on them; time comes from outside."""
 
-    def __init__(self, now_s: float) -> None:
+    def __init__(self, now_s: float, silent_s: float = SILENT_S) -> None:
         self._last_s = now_s
+        self._silent_s = silent_s
         self._drives = False
         self.ended = False
 
@@ -135,7 +136,7 @@ class Signs:
 
     def must_stop(self, now_s: float) -> bool:
         """Return True, once, if the robot must be stopped."""
-        must = self._drives and (self.ended or now_s - self._last_s > SILENT_S)
+        must = self._drives and (self.ended or now_s - self._last_s > self._silent_s)
         if must:
             self._drives = False
         return must
@@ -160,6 +161,7 @@ class GoalStop:
     """Cancels a robot's goals, and commands zero velocity."""
 
     def __init__(self, node: RosNode, wanted: dict[str, Any]) -> None:
+        self.wanted = wanted
         self._clients = [node.client(CANCEL, name) for name in wanted["cancel"]]
         topic = wanted["cmd_vel"]
         self._velocity = node.publisher(wanted["velocity_type"], topic) if topic else None

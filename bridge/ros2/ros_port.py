@@ -97,8 +97,11 @@ class GoalEvents(Protocol):
 class RosActionClient(Protocol):
     """A client of an action; goals are cancelled by the service of the action that does that."""
 
-    goal: MessageKind
-    result: MessageKind
+    @property
+    def goal(self) -> MessageKind: ...
+
+    @property
+    def result(self) -> MessageKind: ...
 
     def missing(self) -> str: ...
 

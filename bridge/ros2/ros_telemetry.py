@@ -86,6 +86,10 @@ class RosTelemetry:
         """Take the reason why no process stops the robot; empty if one does."""
         self.unguarded = why
 
+    def say_fault(self, why: str) -> None:
+        """Take the error that has ended the node's thread."""
+        self.fault = why
+
     # From the node's thread
 
     def take_transform(

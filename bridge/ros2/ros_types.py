@@ -16,9 +16,12 @@ RosFields = Mapping[str, Any]
 class MessageKind(Protocol):
     """A type of message."""
 
-    name: str
-    fields: Mapping[str, str]
-    """Type of each field, as rosidl writes it: `double`, `sequence<uint8>`, `std_msgs/Header`."""
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def fields(self) -> Mapping[str, str]:
+        """Type of each field, as rosidl writes it: `double`, `sequence<uint8>`, `std_msgs/Header`."""
 
     def inner(self, field: str) -> MessageKind:
         """Return the type of a field that is a message, or a list of messages."""
@@ -95,7 +98,7 @@ def _as_type(value: Any, kind: str) -> Any:
 def plain_fields(message: Any) -> dict[str, Any]:
     """Return a message's fields as plain values, inner messages as dictionaries."""
     if dataclasses.is_dataclass(message):
-        names = [field.name for field in dataclasses.fields(message)]
+        names = [one.name for one in dataclasses.fields(message) if not one.name.startswith("__")]
     else:
         names = list(message.get_fields_and_field_types())
     return {name: _plain(getattr(message, name)) for name in names}

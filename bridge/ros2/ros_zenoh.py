@@ -20,12 +20,13 @@ from typing import Any
 import zenoh
 
 from stopgo.bridge.link.clock import Clock, WallClock
-from stopgo.bridge.link.zenoh_link import COMMON
 from stopgo.bridge.ros2.nav2_port import ODOMETRY, TF, charge_of, ns_of, take_transforms
+from stopgo.bridge.ros2.ros_definitions import Undecodable, message_type
 from stopgo.bridge.ros2.ros_graph import BRIDGED_TOKENS, TOKENS, RosEntity, entity_of, hash_text
 from stopgo.bridge.ros2.ros_settings import RosSettings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
-from stopgo.mission.errors import InputError, RobotUnreachable
+from stopgo.bridge.ros2.zenoh_node import open_network
+from stopgo.mission.errors import InputError
 
 ATTACHMENT = struct.Struct("<qq")
 """Sequence number and source time in nanoseconds; a GID follows."""
@@ -81,11 +82,6 @@ class RosListener:
         settings: RosSettings,
         clock: Clock | None = None,
     ) -> None:
-        from rosbags.serde import SerdeError
-        from rosbags.typesys import Stores, get_typestore
-
-        self._undecodable = (SerdeError, ValueError, KeyError, IndexError, struct.error)
-        self._types = get_typestore(Stores.ROS2_JAZZY)
         self._session = session
         self._domain = domain
         self._clock = clock or WallClock()
@@ -135,7 +131,7 @@ class RosListener:
 
     def _heard(self, name: str, one: RosEntity) -> HeardTopic:
         topic, (kind, take) = HeardTopic(one), self.wanted[name]
-        own = self._types.hash_rihs01(kind)
+        own = message_type(kind).hash
         if one.type != kind:
             topic.refused = f"it is of type {one.type}, not {kind}"
         elif one.hash != own and (one.hash or one.domain is not None):
@@ -150,8 +146,8 @@ class RosListener:
             with self._lock:
                 topic.take(attachment, self._clock.now_ns() / 1e9)
                 try:
-                    take(self._types.deserialize_cdr(bytes(sample.payload), kind))
-                except self._undecodable as error:
+                    take(message_type(kind).decode(bytes(sample.payload)))
+                except Undecodable as error:
                     topic.wrong = f"a message cannot be decoded ({error})"
 
         key = topic.entity.key
@@ -209,12 +205,5 @@ def ros_listener(
     RobotUnreachable
         If there is no router.
     """
-    config = zenoh.Config()
-    for key, value in {**COMMON, "mode": "client", "connect/endpoints": list(endpoints)}.items():
-        config.insert_json5(key, json.dumps(value))
-    try:
-        session = zenoh.open(config)
-    except zenoh.ZError:
-        raise RobotUnreachable(f"{','.join(endpoints)}: no zenoh router answers there") from None
-    with session:
+    with open_network(endpoints) as session:
         yield RosListener(session, domain, namespace, settings)
