@@ -319,7 +319,7 @@ ControllerKind = Annotated[
     str,
     typer.Option(
         "--controller",
-        metavar="sim|mavlink:URL|ros2[:FILE]|ros2-zenoh[:FILE]|MODULE:FUNCTION",
+        metavar="sim|mavlink:URL|ros2[-zenoh][:FILE]|MOD:FUNC",
         help="Base and scanner: simulated, an autopilot's, of ROS 2, or your own. ros2-zenoh needs no ROS.",
     ),
 ]

@@ -103,6 +103,11 @@ class RosListener:
         }
         self.topics: dict[str, HeardTopic] = {}
 
+    @property
+    def is_linked(self) -> bool:
+        """True while a zenoh router answers."""
+        return bool(list(self._session.info.routers_zid()))
+
     def look(self) -> None:
         """Read the graph, subscribe to what is new of the robot, and drop topics whose publisher has gone."""
         tokens_of = BRIDGED_TOKENS if self._domain is None else f"{TOKENS}/{self._domain}"
