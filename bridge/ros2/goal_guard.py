@@ -28,6 +28,9 @@ FIRST, LAST = 0, -1
 DRIVES, STANDS = b"1", b"0"
 READY = b"ready\n"
 CANCEL = "action_msgs/srv/CancelGoal"
+READY_S = 30.0
+"""Longest wait for the first guard."""
+NOT_READY = "the process that stops the robot if this program ends is not ready"
 ENDED = "the process that stops the robot if this program ends has ended; it is started again"
 
 
@@ -38,14 +41,19 @@ class GoalGuard:
         self, wanted: dict[str, Any], drives: Callable[[], bool], report: Callable[[str], None],
         module: str,
     ) -> None:  # fmt: skip
-        """`report` takes why no guard runs, and an empty text once one runs again; `module` is run."""
+        """Start it, and wait until it is ready.
+
+        `report` takes why no guard runs, and an empty text once one runs again; `module` is run.
+        """
         self._drives = drives
         self._report = report
         self._command = [sys.executable, "-m", module, json.dumps(wanted)]
-        self._is_missing = False
         self._closing = threading.Event()
         self._lock = threading.Lock()
         self._process = self._started()
+        self._is_missing = not self._is_ready(within_s=READY_S)
+        if self._is_missing:
+            report(NOT_READY)
         self._thread = threading.Thread(target=self._show_life, name="goal guard", daemon=True)
         self._thread.start()
 
@@ -96,15 +104,14 @@ class GoalGuard:
 
     def _hear_ready(self) -> None:
         """Report a new guard once its node is there; until then the robot must not drive."""
-        out = self._process.stdout
-        if (
-            self._is_missing
-            and out is not None
-            and select.select([out], [], [], 0)[FIRST]
-            and out.readline() == READY
-        ):
+        if self._is_missing and self._is_ready(within_s=0.0):
             self._is_missing = False
             self._report("")
+
+    def _is_ready(self, within_s: float) -> bool:
+        out = self._process.stdout
+        assert out is not None
+        return bool(select.select([out], [], [], within_s)[FIRST]) and out.readline() == READY
 
     def _replace(self) -> None:
         """Start another process, at most one in `END_S`."""

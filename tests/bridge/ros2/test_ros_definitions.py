@@ -14,13 +14,17 @@ SCAN = "string id\nfloat64 seconds\nmy_msgs/Part[] parts\nchar[2] flags\n---\nbo
 
 
 def test_hashes_are_those_that_ros_publishes() -> None:
-    """From rosidl's own files of Kilted, and of Nav2's main branch, whose definitions Lyrical has."""
+    """Written by rosidl of Kilted for the definitions of Nav2's branches jazzy and main (as in Lyrical)."""
     assert service_types("std_srvs/srv/Trigger")[0].hash.startswith("RIHS01_eeff2cd6")
     assert service_types("action_msgs/srv/CancelGoal")[0].hash.startswith("RIHS01_573d8b0a")
     assert message_type("nav_msgs/msg/Path").hash.startswith("RIHS01_1957a5bb")
     jazzy, lyrical = action_types("nav2_msgs/action/FollowPath")
     assert (jazzy.send_goal.said, lyrical.send_goal.said) == ("Jazzy, Kilted", "Lyrical")
-    assert jazzy.send_goal.hash != lyrical.send_goal.hash
+    assert jazzy.send_goal.hash.startswith("RIHS01_5b662aee1159e1d7")
+    assert lyrical.send_goal.hash.startswith("RIHS01_0c091793c90a6734")
+    spun, kilted = action_types("nav2_msgs/action/Spin")
+    assert spun.send_goal.hash.startswith("RIHS01_a863727716f5620b")
+    assert kilted.send_goal.hash.startswith("RIHS01_63ad359dc095261a")
     assert jazzy.get_result.hash == lyrical.get_result.hash
 
 
