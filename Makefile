@@ -41,7 +41,7 @@ test: lint
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
-	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/recordings tests/bridge/mavlink tests/bridge/robot
+	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission tests/recordings tests/bridge/mavlink tests/bridge/robot tests/bridge/ros2
 
 # A real ROS 2 of wheels in .venv-ros2 (330 MB), and the tests that drive a mission with it.
 ros2: $(STAMP)

@@ -31,8 +31,8 @@ COMMANDS = {
     "prove_command": ("prove",),
     "demo_command": ("demo",),
     "bridge_commands": (
-        "robot", "push", "fetch-mission", "clear", "doctor", "start", "pause", "resume", "skip", "retry",
-        "abort", "home", "status", "session", "watch", "simulate", "keys", "conform", "tunnel",
+        "robot", "guard", "push", "fetch-mission", "clear", "doctor", "start", "pause", "resume", "skip",
+        "retry", "abort", "home", "status", "session", "watch", "simulate", "keys", "conform", "tunnel",
     ),
     "review_command": ("review",),
     "runs_command": ("runs",),

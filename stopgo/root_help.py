@@ -19,7 +19,7 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
         "export": "Write a mission in another format",
         "import": "Make a mission from another format",
     },
-    "Run": {
+    "Run and look back": {
         "push": "Send a mission to a robot",
         "start": "Start the mission on the robot",
         "pause": "Pause the robot at standstill",
@@ -32,14 +32,13 @@ COMMAND_GROUPS: Mapping[str, Mapping[str, str]] = {
         "session": "Hold a session open for commands",
         "watch": "Follow and record a run",
         "site": "Plan, run and review in the browser",
-    },
-    "Look back": {
         "review": "Compare recordings with their plan",
         "runs": "List the plans and runs in a folder",
         "replay": "Compare a robot's own log with a mission",
     },
     "Robots and upkeep": {
         "robot": "Run the robot agent",
+        "guard": "Stop a ROS 2 robot whose link is cut",
         "simulate": "Simulate a MAVLink vehicle",
         "fetch-mission": "Read the mission of a MAVLink vehicle",
         "clear": "Clear the mission of a MAVLink vehicle",

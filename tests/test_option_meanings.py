@@ -30,6 +30,7 @@ MEANINGS = {
     "--out": "file or folder to write",
     "--parameters": "plan.toml",
     "--robot": "name of the robot",
+    "--ros2": "domain and namespace of a robot with ROS 2",
     "--seed": "seed of the random numbers",
     "--set-origin": "give a vehicle without an origin the mission's",
     "--since": "only what was finished after a day",

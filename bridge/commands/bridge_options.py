@@ -117,6 +117,33 @@ RosDomain = Annotated[
         help="Topics of a ROS 2 robot instead, over rmw_zenoh at --connect; behind a DDS bridge: dds/NS.",
     ),
 ]
+RequiredRosDomain = Annotated[
+    str,
+    typer.Option(
+        "--ros2",
+        metavar="DOMAIN[/NS]",
+        rich_help_panel=CONNECTION,
+        help="Domain and namespace of the robot's node.",
+    ),
+]
+GuardedRouter = Annotated[
+    str,
+    typer.Option(
+        "--connect",
+        metavar="ENDPOINT",
+        rich_help_panel=CONNECTION,
+        help="The zenoh router of the robot's ROS 2 network.",
+    ),
+]
+GuardedNode = Annotated[
+    str,
+    typer.Option(
+        "--node",
+        metavar="NAME",
+        rich_help_panel=CONNECTION,
+        help="Name of the node that drives: `node` of its ros2.toml.",
+    ),
+]
 RequiredMavlinkUrl = Annotated[
     str,
     typer.Option(
@@ -292,8 +319,8 @@ ControllerKind = Annotated[
     str,
     typer.Option(
         "--controller",
-        metavar="sim|mavlink:URL|ros2[:FILE]|MODULE:FUNCTION",
-        help="Base and scanner: simulated, an autopilot's, of ROS 2, or your own.",
+        metavar="sim|mavlink:URL|ros2[-zenoh][:FILE]|MOD:FUNC",
+        help="Base and scanner: simulated, an autopilot's, of ROS 2, or your own. ros2-zenoh needs no ROS.",
     ),
 ]
 RosArguments = Annotated[

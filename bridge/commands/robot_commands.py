@@ -18,6 +18,8 @@ from stopgo.bridge.commands.bridge_options import (
     BatteryLife,
     ControllerKind,
     FaultsOfRobot,
+    GuardedNode,
+    GuardedRouter,
     Insecure,
     JournalFolder,
     KeyFolder,
@@ -25,6 +27,7 @@ from stopgo.bridge.commands.bridge_options import (
     LogSize,
     OnRevision,
     OwnName,
+    RequiredRosDomain,
     RosArguments,
     RouterEndpoint,
     ScannerTrigger,
@@ -52,8 +55,8 @@ if TYPE_CHECKING:
 
 MAVLINK = "mavlink:"
 """Before the URL of an autopilot that is the controller."""
-ROS2 = "ros2"
-"""The controller that speaks ROS 2; after a colon the file of its names."""
+ROS2, ROS2_ZENOH = "ros2", "ros2-zenoh"
+"""Controllers that speak ROS 2, by rclpy and over zenoh; after a colon the file of names."""
 LONGEST_BATTERY_LIFE_S = 1e6
 ONLY_SIMULATED = ("--at", "--map", "--fault", "--speed-up", "--battery-life")
 ONLY_ROS = ("--ros-args",)
@@ -145,7 +148,7 @@ def body_of(
     ros_args: str,
 ) -> OpenBody:
     """Return the base and scanner of a kind of controller; raise `InputError` for options of another kind."""
-    if controller.partition(":")[0] == ROS2:
+    if controller.partition(":")[0] in (ROS2, ROS2_ZENOH):
         return ros_body_of(controller, given, simulated, ros_args)
     refuse_options(given, "a controller that is not ros2", *ONLY_ROS)
     if controller == "sim":
@@ -172,17 +175,41 @@ def body_of(
 
 def ros_body_of(controller: str, given: GivenOptions, simulated: SimulatedOptions, ros_args: str) -> OpenBody:
     """Return the base and scanner of a robot that speaks ROS 2."""
-    from stopgo.bridge.ros2.rclpy_port import open_rclpy
     from stopgo.bridge.ros2.ros_body import RosBody
     from stopgo.bridge.ros2.ros_settings import read_ros_settings
     from stopgo.bridge.ros2.run_topics import RunTopics
 
     others = tuple(option for option in ONLY_SIMULATED if option != "--map")
     refuse_options(given, "ROS 2", *others, *ONLY_DRIVEN)
-    file = controller.partition(":")[2]
+    kind, _, file = controller.partition(":")
     settings = read_ros_settings(Path(file) if file else None)
+    if kind == ROS2_ZENOH:
+        from stopgo.bridge.ros2.zenoh_robot import open_zenoh
+
+        refuse_options(given, "ROS 2 over zenoh, whose names are in ros2.toml", *ONLY_ROS)
+        return RosBody(settings, open_zenoh, RunTopics, simulated.to_map)
+    from stopgo.bridge.ros2.rclpy_node import open_rclpy
+
     arguments = ("--ros-args", *shlex.split(ros_args)) if ros_args else ()
     return RosBody(settings, partial(open_rclpy, ros_args=arguments), RunTopics, simulated.to_map)
+
+
+def guard(
+    *, ros2: RequiredRosDomain, connect: GuardedRouter = DEFAULT_ENDPOINT, node: GuardedNode = "stopgo"
+) -> None:
+    """Guard a robot with ROS 2 over zenoh, on its computer, until SIGTERM: stop it if its link is cut.
+
+    Example: stopgo guard --ros2 0/r1 --connect tcp/127.0.0.1:7447
+    """
+    from stopgo.bridge.robot.program import end_at_sigterm
+    from stopgo.bridge.ros2.ros_zenoh import read_domain
+    from stopgo.bridge.ros2.zenoh_robot import guard_at_robot
+
+    domain, namespace = read_domain(ros2)
+    if domain is None:
+        raise InputError(f"--ros2 {ros2}: a guard needs rmw_zenoh; write DOMAIN or DOMAIN/NAMESPACE, as 0/r1")
+    end_at_sigterm()
+    guard_at_robot(connect, domain, namespace, node, say)
 
 
 def read_faults(texts: list[str] | None) -> Faults:

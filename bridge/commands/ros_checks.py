@@ -91,6 +91,7 @@ def state_of(listener: RosListener, text: str) -> dict[str, Any]:
     silent, pose, state = told.silence(), told.pose(), listener.state or {}
     return {
         "robot": text,
+        "linked": listener.is_linked,
         "refused": [f"{name}: {topic.refused}" for name, topic in listener.topics.items() if topic.refused],
         "silent": silent,
         "pose": None if silent else {"x": pose.x, "y": pose.y, "heading": pose.heading},
@@ -102,6 +103,8 @@ def state_of(listener: RosListener, text: str) -> dict[str, Any]:
 
 def ros_status_text(found: dict[str, Any]) -> str:
     """Return a robot's state as one line."""
+    if not found["linked"]:
+        return f"{found['robot']}: no link to the zenoh router; last pose and state are not current"
     state = found["state"] or "no state published by stopgo"
     stop = f", {found['stop_state']} at {found['stop']}" if found["stop"] else ""
     battery = "" if found["battery"] is None else f", battery {found['battery']:.0%}"

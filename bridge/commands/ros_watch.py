@@ -60,4 +60,4 @@ def _noted(found: dict[str, Any]) -> tuple[object, ...]:
     if found["state"] is None and pose is not None:
         cell = round(pose["x"] * STEPS_A_METRE), round(pose["y"] * STEPS_A_METRE)
     run = (found[key] for key in ("state", "run_id", "stop", "stop_state", "done_count"))
-    return (*run, not found["silent"], *found["refused"], cell)
+    return (*run, found["linked"], not found["silent"], *found["refused"], cell)

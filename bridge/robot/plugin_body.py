@@ -23,7 +23,7 @@ from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 T = TypeVar("T")
 
-OURS: dict[str, Any] = {"sim": None, "mavlink:URL": None, "ros2[:FILE]": None}
+OURS: dict[str, Any] = {"sim": None, "mavlink:URL": None, "ros2[:FILE]": None, "ros2-zenoh[:FILE]": None}
 """Values of `--controller` that need no plugin."""
 OPTIONAL = ("health", "scan_outcome")
 """Methods that a base or a scanner may lack."""

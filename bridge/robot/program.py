@@ -77,7 +77,7 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     """Run the robot agent until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
     from stopgo.bridge.link.zenoh_link import Guard, admitting, joining
 
-    signal.signal(signal.SIGTERM, _leave)
+    end_at_sigterm()
     sys.setswitchinterval(SWITCH_S)
     keys = KeyExpressions(options.name, options.site)
     held = None if options.keys is None else robots_keys(options.keys, options.name, options.state)
@@ -195,6 +195,11 @@ def crashing(faults: Faults) -> Callable[[str], None]:
             os.kill(os.getpid(), signal.SIGKILL)
 
     return at_commit
+
+
+def end_at_sigterm() -> None:
+    """Let SIGTERM end the program as its end does: with every session closed."""
+    signal.signal(signal.SIGTERM, _leave)
 
 
 def _leave(signum: int, frame: object) -> None:

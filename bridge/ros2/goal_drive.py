@@ -27,6 +27,8 @@ GONE_S = 1.0
 HALT_S = 5.0
 STAND_AGAIN_S = 0.5
 """Interval at which a robot that does not stand yet is stopped again."""
+TAKEN_S = 0.3
+"""Time by which another client's goal may be known later than the end of ours that it caused."""
 PROGRESS_M = 0.05
 PROGRESS_RAD = math.radians(3.0)
 TRIES = 4
@@ -125,9 +127,12 @@ class GoalDrive:
 
     def _end_of_patience(self, goal: RosGoal, watch: _Watch) -> str:
         now_ns, limits = self._clock.now_ns(), self._settings.limits
-        watch.look(now_ns, self._telemetry.pose(), server=self._port.is_ready("drive"))
+        watch.look(now_ns, self._telemetry.pose(), server=not self._port.missing("drive"))
         if goal.status == "sent" and watch.since_begin_s(now_ns) > ANSWER_S:
-            return f"Nav2 does not answer a goal within {ANSWER_S:g} s"
+            return (
+                f"Nav2 does not answer a goal within {ANSWER_S:g} s; it may drive,"
+                " so every goal is cancelled and zero velocity commanded"
+            )
         if watch.without_server_s(now_ns) > GONE_S:
             return "Nav2's action server is not available"
         if watch.without_progress_s(now_ns) > limits.stalled_s:
@@ -137,9 +142,10 @@ class GoalDrive:
     def _ended_early(self, goal: RosGoal) -> str:
         """Return why an aborted goal is to be tried again; one that somebody has ended is not."""
         detail = f": {goal.detail}" if goal.detail else ""
-        taken = self._taken()
-        if taken:
-            self._end_if(goal, taken)
+        end_ns = self._clock.now_ns() + round(TAKEN_S * 1e9)
+        while not (taken := self._taken()) and self._clock.now_ns() < end_ns:
+            self._clock.wait(LOOK_S)
+        self._end_if(goal, taken)
         if goal.status == "canceled":
             self._end_if(goal, "another client, or the guard of this program, has cancelled the goal")
         self.halt(goal)

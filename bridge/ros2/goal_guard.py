@@ -13,11 +13,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from stopgo.bridge.ros2.ros_types import load
+from stopgo.bridge.ros2.ros_port import RosNode
 
 SIGN_S = 0.1
 SILENT_S = 0.5
@@ -27,6 +27,10 @@ END_S = 2.0
 FIRST, LAST = 0, -1
 DRIVES, STANDS = b"1", b"0"
 READY = b"ready\n"
+CANCEL = "action_msgs/srv/CancelGoal"
+READY_S = 30.0
+"""Longest wait for the first guard."""
+NOT_READY = "the process that stops the robot if this program ends is not ready"
 ENDED = "the process that stops the robot if this program ends has ended; it is started again"
 
 
@@ -35,16 +39,21 @@ class GoalGuard:
 
     def __init__(
         self, wanted: dict[str, Any], drives: Callable[[], bool], report: Callable[[str], None],
-        module: str = __name__,
+        module: str,
     ) -> None:  # fmt: skip
-        """`report` takes why no guard runs, and an empty text once one runs again."""
+        """Start it, and wait until it is ready.
+
+        `report` takes why no guard runs, and an empty text once one runs again; `module` is run.
+        """
         self._drives = drives
         self._report = report
         self._command = [sys.executable, "-m", module, json.dumps(wanted)]
-        self._is_missing = False
         self._closing = threading.Event()
         self._lock = threading.Lock()
         self._process = self._started()
+        self._is_missing = not self._is_ready(within_s=READY_S)
+        if self._is_missing:
+            report(NOT_READY)
         self._thread = threading.Thread(target=self._show_life, name="goal guard", daemon=True)
         self._thread.start()
 
@@ -95,15 +104,14 @@ class GoalGuard:
 
     def _hear_ready(self) -> None:
         """Report a new guard once its node is there; until then the robot must not drive."""
-        out = self._process.stdout
-        if (
-            self._is_missing
-            and out is not None
-            and select.select([out], [], [], 0)[FIRST]
-            and out.readline() == READY
-        ):
+        if self._is_missing and self._is_ready(within_s=0.0):
             self._is_missing = False
             self._report("")
+
+    def _is_ready(self, within_s: float) -> bool:
+        out = self._process.stdout
+        assert out is not None
+        return bool(select.select([out], [], [], within_s)[FIRST]) and out.readline() == READY
 
     def _replace(self) -> None:
         """Start another process, at most one in `END_S`."""
@@ -121,8 +129,9 @@ class GoalGuard:
 class Signs:
     """Signs of life of a program, and the verdict on them; time comes from outside."""
 
-    def __init__(self, now_s: float) -> None:
+    def __init__(self, now_s: float, silent_s: float = SILENT_S) -> None:
         self._last_s = now_s
+        self._silent_s = silent_s
         self._drives = False
         self.ended = False
 
@@ -134,40 +143,43 @@ class Signs:
 
     def must_stop(self, now_s: float) -> bool:
         """Return True, once, if the robot must be stopped."""
-        must = self._drives and (self.ended or now_s - self._last_s > SILENT_S)
+        must = self._drives and (self.ended or now_s - self._last_s > self._silent_s)
         if must:
             self._drives = False
         return must
 
 
-def guard(wanted: dict[str, Any], source: int) -> None:
-    """Read signs of life from a file descriptor until the program ends, and stop the robot if need be."""
-    rclpy = load("rclpy")
-    rclpy.init(args=[])
-    node = rclpy.create_node(wanted["node"])
-    request = load("action_msgs.srv").CancelGoal
-    clients = [node.create_client(request, name) for name in wanted["cancel"]]
-    kind = getattr(load("geometry_msgs.msg"), wanted["velocity_type"])
-    publisher = node.create_publisher(kind, wanted["cmd_vel"], 10) if wanted["cmd_vel"] else None
+def guard(node: RosNode, wanted: dict[str, Any], source: int) -> None:
+    """Read signs of life from a file descriptor until the program ends, and stop the robot if need be.
+
+    `wanted` names the services that cancel, and the topic that takes velocities.
+    """
+    robot = GoalStop(node, wanted)
     os.write(sys.stdout.fileno(), READY)
     signs = Signs(time.monotonic())
     while not signs.ended:
         if select.select([source], [], [], SIGN_S)[FIRST]:
             signs.take(os.read(source, 4096), time.monotonic())
         if signs.must_stop(time.monotonic()):
-            _stop(clients, request, publisher, kind)
+            robot.stop()
 
 
-def _stop(clients: Sequence[Any], request: Any, publisher: Any, kind: Any) -> None:
-    end_s = time.monotonic() + STOPS_S
-    while time.monotonic() < end_s:
-        for client in clients:
-            if client.service_is_ready():
-                client.call_async(request.Request())
-        if publisher is not None:
-            publisher.publish(kind())
-        time.sleep(SIGN_S)
+class GoalStop:
+    """Cancels a robot's goals, and commands zero velocity."""
 
+    def __init__(self, node: RosNode, wanted: dict[str, Any]) -> None:
+        self.wanted = wanted
+        self._clients = [node.client(CANCEL, name) for name in wanted["cancel"]]
+        topic = wanted["cmd_vel"]
+        self._velocity = node.publisher(wanted["velocity_type"], topic) if topic else None
 
-if __name__ == "__main__":
-    guard(json.loads(sys.argv[1]), sys.stdin.fileno())
+    def stop(self) -> None:
+        """Do so for `STOPS_S`, whatever is answered."""
+        end_s = time.monotonic() + STOPS_S
+        while time.monotonic() < end_s:
+            for client in self._clients:
+                if not client.missing():
+                    client.call({})  # no id and no time: every goal
+            if self._velocity is not None:
+                self._velocity.publish({})
+            time.sleep(SIGN_S)

@@ -79,8 +79,8 @@ class RosBase:
         return self._telemetry.silence() or self._telemetry.unusable() or self._cannot_drive()
 
     def _cannot_drive(self) -> str:
-        if not self._port.is_ready("drive"):
-            return f"no action server {self._settings.drive.follow_path} (nav2_msgs/action/FollowPath)"
+        if missing := self._port.missing("drive"):
+            return missing
         foreign = self._port.foreign_goals()
         return f"another client drives the robot ({foreign[0]})" if foreign else ""
 

@@ -40,6 +40,8 @@ class RosEntity:
     """As ROS users write it: nav_msgs/msg/Odometry."""
     hash: str = ""
     qos: str = ""
+    source: str = ""
+    """Session and numbers of the entity: another one after a restart."""
 
     @property
     def key(self) -> str:
@@ -70,16 +72,16 @@ def entity_of(token: str) -> RosEntity | None:
         return _bridged(parts)
     if len(parts) < 9 or parts[0] != TOKENS or parts[5] not in KINDS or not parts[1].isdigit():
         return None
-    kind = KINDS[parts[5]]
+    kind, source = KINDS[parts[5]], "/".join(parts[2:5])
     node = f"{_name(parts[7]).rstrip('/')}/{parts[8]}"
     if kind == "node":
-        return RosEntity(int(parts[1]), kind, node)
+        return RosEntity(int(parts[1]), kind, node, source=source)
     if len(parts) < 13:
         return None
     type_ = parts[10].replace("::dds_::", "::").removesuffix("_").replace("::", "/")
     if type_.count("/") != 2:
         return None
-    return RosEntity(int(parts[1]), kind, node, _name(parts[9]), type_, parts[11], parts[12])
+    return RosEntity(int(parts[1]), kind, node, _name(parts[9]), type_, parts[11], parts[12], source)
 
 
 def _bridged(parts: list[str]) -> RosEntity | None:

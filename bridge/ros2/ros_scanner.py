@@ -84,8 +84,8 @@ class RosScanner:
         return ""
 
     def _not_ready(self) -> str:
-        if not self._port.is_ready("scan"):
-            return f"no {self._settings.kind} {self._settings.name} ({self._settings.type})"
+        if missing := self._port.missing("scan"):
+            return missing
         return self._moves() or ("" if self._telemetry.still() else "the robot does not stand")
 
     def _moves(self) -> str:

@@ -33,6 +33,8 @@ class TopicNames(RosSection, frozen=True):
     """Topics that the robot publishes, and the one that takes velocities."""
 
     odometry: NeededName = "odom"
+    tf: NeededName = "/tf"
+    tf_static: NeededName = "/tf_static"
     battery: Name = "battery_state"
     localisation: Name = ""
     """geometry_msgs/msg/PoseWithCovarianceStamped, such as amcl_pose."""
@@ -93,6 +95,8 @@ class ScanCall(RosSection, frozen=True):
     size: str = "message.size"
     sha256: str = "message.sha256"
     points: str = "message.points"
+    definitions: str = ""
+    """Folder with packages of .msg, .srv and .action files, for a type that `ros2-zenoh` does not know."""
     folder: str = ""
     """Folder of the files on this computer: size and sha256 are then taken from the file itself."""
     late_s: Seconds = 60.0
@@ -101,6 +105,17 @@ class ScanCall(RosSection, frozen=True):
     @property
     def kind(self) -> Literal["srv", "action"]:
         return "action" if "/action/" in self.type else "srv"
+
+
+class ZenohNetwork(RosSection, frozen=True):
+    """Place of the robot in a network of rmw_zenoh, for `--controller ros2-zenoh`."""
+
+    router: str = "tcp/127.0.0.1:7447"
+    domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0
+    namespace: Name = ""
+    use_sim_time: bool = False
+    guard: Literal["here", "robot"] = "here"
+    """`robot`: the robot is driven only while `stopgo guard` at the robot answers."""
 
 
 class RosSettings(RosSection, frozen=True):
@@ -114,6 +129,7 @@ class RosSettings(RosSection, frozen=True):
     drive: DriveActions = DriveActions()
     limits: RosLimits = RosLimits()
     scan: ScanCall = ScanCall()
+    zenoh: ZenohNetwork = ZenohNetwork()
 
 
 def read_ros_settings(path: Path | None) -> RosSettings:

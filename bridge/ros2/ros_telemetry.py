@@ -82,6 +82,14 @@ class RosTelemetry:
         self.sigma_m: float | None = None
         """Standard deviation of the position."""
 
+    def say_unguarded(self, why: str) -> None:
+        """Take the reason why no process stops the robot; empty if one does."""
+        self.unguarded = why
+
+    def say_fault(self, why: str) -> None:
+        """Take the error that has ended the node's thread."""
+        self.fault = why
+
     # From the node's thread
 
     def take_transform(

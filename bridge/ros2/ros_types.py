@@ -1,52 +1,51 @@
-"""Types of ROS messages, services and actions, loaded by their names, and their fields as plain values."""
+"""Fields of ROS messages as plain values: nested mappings and lists, whichever library makes the messages."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from importlib import import_module
-from typing import Any
+from typing import Any, Protocol
 
 from stopgo.bridge.ros2.ros_settings import ScanCall
-from stopgo.mission.errors import InputError, MissingExtra
+from stopgo.mission.errors import InputError
 
 RosFields = Mapping[str, Any]
+"""Values of a message's fields, by name; inner messages are mappings. What is missing has its default."""
 
 
-def load(module: str) -> Any:
-    """Load a module of ROS; raises `MissingExtra` if ROS's Python packages are not there."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        raise MissingExtra(
-            f"--controller ros2: no Python module {module} ({error});"
-            " run `source /opt/ros/jazzy/setup.bash` first, and start stopgo with ROS's Python"
-        ) from None
+class MessageKind(Protocol):
+    """A type of message."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def fields(self) -> Mapping[str, str]:
+        """Type of each field, as rosidl writes it: `double`, `sequence<uint8>`, `std_msgs/Header`."""
+
+    def inner(self, field: str) -> MessageKind:
+        """Return the type of a field that is a message, or a list of messages."""
+
+    def message(self, fields: RosFields) -> Any:
+        """Return a message with these fields."""
 
 
-def checked_scan_type(scan: ScanCall) -> Any:
-    """Return the type of the scanner's service or action, after a check of the fields that scan names.
+def check_scan(scan: ScanCall, request: MessageKind, response: MessageKind) -> None:
+    """Check the fields that a scan's settings name.
 
     Raises
     ------
     InputError
         Naming the missing field, and those that there are.
     """
-    package, kind, name = scan.type.split("/")
-    try:
-        found = getattr(import_module(f"{package}.{kind}"), name)
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"scan.type = {scan.type!r}: there is no such type here ({error})") from None
-    request, response = (found.Goal, found.Result) if kind == "action" else (found.Request, found.Response)
-    filled_message(request, {field: _example(value) for field, value in scan.request.items()})
-    known = response.get_fields_and_field_types()
+    checked_fields(request, {field: _example(value) for field, value in scan.request.items()})
     for key in ("success", "message", "file", "size", "sha256", "points"):
         first = getattr(scan, key).partition(".")[0]
-        if first and first not in known:
+        if first and first not in response.fields:
             raise InputError(
                 f"scan.{key} = {getattr(scan, key)!r}: the response of {scan.type} has no field {first};"
-                f" it has: {', '.join(known) or 'none'}"
+                f" it has: {', '.join(response.fields) or 'none'}"
             )
-    return found
 
 
 EXAMPLES = {"{duration_s}": 1.0, "{timeout_s}": 1.0}
@@ -59,22 +58,23 @@ def _example(value: Any) -> Any:
     return EXAMPLES.get(value, value) if isinstance(value, str) else value
 
 
-def filled_message(kind: Any, fields: RosFields, where: str = "scan.request") -> Any:
-    """Return a message with these fields; raises `InputError` for a wrong field or value."""
-    made, known = kind(), kind.get_fields_and_field_types()
+def checked_fields(kind: MessageKind, fields: RosFields, where: str = "scan.request") -> dict[str, Any]:
+    """Return the fields as their types take them; raises `InputError` for a wrong field or value."""
+    checked: dict[str, Any] = {}
     for field, given in fields.items():
-        if field not in known:
+        if field not in kind.fields:
             raise InputError(
-                f"{where}.{field}: {kind.__name__} has no such field; it has: {', '.join(known) or 'none'}"
+                f"{where}.{field}: {kind.name} has no such field; it has: {', '.join(kind.fields) or 'none'}"
             )
-        if isinstance(given, Mapping):
-            value = filled_message(type(getattr(made, field)), given, f"{where}.{field}")
-        else:
-            value = _as_type(given, known[field])
-        if not _fits(value, known[field]):
-            raise InputError(f"{where}.{field} = {given!r}: must be {known[field]}")
-        setattr(made, field, value)
-    return made
+        type_ = kind.fields[field]
+        if isinstance(given, Mapping) and "/" in type_:
+            checked[field] = checked_fields(kind.inner(field), given, f"{where}.{field}")
+            continue
+        value = _as_type(given, type_)
+        if not _fits(value, type_):
+            raise InputError(f"{where}.{field} = {given!r}: must be {type_}")
+        checked[field] = value
+    return checked
 
 
 def _fits(value: Any, kind: str) -> bool:
@@ -97,8 +97,13 @@ def _as_type(value: Any, kind: str) -> Any:
 
 def plain_fields(message: Any) -> dict[str, Any]:
     """Return a message's fields as plain values, inner messages as dictionaries."""
-    return {name: _plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if dataclasses.is_dataclass(message):
+        names = [one.name for one in dataclasses.fields(message) if not one.name.startswith("__")]
+    else:
+        names = list(message.get_fields_and_field_types())
+    return {name: _plain(getattr(message, name)) for name in names}
 
 
 def _plain(value: Any) -> Any:
-    return plain_fields(value) if hasattr(value, "get_fields_and_field_types") else value
+    is_message = hasattr(value, "get_fields_and_field_types") or dataclasses.is_dataclass(value)
+    return plain_fields(value) if is_message else value

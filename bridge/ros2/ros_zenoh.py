@@ -14,17 +14,19 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import zenoh
 
 from stopgo.bridge.link.clock import Clock, WallClock
-from stopgo.bridge.link.zenoh_link import COMMON
+from stopgo.bridge.ros2.nav2_port import ODOMETRY, TF, charge_of, ns_of, take_transforms
+from stopgo.bridge.ros2.ros_definitions import Undecodable, message_type
 from stopgo.bridge.ros2.ros_graph import BRIDGED_TOKENS, TOKENS, RosEntity, entity_of, hash_text
 from stopgo.bridge.ros2.ros_settings import RosSettings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
-from stopgo.mission.errors import InputError, RobotUnreachable
-from stopgo.mission.frames.transform import Transform
+from stopgo.bridge.ros2.zenoh_node import open_network
+from stopgo.mission.errors import InputError
 
 ATTACHMENT = struct.Struct("<qq")
 """Sequence number and source time in nanoseconds; a GID follows."""
@@ -80,11 +82,6 @@ class RosListener:
         settings: RosSettings,
         clock: Clock | None = None,
     ) -> None:
-        from rosbags.serde import SerdeError
-        from rosbags.typesys import Stores, get_typestore
-
-        self._undecodable = (SerdeError, ValueError, KeyError, IndexError, struct.error)
-        self._types = get_typestore(Stores.ROS2_JAZZY)
         self._session = session
         self._domain = domain
         self._clock = clock or WallClock()
@@ -98,13 +95,18 @@ class RosListener:
         self._own_tf = {f"{base}/tf": "/tf", f"{base}/tf_static": "/tf_static"}
         self._state_topic = f"{base}/{settings.node}/state"
         self.wanted = {
-            f"{base}/{settings.topics.odometry}": ("nav_msgs/msg/Odometry", self._take_odometry),
-            "/tf": ("tf2_msgs/msg/TFMessage", self._take_tf),
-            "/tf_static": ("tf2_msgs/msg/TFMessage", self._take_tf_static),
+            f"{base}/{settings.topics.odometry}": (ODOMETRY, self._take_odometry),
+            "/tf": (TF, partial(take_transforms, self.telemetry, static=False)),
+            "/tf_static": (TF, partial(take_transforms, self.telemetry, static=True)),
             f"{base}/{settings.topics.battery}": ("sensor_msgs/msg/BatteryState", self._take_battery),
             self._state_topic: ("std_msgs/msg/String", self._take_state),
         }
         self.topics: dict[str, HeardTopic] = {}
+
+    @property
+    def is_linked(self) -> bool:
+        """True while a zenoh router answers."""
+        return bool(list(self._session.info.routers_zid()))
 
     def look(self) -> None:
         """Read the graph, subscribe to what is new of the robot, and drop topics whose publisher has gone."""
@@ -134,7 +136,7 @@ class RosListener:
 
     def _heard(self, name: str, one: RosEntity) -> HeardTopic:
         topic, (kind, take) = HeardTopic(one), self.wanted[name]
-        own = self._types.hash_rihs01(kind)
+        own = message_type(kind).hash
         if one.type != kind:
             topic.refused = f"it is of type {one.type}, not {kind}"
         elif one.hash != own and (one.hash or one.domain is not None):
@@ -149,8 +151,8 @@ class RosListener:
             with self._lock:
                 topic.take(attachment, self._clock.now_ns() / 1e9)
                 try:
-                    take(self._types.deserialize_cdr(bytes(sample.payload), kind))
-                except self._undecodable as error:
+                    take(message_type(kind).decode(bytes(sample.payload)))
+                except Undecodable as error:
                     topic.wrong = f"a message cannot be decoded ({error})"
 
         key = topic.entity.key
@@ -171,36 +173,17 @@ class RosListener:
                 heard(reply.ok)
 
     def _take_odometry(self, message: Any) -> None:
-        speed, stamp_ns = message.twist.twist.linear, _stamp_ns(message.header.stamp)
+        speed, stamp_ns = message.twist.twist.linear, ns_of(message.header.stamp)
         behind_s = (time.time_ns() - stamp_ns) / 1e9
         turn = float(message.twist.twist.angular.z)
         self.telemetry.take_odometry(math.hypot(speed.x, speed.y), turn, stamp_ns=stamp_ns, behind_s=behind_s)
 
-    def _take_tf(self, message: Any, *, static: bool = False) -> None:
-        for one in message.transforms:
-            at, turn = one.transform.translation, one.transform.rotation
-            self.telemetry.take_transform(
-                one.header.frame_id,
-                one.child_frame_id,
-                Transform(x=at.x, y=at.y, heading=2 * math.atan2(turn.z, turn.w)),
-                stamp_ns=_stamp_ns(one.header.stamp),
-                static=static,
-            )
-
-    def _take_tf_static(self, message: Any) -> None:
-        self._take_tf(message, static=True)
-
     def _take_battery(self, message: Any) -> None:
-        charge = float(message.percentage)
-        self.telemetry.charge = charge if 0.0 <= charge <= 1.0 else None
+        self.telemetry.charge = charge_of(message)
 
     def _take_state(self, message: Any) -> None:
         told = json.loads(message.data)
         self.state = told if isinstance(told, dict) else None
-
-
-def _stamp_ns(stamp: Any) -> int:
-    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
 def read_domain(text: str) -> tuple[int | None, str]:
@@ -227,12 +210,5 @@ def ros_listener(
     RobotUnreachable
         If there is no router.
     """
-    config = zenoh.Config()
-    for key, value in {**COMMON, "mode": "client", "connect/endpoints": list(endpoints)}.items():
-        config.insert_json5(key, json.dumps(value))
-    try:
-        session = zenoh.open(config)
-    except zenoh.ZError:
-        raise RobotUnreachable(f"{','.join(endpoints)}: no zenoh router answers there") from None
-    with session:
+    with open_network(endpoints) as session:
         yield RosListener(session, domain, namespace, settings)

@@ -10,14 +10,14 @@ import itertools
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, get_args
 
 import msgspec
 
 from stopgo.bridge.robot.map_frame import turned
 from stopgo.bridge.robot.runner import Runner, state_report
-from stopgo.bridge.ros2.rclpy_port import RclpyPort, path_message
-from stopgo.bridge.ros2.ros_types import load
+from stopgo.bridge.ros2.nav2_port import Nav2Port, header_fields, path_fields, pose_fields
 from stopgo.mission.document import Mission, Point
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import Pose
@@ -37,12 +37,14 @@ COLOURS = {
 """Red, green and blue of a stop's marker."""
 OK, WARN = 0, 1
 """Levels of diagnostic_msgs/msg/DiagnosticStatus."""
+ARROW, TEXT, DELETE_ALL = 0, 9, 3
+"""Types and action of visualization_msgs/msg/Marker."""
 
 
 class RunTopics:
     """Publishes one robot's run from the node's thread, and takes commands."""
 
-    def __init__(self, port: RclpyPort, runner: Runner, to_map: Callable[[], Transform]) -> None:
+    def __init__(self, port: Nav2Port, runner: Runner, to_map: Callable[[], Transform]) -> None:
         self._port = port
         self._node = port.node
         self._runner = runner
@@ -53,17 +55,15 @@ class RunTopics:
         self._driven: list[Pose] = []
         self._of_run: str | None = None
         self._round = 0
-        qos = load("rclpy.qos")
-        kept = qos.QoSProfile(depth=1, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
-        make, nav = self._node.create_publisher, load("nav_msgs.msg")
-        self._state = make(load("std_msgs.msg").String, "~/state", kept)
-        self._plan = make(nav.Path, "~/plan", kept)
-        self._path = make(nav.Path, "~/path", kept)
-        self._stops = make(load("visualization_msgs.msg").MarkerArray, "~/stops", kept)
-        self._diagnostics = make(load("diagnostic_msgs.msg").DiagnosticArray, "/diagnostics", 10)
+        make, path = self._node.publisher, "nav_msgs/msg/Path"
+        self._state = make("std_msgs/msg/String", "~/state", "kept", depth=1)
+        self._plan = make(path, "~/plan", "kept", depth=1)
+        self._path = make(path, "~/path", "kept", depth=1)
+        self._stops = make("visualization_msgs/msg/MarkerArray", "~/stops", "kept", depth=1)
+        self._diagnostics = make("diagnostic_msgs/msg/DiagnosticArray", "/diagnostics")
         for verb in get_args(Verb):
-            self._serve(verb)
-        self._node.create_timer(PERIOD_S, self.tick)
+            self._node.serve("std_srvs/srv/Trigger", f"~/{verb}", partial(self._command, verb))
+        self._node.every(PERIOD_S, self.tick)
 
     def tick(self) -> None:
         """Publish what has changed; diagnostics once a second."""
@@ -84,10 +84,10 @@ class RunTopics:
 
     def _publish_state(self) -> None:
         report = state_report(
-            self._runner, robot=self._node.get_namespace().strip("/") or self._node.get_name(),
+            self._runner, robot=self._node.namespace.strip("/") or self._node.name,
             seq=next(self._numbers), ns=self._port.clock.now_ns(), newest=0,
         )  # fmt: skip
-        self._state.publish(load("std_msgs.msg").String(data=msgspec.json.encode(report).decode()))
+        self._state.publish({"data": msgspec.json.encode(report).decode()})
 
     def _publish_plan(self, mission: Mission | None) -> None:
         legs = () if mission is None else legs_of(mission)
@@ -105,39 +105,36 @@ class RunTopics:
             self._driven.append(pose)
 
     def _publish_path(self) -> None:
-        if self._driven and self._path.get_subscription_count():
+        if self._driven and self._path.is_heard():
             self._path.publish(self._path_of(self._driven))
 
-    def _path_of(self, poses: list[Pose]) -> Any:
-        frame = self._port.settings.frames.map
-        return path_message(load("nav_msgs.msg").Path(), poses, frame, self._node)
+    def _path_of(self, poses: list[Pose]) -> dict[str, Any]:
+        return path_fields(poses, self._port.settings.frames.map, self._node.now_ns())
 
     def _publish_stops(self, run: Run, mission: Mission | None) -> None:
-        kinds = load("visualization_msgs.msg")
-        markers = kinds.MarkerArray(markers=[kinds.Marker(action=kinds.Marker.DELETEALL)])
+        markers: list[dict[str, Any]] = [{"action": DELETE_ALL}]
         for number, stop in enumerate(() if mission is None else mission.stops):
             outcome = "done" if stop.id in run.done else "skipped" if stop.id in run.skipped else ""
             current = number == run.at and run.state in ("RUNNING", "PAUSED", "HELD")
             at = turned(Pose(x=stop.x, y=stop.y, heading=stop.heading), self._to_map())
             colour = COLOURS["current" if current and not outcome else outcome]
-            markers.markers += [
-                self._marker(2 * number, at, colour, kinds.Marker.ARROW, ""),
-                self._marker(2 * number + 1, at, colour, kinds.Marker.TEXT_VIEW_FACING, stop.id),
-            ]
-        self._stops.publish(markers)
+            markers += [
+                self._marker(2 * number, at, colour, ""), self._marker(2 * number + 1, at, colour, stop.id)
+            ]  # fmt: skip
+        self._stops.publish({"markers": markers})
 
-    def _marker(self, number: int, at: Pose, colour: tuple[float, float, float], kind: int, text: str) -> Any:
-        made = load("visualization_msgs.msg").Marker(id=number, type=kind, text=text, ns="stops")
-        made.header.frame_id = self._port.settings.frames.map
-        made.pose.position.x, made.pose.position.y = at.x, at.y
-        made.pose.orientation.z, made.pose.orientation.w = math.sin(at.heading / 2), math.cos(at.heading / 2)
-        made.scale.x, made.scale.y, made.scale.z = 0.4, 0.08, 0.25 if text else 0.08
-        made.color.r, made.color.g, made.color.b = colour
-        made.color.a = 1.0
-        return made
+    def _marker(self, number: int, at: Pose, colour: tuple[float, float, float], text: str) -> dict[str, Any]:
+        red, green, blue = colour
+        return {
+            "header": header_fields(self._port.settings.frames.map, 0),
+            "ns": "stops", "id": number, "type": TEXT if text else ARROW, "text": text,
+            "pose": pose_fields(at),
+            "scale": {"x": 0.4, "y": 0.08, "z": 0.25 if text else 0.08},
+            "color": {"r": red, "g": green, "b": blue, "a": 1.0},
+        }  # fmt: skip
 
     def _publish_diagnostics(self, run: Run) -> None:
-        told, kinds = self._port.telemetry, load("diagnostic_msgs.msg")
+        told, node = self._port.telemetry, self._node
         wrong = told.silence() or told.unusable()
         offset = told.clock_offset_s
         values = {
@@ -145,33 +142,26 @@ class RunTopics:
             "clock_offset_s": "" if offset is None else f"{offset:.3f}",
             "sigma_m": "" if told.sigma_m is None else f"{told.sigma_m:.3f}",
         }  # fmt: skip
-        status = kinds.DiagnosticStatus(
-            level=bytes([WARN if wrong or run.state == "HELD" else OK]), name=f"{self._node.get_name()}: run",
-            message=wrong or run.state, hardware_id=self._node.get_fully_qualified_name(),
-            values=[kinds.KeyValue(key=key, value=value) for key, value in values.items()],
-        )  # fmt: skip
-        made = kinds.DiagnosticArray(status=[status])
-        made.header.stamp = self._node.get_clock().now().to_msg()
-        self._diagnostics.publish(made)
+        status = {
+            "level": WARN if wrong or run.state == "HELD" else OK, "name": f"{node.name}: run",
+            "message": wrong or run.state, "hardware_id": f"{node.namespace.rstrip('/')}/{node.name}",
+            "values": [{"key": key, "value": value} for key, value in values.items()],
+        }  # fmt: skip
+        self._diagnostics.publish({"header": header_fields("", node.now_ns()), "status": [status]})
 
     # Commands
 
-    def _serve(self, verb: Verb) -> None:
-        def called(request: Any, response: Any) -> Any:
-            response.success, response.message = self._command(verb)
-            return response
-
-        self._node.create_service(load("std_srvs.srv").Trigger, f"~/{verb}", called)
-
-    def _command(self, verb: Verb) -> tuple[bool, str]:
+    def _command(self, verb: Verb) -> dict[str, Any]:
+        """Execute a command; return the fields of a std_srvs/srv/Trigger's response."""
         if verb not in FREE_VERBS and not self._port.settings.commands:
-            return False, f"{verb} is not taken from ROS; set commands = true in ros2.toml"
+            why = f"{verb} is not taken from ROS; set commands = true in ros2.toml"
+            return {"success": False, "message": why}
         number = f"ros2-{self._runner.boot_id}-{next(self._numbers)}-{time.time_ns()}"
         command = RunCommand(
             cmd_id=number, verb=verb, commander=COMMANDER, issued_ns=time.time_ns(), valid_for_s=VALID_S
         )
         answer = self._runner.execute(command)
-        return answer.outcome == "ok", answer.message or answer.state
+        return {"success": answer.outcome == "ok", "message": answer.message or answer.state}
 
 
 def _headed(points: list[Point]) -> list[Pose]:

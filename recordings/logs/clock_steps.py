@@ -70,11 +70,16 @@ def mended_times(ns: IntArray, xy: FloatArray, *, forward: bool = True) -> Mende
     return MendedTimes(mended, kept, tuple(lines[0 if wrong else 1 :]), steps_ns)
 
 
+def longest_usual_ns(usual_ns: int) -> int:
+    """Return the longest time between poses that is neither a gap nor a clock that was set."""
+    return max(STEP_NS, 10 * usual_ns)
+
+
 def _undone(step: IntArray, back: IntArray, usual: int) -> list[int]:
     """Return the steps forward that undo a step back before them: the clock was set right again."""
     found = []
     for k in back.tolist():
-        again = np.flatnonzero(np.abs(step + step[k]) <= max(STEP_NS, 10 * usual))
+        again = np.flatnonzero(np.abs(step + step[k]) <= longest_usual_ns(usual))
         found += [m for m in again.tolist() if m > k and m not in found][:1]
     return found
 
@@ -90,7 +95,7 @@ def _alone(ns: IntArray, far_ns: int) -> BoolArray:
 def _forward_steps(step: IntArray, xy: FloatArray, usual: int) -> IntArray:
     """Return the steps forward through which the robot drove on as from one pose to the next."""
     moved = np.hypot(*np.diff(xy, axis=0).T)
-    inner = np.flatnonzero(step > max(STEP_NS, 10 * usual))
+    inner = np.flatnonzero(step > longest_usual_ns(usual))
     if len(inner) > MOST_FORWARD:
         return np.zeros(0, np.int64)
     inner = inner[(inner > 0) & (inner < len(step) - 1)]

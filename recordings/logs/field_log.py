@@ -80,6 +80,8 @@ class Poses:
     """Times of the first data after each restart of the robot, where the log reports it."""
     steps_ns: tuple[int, ...] = ()
     """Times at which the clock was set: how much time passed there is unknown."""
+    own_clock: bool = False
+    """True if the times are of the clock that all messages in the log have: a step forward is a gap."""
 
     @property
     def seconds(self) -> float:
@@ -185,7 +187,6 @@ def poses_of(
 ) -> Poses | None:
     """Return the finite poses in order of time; None if there is none.
 
-    `own_clock`: the times are of the clock that all messages in the log have: a step forward is a gap.
     `more` are further fields of `Poses`.
     """
     times, positions = np.asarray(ns, np.int64), np.asarray(xy, float).reshape(-1, 2)
@@ -209,7 +210,8 @@ def poses_of(
     heights = None if height is None else frozen(np.asarray(height, float)[order])
     return Poses(
         source, frame, frozen(times[order], np.int64), frozen(positions[order]), headings,
-        **{"oddities": oddities, "height": heights, "steps_ns": mended.steps_ns, **more},
+        **{"oddities": oddities, "height": heights, "steps_ns": mended.steps_ns,
+           "own_clock": own_clock, **more},
     )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ from stopgo.recordings.replay.jumps import (
 from stopgo.recordings.replay.matching import long_enough
 from stopgo.recordings.replay.position_errors import PositionErrors, position_errors, visits_of
 from stopgo.recordings.replay.replayed import Replay
-from stopgo.recordings.replay.unseen_visits import DRIFTS, why_unseen
+from stopgo.recordings.replay.unseen_visits import DRIFTS, why_shorter, why_unseen
 
 LEVEL_M = 2.0
 """Difference of heights above which a stop is on another level."""
@@ -162,6 +162,7 @@ def _of_visit(replay: Replay, number: int, item: StopComparison, errors: Positio
         why = DRIFTS if errors.drifts or errors.most_m[number] > 0 else NOISE
     elif within == "yes":
         why = other_storey(replay, number) or _why_unlogged(replay, item.stop)
+        why = why or why_shorter(replay, number)
     elif replay.inferred:
         why = _why_unseen(replay, number, errors, halted=True)
     return StopEvidence(item, "unknown" if why else within, why)

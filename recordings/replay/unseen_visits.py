@@ -11,6 +11,7 @@ import numpy as np
 from stopgo.mission.document import Stop
 from stopgo.mission.geometry import BoolArray
 from stopgo.mission.run.run_log import Track
+from stopgo.recordings.logs.clock_steps import longest_usual_ns
 from stopgo.recordings.replay.fitting import STRETCH
 from stopgo.recordings.replay.jumps import lasting_jump
 from stopgo.recordings.replay.matching import REACH_M, Match, least_stay_s, long_enough
@@ -88,6 +89,39 @@ def _across_a_step(replay: Replay, at: Sequence[Match]) -> str:
     spans = [(item.standstill.begin_ns - slack_ns, item.standstill.end_ns + slack_ns) for item in at]
     stepped = any(begin <= ns <= end for ns in steps for begin, end in spans)
     return "the clock was set while it was stationary; give a log with another clock" if stepped else ""
+
+
+def why_shorter(replay: Replay, number: int) -> str:
+    """Return why the standstills at a stop may have been shorter than the log shows; empty if one was not.
+
+    In a log without another clock, a time without poses may be the clock that was set forward. A log that
+    shows most standstills by hardly any pose is of a robot that writes none while it stands.
+    """
+    if replay.placed.source.own_clock or not replay.inferred:
+        return ""
+    stop, track = replay.mission.stops[number], replay.run.poses
+    seen_s = {id(match): _seen_s(track, match) for match in replay.matches}
+    fractions = [seen_s[id(match)] / match.standstill.seconds for match in replay.matches]
+    whole = [match for match in replay.at(number) if long_enough(match.standstill, stop)]
+    if float(np.median(fractions)) < MOSTLY_SEEN or not whole:
+        return ""
+    seen = max(seen_s[id(match)] for match in whole)
+    return "" if seen >= least_stay_s(stop) else SET_FORWARD.format(seen)
+
+
+MOSTLY_SEEN = 0.5
+"""Fraction of the usual standstill that its poses show, above which a robot writes poses while it stands."""
+SET_FORWARD = (
+    "its poses show {:.1f} s of standstill; the rest may be a clock that was set forward; "
+    "give a log with another clock"
+)
+
+
+def _seen_s(track: Track, match: Match) -> float:
+    """Return the time of a standstill without the times without poses in it."""
+    steps = np.diff(track.between(match.standstill.begin_ns, match.standstill.end_ns).ns)
+    usual = int(np.median(np.diff(track.ns)))
+    return float(steps[steps <= longest_usual_ns(usual)].sum()) / 1e9
 
 
 JUMPS = "its poses jump while it is stationary; give another source of poses"

@@ -13,7 +13,7 @@ from stopgo.bridge.commands.conform_commands import conform_commands
 from stopgo.bridge.commands.doctor import doctor
 from stopgo.bridge.commands.key_commands import key_commands
 from stopgo.bridge.commands.mission_commands import clear, fetch_mission, push
-from stopgo.bridge.commands.robot_commands import robot
+from stopgo.bridge.commands.robot_commands import guard, robot
 from stopgo.bridge.commands.run_control_commands import add_run_control
 from stopgo.bridge.commands.session_command import session
 from stopgo.bridge.commands.simulate_commands import simulate_commands
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 def add_commands(app: typer.Typer) -> None:
     """Add the bridge's commands to the CLI."""
     app.command()(robot)
+    app.command()(guard)
     app.command()(push)
     app.command("fetch-mission")(fetch_mission)
     app.command()(clear)

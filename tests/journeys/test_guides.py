@@ -49,6 +49,7 @@ ELSEWHERE = {
     r"python docs/query_runs.py": "tests/recordings/test_query.py runs it",
     r"(sudo apt|python3 -m venv|source) ": "prepares a computer with ROS 2",
     r"~/stopgo/bin/stopgo robot|stopgo (status|watch|doctor) --ros2": "needs ROS 2: tests/ros2, in make ros2",
+    r"stopgo robot .*ros2-zenoh|stopgo guard": "needs Nav2: tests/bridge/ros2/test_ros2_zenoh_robot.py",
     r"cat ": "prints a file of the guide",
 }
 """Commands that do not run here, and the reason."""

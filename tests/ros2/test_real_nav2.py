@@ -21,11 +21,12 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.protocol import encode
+from stopgo.bridge.ros2.ros_definitions import ACTIONS, SERVICES, action_types, service_types
 from stopgo.mission.document import Mission, RobotSpec, with_digest
 from tests.bridge.world import corridor
 from tests.called import stopgo
 from tests.ports import free_port
-from tests.ros2.environment import activated, is_made
+from tests.ros2.environment import FOLDER, activated, is_made
 
 pytestmark = [
     pytest.mark.real_time,
@@ -171,21 +172,77 @@ def test_a_robot_on_rmw_zenoh_is_read_without_ros(tmp_path: Path) -> None:
         assert "two versions of nav_msgs/msg/Odometry: RIHS01_" in asked.stderr
 
 
+def test_hashes_without_ros_are_those_that_rosidl_has_written() -> None:
+    written: dict[str, str] = {}
+    for file in [*FOLDER.glob("types/share/*/*/*.json"), *FOLDER.glob("venv/share/*/*/*.json")]:
+        found = json.loads(file.read_text())
+        written |= {one["type_name"]: one["hash_string"] for one in found.get("type_hashes", ())}
+    for name in SERVICES:
+        assert service_types(name)[0].hash == written[name], name
+    for name in ACTIONS:
+        newest = action_types(name)[-1]
+        for one in (newest.send_goal, newest.get_result, newest.feedback):
+            assert one.hash == written[one.name], one.name
+
+
+def test_a_mission_is_driven_over_zenoh_with_types_of_real_ros_and_a_foreign_scanner(tmp_path: Path) -> None:
+    """Nav2 is played with CDR and hashes of real ROS; the scanner and a client are of others' library."""
+    router, endpoint = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
+    (tmp_path / "scans").mkdir()
+    (tmp_path / "mission.json").write_bytes(encode(quick_corridor(stops=2, closed=True)))
+    (tmp_path / "ros2.toml").write_text(
+        f'{SETTINGS}[scan]\nname = "peer_scan"\n[zenoh]\nrouter = "{router}"\ndomain = 9\nnamespace = "r1"\n'
+    )
+    python, robot = activated({})["STOPGO_ROS2_PYTHON"], ("--robot", "r1", "--connect", endpoint)
+    with _processes(
+        [sys.executable, "-m", "tests.bridge.router", router],
+        [python, "-m", "tests.bridge.ros2.zenoh_nav2", router, "9", str(tmp_path / "scans"), "1.5"],
+        [python, "-m", "tests.ros2.zenoh_peers", router, "9"],
+        [
+            sys.executable, "-m", "stopgo", "robot", "--name", "r1", "--listen", endpoint, "--state",
+            str(tmp_path / "r1.state"), "--controller", f"ros2-zenoh:{tmp_path / 'ros2.toml'}",
+        ],
+    ) as started:  # fmt: skip
+        assert stopgo("push", str(tmp_path / "mission.json"), *robot).returncode == 0
+        assert stopgo("start", *robot).returncode == 0
+        recording = str(tmp_path / "field.rrd")
+        assert stopgo("watch", "--rrd", recording, *robot).returncode == 0
+        (run,) = json.loads(stopgo("review", recording, "--json").stdout)["runs"]
+        distances = {stop["stop"]: stop["deviation_m"] for stop in run["stops"]}
+        print("distances from the stops, over zenoh:", distances)
+        assert list(distances) == ["s1", "s2"] and max(distances.values()) <= 0.05
+        stream = started[2].stdout
+        assert stream is not None
+        seen = json.loads(next(line for line in stream if line.startswith("{")))
+        assert seen["state"] in ("IDLE", "READY", "RUNNING", "FINISHED")
+        assert seen["resume"] == "resume is not taken from ROS; set commands = true in ros2.toml"
+
+
 @contextmanager
 def _zenoh_robot(endpoint: str, *more: str) -> Iterator[None]:
     """A zenoh router, and a robot of pyzeros at it."""
-    environment = activated({})
-    python, options = environment["STOPGO_ROS2_PYTHON"], {"text": True, "cwd": HERE.parents[1]}
-    started = []
+    python = activated({})["STOPGO_ROS2_PYTHON"]
+    with _processes(
+        [sys.executable, "-m", "tests.bridge.router", endpoint],
+        [python, "-m", "tests.ros2.rmw_zenoh_peer", endpoint, "7", *more],
+    ):
+        yield
+
+
+@contextmanager
+def _processes(*commands: list[str]) -> Iterator[list[subprocess.Popen[str]]]:
+    """Processes, each started once the one before it is ready."""
+    started: list[subprocess.Popen[str]] = []
     try:
-        for command in (
-            [sys.executable, "-m", "tests.bridge.router", endpoint],
-            [python, "-m", "tests.ros2.rmw_zenoh_peer", endpoint, "7", *more],
-        ):
-            process = subprocess.Popen(command, stdout=subprocess.PIPE, **options)  # type: ignore[call-overload]
+        for command in commands:
+            environment = None if command[0] == sys.executable else activated({})
+            process = subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=HERE.parents[1],
+                env=environment,
+            )  # fmt: skip
             started.append(process)
             _wait_for_line(process.stdout, "ready")
-        yield
+        yield started
     finally:
         for process in started:
             process.kill()

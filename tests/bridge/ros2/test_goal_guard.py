@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
 from queue import Queue
 
 from stopgo.bridge.ros2.goal_guard import DRIVES, ENDED, SILENT_S, STANDS, GoalGuard, Signs
@@ -33,6 +34,18 @@ def test_a_program_that_stands_may_end_or_hang() -> None:
     assert not signs.must_stop(9.0)
     signs.take(b"", 9.0)
     assert signs.ended and not signs.must_stop(9.1)
+
+
+def test_nothing_drives_before_the_guard_is_ready(tmp_path: Path) -> None:
+    reports: Queue[str] = Queue()
+    mark = tmp_path / "ready"
+    guard = GoalGuard(
+        {"marks": str(mark)}, lambda: True, reports.put, module="tests.bridge.ros2.idle_guard"
+    )  # fmt: skip
+    try:
+        assert mark.exists() and reports.empty()
+    finally:
+        guard.close()
 
 
 def test_a_guard_that_was_killed_is_reported_and_replaced() -> None:

@@ -104,6 +104,22 @@ def test_what_goes_wrong_in_a_drive_stops_the_robot_and_is_reported(
     assert field.world.speed == 0.0
 
 
+def test_another_clients_goal_that_becomes_known_after_the_end_of_ours_is_reported() -> None:
+    field = started(RosField())
+    world = field.world
+    known = world.foreign_goals
+
+    def preempted() -> None:
+        world.foreign(3.0, 3.0)
+        world.foreign_goals = lambda: ()  # type: ignore[method-assign]
+        world.later(0.2, lambda: setattr(world, "foreign_goals", known))
+
+    world.later(2.0, preempted)
+    field.work()
+    assert field.controller.run.state == "HELD"
+    assert "another client drives the robot" in field.controller.run.reason
+
+
 def test_a_robot_that_was_localised_again_by_hand_goes_on_with_the_next_command() -> None:
     field = started(RosField())
     field.world.later(2.0, lambda: setattr(field.world, "correction", Transform(x=0.0, y=5.0, heading=0.0)))

@@ -6,8 +6,9 @@ from typing import Any, ClassVar
 
 import pytest
 
+from stopgo.bridge.ros2.rclpy_node import ClassKind, RclpyNode
 from stopgo.bridge.ros2.ros_settings import ScanCall
-from stopgo.bridge.ros2.ros_types import checked_scan_type, filled_message, plain_fields
+from stopgo.bridge.ros2.ros_types import check_scan, checked_fields, plain_fields
 from stopgo.mission.errors import InputError
 
 
@@ -30,7 +31,8 @@ class Request:
 
 
 def test_numbers_are_given_as_the_field_takes_them() -> None:
-    made = filled_message(Request, {"label": "a", "seconds": 60.0, "loud": True, "far": 3})
+    kind = ClassKind(Request)
+    made = kind.message(checked_fields(kind, {"label": "a", "seconds": 60.0, "loud": True, "far": 3}))
     assert plain_fields(made) == {"label": "a", "seconds": 60, "loud": True, "far": 3.0}
     assert isinstance(made.seconds, int) and isinstance(made.far, float)
 
@@ -47,10 +49,24 @@ def test_numbers_are_given_as_the_field_takes_them() -> None:
 )
 def test_a_wrong_field_is_named_with_what_there_is(fields: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError) as told:
-        filled_message(Request, fields)
+        checked_fields(ClassKind(Request), fields)
     assert str(told.value) == words
 
 
+def test_a_response_without_a_named_field_is_refused() -> None:
+    kind = ClassKind(Request)
+    with pytest.raises(InputError) as told:
+        check_scan(ScanCall(success="ok"), kind, kind)
+    words = "scan.success = 'ok': the response of std_srvs/srv/Trigger has no field ok; it has: label, "
+    assert str(told.value) == f"{words}seconds, loud, far"
+
+
 def test_a_type_that_is_not_installed_is_named() -> None:
+    class Node:
+        def get_name(self) -> str:
+            return "stopgo"
+
+        get_namespace = get_name
+
     with pytest.raises(InputError, match="there is no such type here"):
-        checked_scan_type(ScanCall(type="foo_msgs/srv/Scan"))
+        RclpyNode(Node()).service_kinds("foo_msgs/srv/Scan")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import struct
 import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,14 @@ import zenoh
 from rosbags.typesys import Stores, get_typestore
 
 from stopgo.bridge.commands import ros_checks, watch_commands
-from stopgo.bridge.commands.ros_checks import graph_checks, state_of
+from stopgo.bridge.commands.ros_checks import graph_checks, ros_status_text, state_of
 from stopgo.bridge.commands.ros_watch import followed
 from stopgo.bridge.ros2.ros_settings import RosSettings
-from stopgo.bridge.ros2.ros_zenoh import HeardTopic, RosListener, read_domain
+from stopgo.bridge.ros2.ros_zenoh import HeardTopic, RosListener, read_domain, ros_listener
 from stopgo.command_line import main as stopgo
 from stopgo.mission.errors import InputError
+from tests.bridge.proxy import Proxy
+from tests.bridge.ros2.zenoh_nav2 import session_at
 from tests.ports import free_port
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -127,9 +130,9 @@ def state_message(**state: Any) -> bytes:
     return bytes(TYPES.serialize_cdr(made, "std_msgs/msg/String"))
 
 
-def state_announced(robot: Any, hash_: str, domain: int) -> Any:
+def state_announced(robot: Any, hash_: str, domain: int, session: str = "abc") -> Any:
     tail = f"%r1%stopgo%state/{STRING}/{hash_}/1:1:,1:,:,:,,"
-    return robot.liveliness().declare_token(f"@ros2_lv/{domain}/abc/0/5/MP/%/%r1/stopgo/{tail}")
+    return robot.liveliness().declare_token(f"@ros2_lv/{domain}/{session}/0/5/MP/%/%r1/stopgo/{tail}")
 
 
 @contextmanager
@@ -188,6 +191,44 @@ def test_the_state_of_a_node_that_has_ended_is_not_shown(sessions: tuple[Any, An
     assert state_of(listener, "10/r1")["state"] is None
 
 
+def test_the_state_of_a_publisher_that_was_restarted_between_two_looks_is_not_shown(
+    sessions: tuple[Any, Any],
+) -> None:
+    robot, station = sessions
+    listener = RosListener(station, 15, "r1", RosSettings())
+    with stating(robot, 15) as publisher:
+        publisher.put(state_message(state="RUNNING"))
+        while listener.state is None:
+            listener.look()
+    hash_ = TYPES.hash_rihs01("std_msgs/msg/String")
+    restarted = state_announced(robot, hash_, 15, session="def")
+    looks = station.liveliness()
+    while [str(one.ok.key_expr).split("/")[2] for one in looks.get("@ros2_lv/15/**")] != ["def"]:
+        pass
+    listener.look()
+    assert "/r1/stopgo/state" in listener.topics
+    assert listener.state is None
+    restarted.undeclare()
+
+
+def test_a_cut_link_is_shown_as_such() -> None:
+    with ExitStack() as stack:
+        port = free_port()
+        stack.enter_context(session_at("router", f"tcp/127.0.0.1:{port}"))
+        line = stack.enter_context(Proxy(port))
+        listener = stack.enter_context(ros_listener([line.endpoint], 16, "r1", RosSettings()))
+        assert state_of(listener, "16/r1")["linked"]
+        line.swallow(True)
+        while state_of(listener, "16/r1")["linked"]:
+            time.sleep(0.05)
+        words = ros_status_text(state_of(listener, "16/r1"))
+        assert words == "16/r1: no link to the zenoh router; last pose and state are not current"
+        line.swallow(False)
+        while not state_of(listener, "16/r1")["linked"]:
+            time.sleep(0.05)
+        assert "no state published by stopgo" in ros_status_text(state_of(listener, "16/r1"))
+
+
 def test_the_state_is_not_shown_once_its_topic_is_refused(sessions: tuple[Any, Any]) -> None:
     robot, station = sessions
     listener = RosListener(station, 14, "r1", RosSettings())
@@ -225,7 +266,13 @@ def test_a_refused_topic_is_named_once(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     empty = dict.fromkeys(("stop", "stop_state", "battery", "pose"))
-    found = {"robot": "0/r1", "refused": ["/r1/odom: two versions"], "silent": "no tf", **empty}
+    found = {
+        "linked": True,
+        "robot": "0/r1",
+        "refused": ["/r1/odom: two versions"],
+        "silent": "no tf",
+        **empty,
+    }
 
     def watched(_text: str, _endpoint: str, show: Any) -> str:
         for state in ("RUNNING", "FINISHED"):

@@ -159,8 +159,8 @@ class World:
 
     # Nav2
 
-    def is_ready(self, what: Literal["drive", "spin", "scan"]) -> bool:
-        return self.servers or what == "scan"
+    def missing(self, what: Literal["drive", "spin", "scan"]) -> str:
+        return "" if self.servers or what == "scan" else "no action server follow_path"
 
     def follow(self, path: Sequence[Pose]) -> FakeGoal:
         ends = [(path[0].x, path[0].y), (path[-1].x, path[-1].y)]

@@ -173,7 +173,7 @@ def test_a_gap_into_which_the_robot_turned_away_does_not_show_that_it_stood_too_
     drive = driven(MISSION)
     end = drive.halts[0].end_s + late_s
     track = seen(drive, lambda s: (s <= end - 8.0) | (s >= end))
-    judged = drive_verdict(replay(log_of(track), MISSION, THERE))
+    judged = drive_verdict(replay(log_of(track, own_clock=True), MISSION, THERE))
     assert judged.answer == ("unknown" if late_s > 0 else "yes")
 
 
@@ -340,6 +340,27 @@ def test_a_standstill_in_which_the_clock_was_set_back_may_have_been_longer() -> 
     judged = drive_verdict(replay(held(poses), MISSION, THERE))
     assert judged.answer == "unknown"
     assert "s05 is undecided: the clock was set while it was stationary" in judged.text
+
+
+@pytest.mark.parametrize("own_clock, answer", [(False, "unknown"), (True, "yes")])
+def test_a_standstill_is_as_long_as_its_poses_show_where_the_clock_may_have_been_set(
+    own_clock: bool, answer: str
+) -> None:
+    """Nine seconds without poses in a standstill look like a clock that was set forward."""
+    drive = driven(MISSION)
+    begin_s = drive.halts[4].begin_s + 3
+    track = seen(drive, lambda s: (s < begin_s) | (s > begin_s + 9))
+    judged = drive_verdict(replay(log_of(track, own_clock=own_clock), MISSION, THERE))
+    assert judged.answer == answer, judged.text
+    assert ("may be a clock that was set forward" in judged.text) is not own_clock
+
+
+def test_a_robot_that_writes_no_poses_while_it_stands_stood_as_long_as_they_are_missing() -> None:
+    drive = driven(MISSION)
+    stands = [(halt.begin_s + 1, halt.end_s - 1) for halt in drive.halts]
+    track = seen(drive, lambda s: ~np.any([(begin < s) & (s < end) for begin, end in stands], axis=0))
+    judged = drive_verdict(replay(log_of(track), MISSION, THERE))
+    assert judged.answer == "yes", judged.text
 
 
 def test_poses_that_end_before_their_log_do_not_show_the_end_of_the_run() -> None:

@@ -21,7 +21,17 @@ from stopgo.mission.files.mission_json import write
 from tests.recordings.truth import disturbances, drives
 from tests.recordings.truth.disturbances import SENSES, SLOW, Sense, Sensed
 from tests.recordings.truth.drives import MISHAPS, STOPS, Mishap, Tour, mission_with_return
-from tests.recordings.truth.formats import BAGS, FIRST, FITTED, MAP, VEHICLES, WRITERS, Writer, write_log
+from tests.recordings.truth.formats import (
+    BAGS,
+    FIRST,
+    FITTED,
+    MAP,
+    TABLES,
+    VEHICLES,
+    WRITERS,
+    Writer,
+    write_log,
+)
 
 AWAY = (drives.mirrored, drives.another_mission)
 """Drives of another mission: their logs may be refused, and no fit to the stops tells anything."""
@@ -82,6 +92,8 @@ def cases(seeds: int = 1) -> Iterator[Case]:
                 writer = WRITERS[(number + k + 3 * seed) % len(WRITERS)]
                 if sense in SLOW and writer in BAGS:
                     writer = VEHICLES[k % len(VEHICLES)]
+                if sense is disturbances.clock_ahead_in_a_halt and writer in VEHICLES:
+                    writer = TABLES[k % len(TABLES)]  # nobody sets a vehicle's time since boot
                 if sense is disturbances.without_headings:
                     writer = WRITERS[0]
                 placing = (MAP, FIRST, FITTED, MAP)[(n + 2 * k + seed) % 4]
@@ -120,20 +132,25 @@ def could_tell(case: Case, tour: Tour, poses: Sensed) -> bool:
         return False
     if case.placing == FITTED and case.writer not in VEHICLES and case.mishap in AWAY:
         return False
-    shown = [_shown(tour, poses, k, good=good) for k, good in enumerate(tour.good)]
+    shown = [_shown(tour, poses, k, good=good, gaps=not own) for k, good in enumerate(tour.good)]
     if tour.answer == "yes":
         return all(shown)
     return any(shows for shows, good in zip(shown, tour.good, strict=True) if not good)
 
 
-def _shown(tour: Tour, poses: Sensed, number: int, *, good: bool) -> bool:
-    """True if the poses show that a stop was scanned, or that it was not."""
+def _shown(tour: Tour, poses: Sensed, number: int, *, good: bool, gaps: bool) -> bool:
+    """True if the poses show that a stop was scanned, or that it was not.
+
+    `gaps`: a time without poses is one, and no clock that was set forward.
+    """
     stop: Mission = tour.mission
     plan, halts = stop.stops[number], tour.drive.halts
     least_s = 0.9 * (plan.settle_s + plan.scan.duration_s) - 1.0
     if good:
         return any(
-            _covered(poses, halt.begin_s, halt.end_s, least_s) for halt in halts if halt.stop == number
+            _covered(poses, halt.begin_s, halt.end_s, least_s, gaps=gaps)
+            for halt in halts
+            if halt.stop == number
         )
     there = [halt for halt in halts if halt.stop == number]
     if there:
@@ -164,13 +181,15 @@ def _steps_ahead_at_a_halt(poses: Sensed, least_s: float) -> bool:
     return bool((ahead[moved < 0.02] > least_s).any()) if (ahead > least_s).sum() == 1 else False
 
 
-def _covered(poses: Sensed, begin_s: float, end_s: float, least_s: float) -> bool:
-    """True if poses within 30 mm of the truth show a time of at least `least_s`."""
+def _covered(poses: Sensed, begin_s: float, end_s: float, least_s: float, *, gaps: bool = True) -> bool:
+    """True if poses within 30 mm of the truth show a time of at least `least_s`, with or without gaps."""
     inside = (poses.true_s >= begin_s - 1e-6) & (poses.true_s <= end_s + 1e-6) & np.isfinite(poses.xy[:, 0])
     times = np.sort(poses.true_s[inside])
     if len(times) < 2 or np.median(poses.error_m[inside]) > 0.03:
         return False
-    return float(times[-1] - times[0]) >= least_s
+    steps = np.diff(times)
+    usual_s = float(np.median(np.abs(np.diff(poses.ns)))) / 1e9
+    return float(steps[gaps | (steps <= max(1.0, 10 * usual_s))].sum()) >= least_s
 
 
 __all__ = ["STOPS", "Answer", "Case", "answered", "cases", "could_tell"]

@@ -171,6 +171,29 @@ def clock_back_and_ahead(tour: Tour, chance: np.random.Generator) -> Sensed:
     return replace(poses, ns=poses.ns - np.where(wrong, 3600 * 10**9, 0))
 
 
+def clock_ahead_in_a_halt(tour: Tour, chance: np.random.Generator) -> Sensed:
+    """The clock is set forward by about as long as a scan in the middle of the shortest standstill."""
+    poses = sensed(tour)
+    halt = min(tour.drive.halts, key=lambda halt: halt.end_s - halt.begin_s)
+    at, step_s = (halt.begin_s + halt.end_s) / 2, chance.uniform(8, 20)
+    return replace(poses, ns=poses.ns + np.where(poses.true_s > at, round(step_s * 1e9), 0))
+
+
+def jump_in_a_gap(tour: Tour, chance: np.random.Generator) -> Sensed:
+    """The localisation jumps 0.2 to 0.8 m aside for good, in 2 to 8 s without poses.
+
+    Half of these times begin at a standstill, the others anywhere.
+    """
+    poses, halts = sensed(tour), tour.drive.halts
+    at = float(chance.uniform(0.1, 0.9) * tour.drive.seconds)
+    if chance.random() < 0.5:
+        halt = halts[int(chance.integers(len(halts)))]
+        at = float(chance.uniform(halt.begin_s, halt.end_s))
+    turn, far = chance.uniform(0, math.tau), chance.uniform(0.2, 0.8)
+    by = np.where(poses.true_s > at, far, 0.0)[:, None] * (math.cos(turn), math.sin(turn))
+    return _gap(poses.moved(by), at, at + chance.uniform(2, 8))
+
+
 def drifting(tour: Tour, chance: np.random.Generator) -> Sensed:
     """Odometry that is 1 % too long and bends by 0.001 rad a metre."""
     return _drifted(tour, 0.01)
@@ -295,6 +318,8 @@ SENSES: tuple[Sense, ...] = (
     clock_ahead_an_hour,
     clock_ahead_ten_seconds,
     clock_back_and_ahead,
+    clock_ahead_in_a_halt,
+    jump_in_a_gap,
     drifting,
     drifting_less,
     drifting_hardly,
