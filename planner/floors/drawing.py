@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -97,8 +98,35 @@ def _load(data: bytes) -> Drawing:
         return Drawing.load(binary_tags_loader(data, errors="surrogateescape"))
     # Universal newlines, as when the file itself is opened: no tag may end in \r, neither the header's.
     info = dxf_stream_info(io.StringIO(data.decode("utf-8", errors="ignore"), newline=None))
-    stream = io.TextIOWrapper(io.BytesIO(data), encoding=info.encoding, errors="surrogateescape")
+    stream = io.TextIOWrapper(
+        io.BytesIO(data), encoding=_encoding(data, info.encoding), errors="surrogateescape"
+    )
     return ezdxf.read(stream)
+
+
+def _encoding(data: bytes, named: str) -> str:
+    """The encoding of a text DXF; `named` is that of its header, or Western European if it names none.
+
+    Scripts write UTF-8 under any header, and Japanese programs R12 without a codepage. Hardly a word of
+    another language is valid UTF-8, or has kana in it.
+    """
+    if named != "cp1252" or data.isascii():
+        return named
+    if _decoded(data, "utf-8") is not None:
+        return "utf-8"
+    has_codepage = b"$DWGCODEPAGE" in data
+    return "cp932" if not has_codepage and _KANA.search(_decoded(data, "cp932") or "") else named
+
+
+_KANA = re.compile("[\u3041-\u30fe]")
+"""Hiragana and katakana of full width."""
+
+
+def _decoded(data: bytes, encoding: str) -> str | None:
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        return None
 
 
 def _recover(data: bytes, *, source: Path, cause: BaseException) -> tuple[Drawing, list[Finding]]:

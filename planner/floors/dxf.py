@@ -212,12 +212,16 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
 
 
 def _encloses_nothing(made: Derived) -> bool:
-    """True if walls enclose no floor, or only a corner between a few of them."""
-    if not any(stroke.role == "floor" for stroke in made.strokes):
+    """True if walls enclose no floor, or only a corner between a few of them, or no room and no opening."""
+    roles = {stroke.role for stroke in made.strokes}
+    if "floor" not in roles:
         return True
     shown = made.shown
     is_corner = sum(room.area for room in shown.rooms) < _CORNER_M2
-    return is_corner and (shown.closed_over > WIDEST_GAP or shown.stray > MOST_STRAY)
+    is_bare = not (shown.doors or shown.passages or "rooms" in roles)
+    return (is_corner and shown.stray > MOST_STRAY) or (
+        (is_corner or is_bare) and shown.closed_over > WIDEST_GAP
+    )
 
 
 def _enclose_nothing(sheet: DxfSheet) -> str:

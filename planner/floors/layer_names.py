@@ -3,7 +3,8 @@
 AIA/NCS writes discipline and group (`A-WALL-FULL`); ISO 13567 and BS 1192 write a discipline and a code
 of the CI/SfB or Uniclass table (`A-21----E-`, `A-210-M_Wall`); everybody else writes words of his language,
 alone or in compounds. Words come before codes, and what is written on a thing before the thing: `DOOR-IDEN`
-is text. Of several things the last one decides: `Stair Wall` is a wall.
+is text. Of several things the last one decides: `Stair Wall` is a wall; but doors and windows
+are openings: `Doors/Windows`.
 """
 
 from __future__ import annotations
@@ -24,13 +25,15 @@ class LayerReading:
 
 def reading_of(name: str) -> LayerReading | None:
     """Return the meaning of a layer or block by its name; None if the name is unknown."""
-    return _reading(_plain(name))
+    return _reading(plain_name(name))
 
 
 def _reading(plain: str) -> LayerReading | None:
     """Return the meaning by the first group of words that has one; within a group the last word decides."""
     for group in _GROUPS:
         found = [(match, role) for role, pattern in group for match in pattern.finditer(plain)]
+        if {"doors", "windows"} <= {role for _, role in found}:
+            return LayerReading("openings", "words for doors and for windows")
         if found:
             match, role = max(found, key=lambda item: (_word_end(plain, item[0]), item[0].end()))
             return LayerReading(role, f"the word {_whole_words(plain, match)}")
@@ -47,8 +50,8 @@ def _whole_words(plain: str, found: re.Match[str]) -> str:
     return plain[start : plain.find(" ", found.end())]
 
 
-def _plain(name: str) -> str:
-    """Capitals without accents, words and numbers apart, one space around each."""
+def plain_name(name: str) -> str:
+    """Return a name in capitals without accents, words and numbers apart, one space around each."""
     apart = re.sub(r"(?<=[a-zà-ÿ])(?=[A-Z])", " ", name)
     return " " + " ".join(re.findall(r"[^\W\d_]+|[0-9]+", _bare(apart.upper()))) + " "
 
@@ -58,8 +61,11 @@ def _bare(text: str) -> str:
     return "".join(letter for letter in spread if not unicodedata.combining(letter))
 
 
-def _any(words: str) -> re.Pattern[str]:
-    """Matches any of the words: whole, `x*` a beginning, `*x` an end; `+` joins words that follow."""
+def any_of(words: str) -> re.Pattern[str]:
+    """Return a pattern that matches any of the words in a plain name.
+
+    A word is whole, `x*` a beginning, `*x` an end; `+` joins words that follow.
+    """
     return re.compile("|".join(_word(_bare(word)) for word in words.split()))
 
 
@@ -89,7 +95,7 @@ _WRITTEN = """
     MASSE MATEN MAATVOERING* MAATLIJN* MEDIDA* РАЗМЕР* 寸法* TEXT TEXTS TEXTE TEXTES TEXTO* TESTO TESTI
     TEKST* TXT *TEXT NOTE NOTES NOTAS ANNO ANNOT* BESCHRIFT* LABEL* LEGEND* LEYENDA* SCHRIFT* IDEN TAG
     TAGS SYMB SYMBOL* ТЕКСТ* 文字* TTLB TITLE* TITEL* CARTOUCHE* CARTIGLIO* CARIMBO* CAJETIN* STEMPEL*
-    标注* *标注 尺寸* 文字* *文字 注释* 说明* 图框* 轴线* 轴号* 轴网* *轴线 BORDER* RAHMEN BLATTRAHMEN
+    标注* *标注 尺寸* 文字* *文字 注释* 说明* 图框* 轴线* 轴号* 轴网* *轴线 BORDER* RAHMEN BLATTRAHMEN RAMKA*
     VIEWPORT* VIEW+PORT VPORT* VPRT DEFPOINTS NPLT NOPLOT REVISION* REVC KEYN
     NORTH* NORDPFEIL* GRID GRIDS GRIDLINE* AXIS AXES AXE AXEN ACHSE ACHSEN *ACHSEN *RASTER EJE EJES ASSE
     ASSI EIXO EIXOS STRAMIEN* CENTERLINE* CENTRELINE* CNTR CENTER ОСИ ОСЬ 通り芯* 芯*
@@ -118,7 +124,8 @@ _FURNITURE = """
     FURN FURNITURE* FURNISH* MÖBEL* MOEBEL* *MÖBEL *MOEBEL MOBILIER* MEUBLE* MOBILIARIO* MUEBLE* MOBILI
     ARREDO* ARREDI MEUBILAIR* MEUBEL* CASE CASEWORK* CABINET* FIXT FIXTURE* SANR SANIT* APPL APPLIANCE*
     EQPM EQUIP*
-    EINRICHT* PFIX PLUMB* SPCQ МЕБЕЛ* САНТЕХ* 家具* 什器* 衛生* 洁具* 设备*
+    EINRICHT* PFIX PLUMB* SPCQ SHELF* SHELVES REGAL REGALE COUCH* SOFA SOFAS BENCH BENCHES МЕБЕЛ* САНТЕХ*
+    家具* 什器* 衛生* 洁具* 设备*
 """
 _PLACES = """
     KITCHEN* KÜCHE* KUECHE* CUISINE* COCINA* CUCINA* KEUKEN* COZINHA* BATH TOILET* WC
@@ -143,7 +150,8 @@ _COLUMNS = """
     PILLAR* POTEAU* PILIER* COLONNE* COLUMNA* PILAR* COLONNA PILASTR* KOLOM* КОЛОНН* 柱* *柱
 """
 _BEAMS = """
-    BEAM BEAMS GIRDER* UNTERZUG* TRÄGER* TRAEGER* POUTRE* VIGA* TRAVE TRAVI BALK BALKEN LIGGER* БАЛК* 梁*
+    BEAM BEAMS GIRDER* UNTERZUG* TRÄGER* TRAEGER* *TRÄGER *TRAEGER POUTRE* VIGA* TRAVE TRAVI BALK BALKEN
+    LIGGER* БАЛК* 梁*
 """
 _WALLS = """
     WALL* *WALL *WALLS WL WLS PARTITION* PRTN WAND WÄNDE WAENDE *WAND *WÄNDE *WAENDE MAUER* *MAUER MUR
@@ -154,7 +162,7 @@ _WALLS = """
 _DRAWN_OVER = """
     HATCH* *HATCH SCHRAFF* HACHUR* SOMBREAD* ACHURAD* TRAMA* RETINO* CAMPITUR* ARCERING* PATT PATTERN*
     ШТРИХОВ* 填充* *填充 FILL FILLS PDF DETL DETAIL* ELEV ELEVATION* ANSICHT* FACADE* ALZADO* PROSPETT* GEVEL*
-    SECTION* SCHNITT* COUPE*
+    SECTION* SCHNITT* COUPE* PRZEKROJ* PRZEKRÓJ*
 """
 _ROOMS = """
     ROOM ROOMS RAUM RÄUME RAEUME ZIMMER SPACE SPACES PIECES LOCAUX HABITACION* AMBIENTI VANI RUIMTE
@@ -168,7 +176,7 @@ _FLOOR = """
 
 
 def _group(*words: tuple[str, str]) -> tuple[tuple[str, re.Pattern[str]], ...]:
-    return tuple((role, _any(listed)) for role, listed in words)
+    return tuple((role, any_of(listed)) for role, listed in words)
 
 
 _GROUPS = (

@@ -46,13 +46,18 @@ def area_in(text: str) -> float | None:
 
 
 def _area_of_sides(text: str) -> float | None:
-    """The product of the sides that a text gives for a room, each with its unit."""
+    sides = sides_in(text)
+    return sides[0] * sides[1] if sides is not None else None
+
+
+def sides_in(text: str) -> tuple[float, float] | None:
+    """The sides in metres that a text gives for a room, each with its unit, such as `12'6" x 10'`."""
     found = _SIDES.search(text.replace("''", '"').replace("’", "'").replace("”", '"'))
     sides = [length_in(side.strip()) for side in found.groups()] if found else []
     metres = [LENGTHS[side[1]] * side[0] for side in sides if side is not None and side[1]]
     if len(metres) < 2 or min(metres) < _LEAST_SIDE or metres[0] * metres[1] < _LEAST_AREA:
         return None
-    return metres[0] * metres[1]
+    return metres[0], metres[1]
 
 
 def is_only_area(text: str) -> bool:

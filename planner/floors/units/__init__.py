@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +16,21 @@ from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.units.unit_evidence import UnitEvidence, evidence_in, extent_of
 from stopgo.planner.floors.units.unit_lengths import CODES, METRES, SHORT
-from stopgo.planner.floors.units.unit_probability import probabilities
+from stopgo.planner.floors.units.unit_probability import measured, probabilities
 
 BELIEVED = 0.95
 """A unit less probable than this is not used: the user is asked."""
-_AGAINST_HEADER = 0.98
-"""The same for a unit that is not the header's, if nothing of it was measured but texts and the size.
+_UNMEASURED = 0.98
+"""The same for a unit that the header does not name, if no measure is for it rather than for the next one.
 
 Such a drawing may be in no unit at all, as one that was made from a PDF.
 """
+_DISPUTED = 0.995
+"""The same for one where the measures are for another unit."""
+_RATHER = 2.0
+"""Measures are for a unit rather than for another if they are this many times as likely in it."""
+_CONTRADICTS = 5.0
+"""One measure contradicts a unit if it is this many times as likely in another."""
 _POSSIBLE = (1.0, 2000.0)
 """Least and greatest length in metres of what a given unit may make."""
 _USUAL = (3.0, 400.0)
@@ -56,18 +62,23 @@ def unit_of(
     evidence = evidence_in(drawing, shapes, outlined=outlined)
     header = _header_code(drawing)
     ranked = sorted(probabilities(evidence, header=header).items(), key=lambda item: (-item[1], item[0]))
-    if ranked[0][1] < _needed(ranked[0][0], header, evidence) and max(evidence.size) > 0:
+    if ranked[0][1] < _needed(ranked, header, evidence) and max(evidence.size) > 0:
         choices = _choices(ranked, evidence)
         raise UnitAsked(f"{source}: {_question(choices, header)}", choices)
     code = header if header in METRES and not max(evidence.size) else ranked[0][0]
     return METRES[code][1], _findings(code, header, ranked[0][1], evidence)
 
 
-def _needed(code: int, header: int, evidence: UnitEvidence) -> float:
-    measured = (
-        evidence.leaves or evidence.across or evidence.dimensions or evidence.areas or evidence.thickness
-    )
-    return BELIEVED if measured or code == header or header not in METRES else _AGAINST_HEADER
+def _needed(ranked: Sequence[tuple[int, float]], header: int, evidence: UnitEvidence) -> float:
+    """The probability that the first unit of a ranking needs."""
+    measures = [measured(evidence, METRES[code][1]) for code, _ in ranked]
+    # Distances between lines that are no walls are too often taken for the thickness to contradict others.
+    own, *others = (without_thickness for _, *without_thickness in measures)
+    if max(map(math.prod, others)) >= _RATHER * math.prod(own):
+        return _DISPUTED
+    is_contradicted = any(max(fits) >= _CONTRADICTS * mine for mine, *fits in zip(own, *others, strict=True))
+    is_measured = math.prod(measures[0]) >= _RATHER * math.prod(measures[1])
+    return BELIEVED if ranked[0][0] == header or (is_measured and not is_contradicted) else _UNMEASURED
 
 
 def given_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:
@@ -141,20 +152,23 @@ def _has_doors(evidence: UnitEvidence, factor: float) -> bool:
 
 def _seen(evidence: UnitEvidence, factor: float) -> str:
     """The evidence that was weighed, in words."""
-    words = []
-    if evidence.dimensions:
-        words.append(f"{len(evidence.dimensions)} dimensions")
-    if evidence.areas:
-        words.append(f"{len(evidence.areas)} areas in rooms")
+    kinds: tuple[tuple[Sized, str], ...] = (
+        (evidence.dimensions, "dimensions"),
+        (evidence.areas, "areas in rooms"),
+        (evidence.sides, "rooms with written sides"),
+        (evidence.furniture, "pieces of furniture"),
+    )
+    words = [f"{len(items)} {kind}" for items, kind in kinds if items]
     for widths, kind in ((evidence.leaves, "leaves"), (evidence.across, "doors")):
         if widths:
             words.append(f"{len(widths)} {kind} of {float(np.median(widths)) * factor:.2g} m")
-    if evidence.thickness:
-        words.append(f"walls {evidence.thickness * factor:.2g} m thick")
-    if evidence.text_height:
-        words.append(f"texts {evidence.text_height * factor:.2g} m high")
-    if evidence.names_apart:
-        words.append(f"names of rooms {evidence.names_apart * factor:.2g} m apart")
+    lengths = (
+        (evidence.thickness, "walls {:.2g} m thick"),
+        (evidence.going, "treads {:.2g} m apart"),
+        (evidence.text_height, "texts {:.2g} m high"),
+        (evidence.names_apart, "names of rooms {:.2g} m apart"),
+    )
+    words += [text.format(length * factor) for length, text in lengths if length]
     return ", ".join([*words, "its size"])
 
 

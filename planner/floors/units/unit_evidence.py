@@ -1,6 +1,7 @@
 """Evidence of the length of a drawing's unit: measures of drawn objects in drawing units.
 
-Door leaves, thickness of walls, heights of texts, texts of dimensions, and areas written in rooms.
+Door leaves, thickness of walls, heights of texts, texts of dimensions, areas and sides written in rooms,
+furniture, and stairs.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from ezdxf.document import Drawing
 from ezdxf.entities import DXFEntity
 from scipy.spatial import cKDTree
@@ -20,7 +20,9 @@ from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.linework.swings import swings_of
 from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.strokes import sketch, stretch_of, strokes_of, word_of
-from stopgo.planner.floors.written_measures import area_in, length_in
+from stopgo.planner.floors.units.known_sizes import furniture_in, going_of
+from stopgo.planner.floors.units.room_texts import RoomSides, areas_in, sides_of
+from stopgo.planner.floors.written_measures import length_in
 from stopgo.planner.geometry.instance_cache import instance_cached
 
 _HOUSE = 30.0
@@ -31,9 +33,6 @@ _BLOCK = 64
 """Lines that are compared with all others at a time."""
 _SLIM = 25.0
 """Walls' faces are nearer to each other than this fraction of the drawing; lines of rooms are not."""
-_ROOM_ROLES = ("rooms", "walls", "floor", "names", "other")
-_LABELS = 3
-"""So many written areas must lie in different faces of lines to say something."""
 _NAMES = 3
 """Fewer names of rooms tell no usual distance."""
 _LINEAR = (0, 1, 6)
@@ -71,6 +70,11 @@ class UnitEvidence:
     """Usual distance from the name of a dwelling's room to the next such name."""
     areas: tuple[tuple[float, float], ...] = ()
     """Areas written in rooms in m², and the rooms' areas in square drawing units."""
+    sides: tuple[RoomSides, ...] = ()
+    furniture: tuple[float, ...] = ()
+    """Drawing units per metre by each thing of known size."""
+    going: float | None = None
+    """Distance between the treads of stairs."""
 
 
 def evidence_in(drawing: Drawing, shapes: Sequence[Shape], *, outlined: bool) -> UnitEvidence:
@@ -93,7 +97,10 @@ def evidence_in(drawing: Drawing, shapes: Sequence[Shape], *, outlined: bool) ->
         text_height=_text_height(written),
         dimensions=tuple(_dimensions(written)),
         names_apart=_names_apart(written),
-        areas=tuple(_areas(shapes, written)),
+        areas=tuple(areas_in(shapes, written)),
+        sides=tuple(sides_of(shapes, written)),
+        furniture=tuple(furniture_in(drawing)),
+        going=going_of(sketch(shape for shape in shapes if shape.role == "stairs" and not shape.is_text)),
     )
 
 
@@ -134,7 +141,7 @@ def _across(shapes: Sequence[Shape]) -> Iterator[float]:
 def _leaves(drawing: Drawing, shapes: Sequence[Shape]) -> list[float]:
     """Radii of swings on layers of doors; elsewhere, of those whose leaf is drawn."""
     known = _leaves_found(drawing)
-    for roles, drawn_leaf in ((("doors", "openings"), False), (("walls", "other"), True)):
+    for roles, drawn_leaf in ((("doors", "openings"), False), (("windows", "walls", "other"), True)):
         own = [shape for shape in shapes if shape.role in roles and not (shape.is_text or shape.is_note)]
         key = (drawn_leaf, *(id(shape.memo) for shape in own))
         if key not in known:
@@ -268,67 +275,3 @@ def _rendered(entity: DXFEntity) -> str:
         return ""
     item = texts[0]
     return str(item.plain_text() if hasattr(item, "plain_text") else item.dxf.text)
-
-
-def _areas(shapes: Sequence[Shape], written: Sequence[Shape]) -> list[tuple[float, float]]:
-    """Areas that texts name, each with the area of the smallest closed shape around the text.
-
-    If few lie in closed shapes of their own, the faces that lines enclose count, if several texts do.
-    """
-    labels = [(area, at) for shape in written if shape.is_text for area, at in _labels(shape)]
-    if not labels:
-        return []
-    found = _around(labels, _faces(_closed(shapes)))
-    if len({face for face, _, _ in found}) < _LABELS <= len(labels):
-        between = _around(labels, _enclosed(shapes))
-        found = between if len({face for face, _, _ in between}) >= _LABELS else found
-    return [(said, drawn) for _, said, drawn in found]
-
-
-def _around(
-    labels: Sequence[tuple[float, tuple[float, float]]], faces: Sequence[shapely.Polygon]
-) -> list[tuple[int, float, float]]:
-    """For each label in a face: the smallest face, the area in the text, and the face's."""
-    tree = shapely.STRtree(faces)
-    found = []
-    for area, at in labels:
-        around = tree.query(shapely.Point(at), predicate="within").tolist()
-        if around:
-            face = min(around, key=lambda k: faces[k].area)
-            found.append((face, area, faces[face].area))
-    return found
-
-
-def _faces(rings: Iterable[FloatArray]) -> list[shapely.Polygon]:
-    faces = [shapely.Polygon(ring) for ring in rings if len(ring) > 3]
-    return [face for face in faces if face.is_valid and face.area > 0]
-
-
-def _enclosed(shapes: Sequence[Shape]) -> list[shapely.Polygon]:
-    """Faces between the lines that may be walls; none of a drawing with very many lines."""
-    own = [shape for shape in shapes if shape.role in _ROOM_ROLES and not (shape.is_text or shape.is_note)]
-    lines = [shapely.LineString(line) for line in sketch(own) if 1 < len(line) < _BLOCK]
-    if not 0 < len(lines) <= _MOST:
-        return []
-    noded = shapely.union_all(lines)
-    return [face for face in shapely.get_parts(shapely.polygonize([noded])) if face.area > 0]
-
-
-def _labels(shape: Shape) -> Iterator[tuple[float, tuple[float, float]]]:
-    try:
-        word = word_of(shape, scale=1.0)
-    except BROKEN_INPUT:
-        return
-    area = area_in(word.text)
-    if area and word.at:
-        yield area, word.at[0]
-
-
-def _closed(shapes: Sequence[Shape]) -> Iterator[FloatArray]:
-    """Closed outlines that may be rooms."""
-    own = [shape for shape in shapes if shape.role in _ROOM_ROLES]
-    own = [shape for shape in own if shape.kind in ("LWPOLYLINE", "POLYLINE")]
-    for shape in own:
-        if shape.entity.is_closed:  # type: ignore[attr-defined]
-            for line in sketch([shape]):
-                yield np.vstack((line, line[:1]))

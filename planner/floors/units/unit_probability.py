@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from stopgo.planner.floors.units.room_texts import RoomSides
 from stopgo.planner.floors.units.unit_evidence import Dimension, UnitEvidence
 from stopgo.planner.floors.units.unit_lengths import METRES, USUAL
 from stopgo.planner.floors.written_measures import LENGTHS
@@ -27,12 +28,16 @@ _TEXT = (0.2, 0.8)
 _DIMENSION = (3.0, 1.3)
 _NAMES = (3.5, 0.5)
 """Kitchen, bath and bedrooms are this far apart, from name to name."""
+_FURNITURE = (1.0, 0.25)
+_GOING = (0.28, 0.12)
 _MISREAD = {
     "leaves": 0.04,
     "across": 0.03,
     "thickness": 0.08,
     "text": 0.2,
     "names": 0.05,
+    "furniture": 0.05,
+    "going": 0.1,
     "bare": 0.02,
     "said": 0.001,
 }
@@ -42,6 +47,8 @@ _MATCH = 0.03
 _AREA_MATCH = 0.12
 """Areas in texts are rounded, and measured to other faces of the walls."""
 _AREA_MISREAD = 0.005
+_SIDE_MATCH = 0.06
+"""Both sides agree within this fraction: they may be measured to the middle of the walls."""
 
 
 def probabilities(evidence: UnitEvidence, *, header: int) -> dict[int, float]:
@@ -70,14 +77,23 @@ def _likelihood(evidence: UnitEvidence, factor: float) -> float:
     return math.prod(
         [
             _size(evidence, factor),
-            _measures(evidence.leaves, factor, _LEAF, "leaves"),
-            _measures(evidence.across, factor, _ACROSS, "across"),
-            _measures(_one(evidence.thickness), factor, _THICKNESS, "thickness"),
             _measures(_one(evidence.text_height), factor, _TEXT, "text"),
             _measures(_one(evidence.names_apart), factor, _NAMES, "names"),
-            _dimensions(evidence.dimensions, factor),
-            _areas(evidence.areas, factor),
+            *measured(evidence, factor),
         ]
+    )
+
+
+def measured(evidence: UnitEvidence, factor: float) -> tuple[float, ...]:
+    """Likelihood by the thickness of walls, each other measure of things, and texts on lengths and areas."""
+    return (
+        _measures(_one(evidence.thickness), factor, _THICKNESS, "thickness"),
+        _measures(evidence.leaves, factor, _LEAF, "leaves"),
+        _measures(evidence.across, factor, _ACROSS, "across"),
+        _dimensions(evidence.dimensions, factor),
+        _rooms(evidence, factor),
+        _measures(evidence.furniture, factor, _FURNITURE, "furniture"),
+        _measures(_one(evidence.going), factor, _GOING, "going"),
     )
 
 
@@ -140,9 +156,29 @@ def _bare_units(dimensions: Sequence[Dimension]) -> Mapping[str, float]:
     return {"m": 0.4, "ft": 0.3, "in": 0.3}
 
 
+def _rooms(evidence: UnitEvidence, factor: float) -> float:
+    """Likelihood of what texts say of rooms; areas and sides come from the same texts and count as one."""
+    likelihoods = []
+    if evidence.areas:
+        likelihoods.append(_areas(evidence.areas, factor))
+    if evidence.sides:
+        likelihoods.append(_sides(evidence.sides, factor))
+    return max(likelihoods, default=1.0)
+
+
 def _areas(areas: Sequence[tuple[float, float]], factor: float) -> float:
     """Likelihood of areas written in rooms; areas that fit no unit say nothing."""
-    if not areas:
-        return 1.0
     fits = [abs(written / (drawn * factor**2) - 1) <= _AREA_MATCH for written, drawn in areas]
+    return max(sum(fits) / len(fits), _AREA_MISREAD)
+
+
+def _sides(sides: Sequence[RoomSides], factor: float) -> float:
+    """Likelihood of sides written in rooms; sides that fit no unit say nothing."""
+    fits = [
+        all(
+            abs(said / (drawn * factor) - 1) <= _SIDE_MATCH
+            for said, drawn in zip(item.written, item.drawn, strict=True)
+        )
+        for item in sides
+    ]
     return max(sum(fits) / len(fits), _AREA_MISREAD)

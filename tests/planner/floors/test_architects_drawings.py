@@ -113,6 +113,39 @@ def test_names_of_layers_are_read_with_either_end_of_line(tmp_path: Path, versio
         is_the_flat(read_floor(path))
 
 
+@pytest.mark.parametrize("version", ["R12", "R2000"])
+@pytest.mark.parametrize(
+    ("walls", "doors", "encoding", "codepage"),
+    [
+        ("WÄNDE", "TÜREN", "cp1252", "ANSI_1252"),
+        ("WÄNDE", "TÜREN", "cp1252", None),
+        ("СТЕНА", "ДВЕРЬ", "cp1251", "ANSI_1251"),
+        ("ŚCIANA", "DRZWI", "cp1250", "ANSI_1250"),
+        ("墙体", "门", "gbk", "ANSI_936"),
+        ("壁", "ドア", "cp932", "ANSI_932"),
+        ("壁", "ドア", "cp932", None),
+        ("СТЕНА", "ДВЕРЬ", "utf-8", None),
+        ("壁", "ドア", "utf-8", "ANSI_1252"),
+    ],
+)
+def test_names_are_read_in_the_encoding_of_the_file(
+    tmp_path: Path, version: str, walls: str, doors: str, encoding: str, codepage: str | None
+) -> None:
+    """Before R2007 a header names the codepage; scripts write UTF-8 all the same, and some name none."""
+    drawing = ezdxf.new(version)
+    drawing.header["$INSUNITS"] = 6
+    flat(drawing.modelspace(), walls="WALLNAME", doors="DOORNAME")
+    path = saved(drawing, tmp_path)
+    text = path.read_text("cp1252").replace("WALLNAME", walls).replace("DOORNAME", doors)
+    named = "  9\n$DWGCODEPAGE\n  3\nANSI_1252\n"
+    assert named in text
+    text = text.replace(named, named.replace("ANSI_1252", codepage) if codepage else "")
+    path.write_bytes(text.encode(encoding))
+    floor = read_floor(path)
+    is_the_flat(floor)
+    assert any(f"layer {walls} is taken for walls" in item.message for item in floor.findings)
+
+
 @pytest.mark.parametrize(
     ("name", "role"),
     [
@@ -134,6 +167,11 @@ def test_names_of_layers_are_read_with_either_end_of_line(tmp_path: Path, versio
         ("A-WALL-PATT", "walls"),
         ("A-DOOR-IDEN", "ignore"),
         ("A-AREA-IDEN", "names"),
+        ("Doors/Windows", "openings"),
+        ("Fenster_Türen", "openings"),
+        ("Stahlträger", "beams"),
+        ("Shelves", "furniture"),
+        ("X_ramka_przekroj_sciany", "ignore"),
     ],
 )
 def test_a_layers_name_is_read_whole_and_its_last_thing_decides(name: str, role: str) -> None:
@@ -399,6 +437,17 @@ def test_walls_that_enclose_nothing_are_refused(tmp_path: Path) -> None:
     drawing = new_drawing()
     rectangle(drawing.modelspace(), "A-WALL", 0, 0, 6, 0.2)
     with pytest.raises(InputError, match="the walls on A-WALL enclose no floor; draw its outline"):
+        read(drawing, tmp_path)
+
+
+def test_walls_left_open_without_a_room_or_a_door_are_refused(tmp_path: Path) -> None:
+    """A line from end to end of three walls is no fourth one."""
+    drawing = new_drawing()
+    outside, inside = ((-0.1, 0), (-0.1, 6.1), (3.1, 6.1), (3.1, 0)), ((3, 0), (3, 6), (0, 6), (0, 0))
+    ring = [*outside, *inside, outside[0]]
+    for a, b in pairwise(ring):
+        drawing.modelspace().add_line(a, b, dxfattribs={"layer": "A-WALL"})
+    with pytest.raises(InputError, match="the walls on A-WALL enclose no floor"):
         read(drawing, tmp_path)
 
 

@@ -15,12 +15,13 @@ from stopgo.mission.errors import InputError
 from stopgo.planner.floors import read_floor, survey_floor
 from stopgo.planner.floors.linework.swings import swings_of
 from stopgo.planner.floors.room_words import names_a_room
+from stopgo.planner.floors.units.known_sizes import going_of
 from stopgo.planner.floors.written_measures import area_in, is_only_area, length_in
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 real = pytest.mark.skipif(not DATA.is_dir(), reason=f"the real inputs are not in {DATA}")
 DECISIVE = ("header", "header and round wall", "dimensions", "areas")
-TELLING = ("doors", "doors and round wall", "bare dimensions", "wrong header and dimensions")
+TELLING = ("doors", "doors and round wall", "bare dimensions", "sides", "wrong header and dimensions")
 UNITS = {1: 1 / 0.0254, 2: 1 / 0.3048, 4: 1000.0, 5: 100.0, 6: 1.0, 14: 10.0}
 
 
@@ -151,6 +152,92 @@ def test_written_areas_between_lines_show_the_unit(tmp_path: Path) -> None:
         model.add_text(said, height=20).set_placement((x, 100))
     drawing.saveas(tmp_path / "plan.dxf")
     assert survey_floor(tmp_path / "plan.dxf").units.startswith("centimetre")
+
+
+def test_written_sides_of_rooms_with_a_gap_between_them_show_the_unit(tmp_path: Path) -> None:
+    drawing = new_drawing()
+    model = drawing.modelspace()
+    rectangle(model, "WALLS", 0, 0, 50, 30)
+    for x in (12.5, 25, 37.5):
+        model.add_line((x, 15.5), (x, 29.5), dxfattribs={"layer": "WALLS"})
+    model.add_line((0.5, 15), (49.5, 15), dxfattribs={"layer": "WALLS"})
+    texts = [
+        ("LIVING 50.0' x 15.0'", 20, 8),
+        *((f"BEDROOM {k} 12.5' x 15.0'", 12.5 * k + 3, 22) for k in range(4)),
+    ]
+    for text, x, y in texts:
+        model.add_text(text, height=1.0, dxfattribs={"layer": "ROOM_LABELS"}).set_placement((x, y))
+    drawing.saveas(tmp_path / "plan.dxf")
+    units = survey_floor(tmp_path / "plan.dxf").units
+    assert units.startswith("foot") and "5 rooms with written sides" in units
+
+
+def test_pieces_of_furniture_show_whether_leaves_of_60_are_centimetres_or_inches(tmp_path: Path) -> None:
+    """Beds and toilets of known size weigh more than the usual width of a leaf."""
+
+    def draw(*, furnished: bool) -> Path:
+        drawing = new_drawing(4)
+        model = drawing.modelspace()
+        rectangle(model, "A-WALL", 0, 0, 1385, 950)
+        for k in (1, 2, 3):
+            model.add_line((300 * k, 0), (300 * k, 60), dxfattribs={"layer": "A-DOOR"})
+            model.add_arc((300 * k, 0), 60, 0, 90, dxfattribs={"layer": "A-DOOR"})
+        if furnished:
+            for name, length in (("luzko", 200), ("kibel2", 65), ("pralka", 60)):
+                block = drawing.blocks.new(name)
+                block.add_line((0, 0), (length, length / 2))
+                model.add_blockref(name, (100, 100), {"layer": "F"})
+        path = tmp_path / f"{furnished}.dxf"
+        drawing.saveas(path)
+        return path
+
+    with pytest.raises(InputError, match=r"the unit is not certain .*--units cm .*--units in"):
+        survey_floor(draw(furnished=False))
+    units = survey_floor(draw(furnished=True)).units
+    assert units.startswith("centimetre") and "3 pieces of furniture" in units
+
+
+def test_treads_are_lines_apart_by_one_distance() -> None:
+    treads = [np.array([(0.0, 0.27 * k), (1.0, 0.27 * k)]) for k in range(10)]
+    assert going_of([*treads, np.array([(0.0, 0.0), (0.0, 2.43)])]) == pytest.approx(0.27)
+    assert going_of(treads[:4]) is None
+    assert going_of([np.array([(0.0, k * k), (1.0, k * k)]) for k in range(10)]) is None
+
+
+def test_a_size_and_texts_show_no_unit_of_a_drawing_made_from_a_page(tmp_path: Path) -> None:
+    """Points of a page are no unit of length, though names and texts look as if they were inches."""
+    drawing = new_drawing(0)
+    model = drawing.modelspace()
+    rectangle(model, "WALLS", 0, 0, 506, 400)
+    for k, name in enumerate(("Bedroom", "Kitchen", "Bathroom", "Living")):
+        model.add_text(name, height=9.9).set_placement((20 + 147 * (k % 3), 100 + 147 * (k // 3)))
+    drawing.saveas(tmp_path / "plan.dxf")
+    with pytest.raises(InputError, match="the unit is not certain"):
+        survey_floor(tmp_path / "plan.dxf")
+
+
+def test_treads_that_contradict_the_walls_leave_the_unit_open(tmp_path: Path) -> None:
+    """Walls of 16 and a floor of 16 by 10 m would be centimetres, but treads 10 apart are inches."""
+    drawing = new_drawing(0)
+    model = drawing.modelspace()
+    for x0, y0, x1, y1 in ((0, 0, 1600, 1000), (16, 16, 792, 984), (808, 16, 1584, 984)):
+        rectangle(model, "A-WALL", x0, y0, x1, y1)
+    for k in range(12):
+        model.add_line((100, 100 + 9.8 * k), (140, 100 + 9.8 * k), dxfattribs={"layer": "A-FLOR-STRS"})
+    drawing.saveas(tmp_path / "plan.dxf")
+    with pytest.raises(InputError, match=r"the unit is not certain .*--units cm"):
+        survey_floor(tmp_path / "plan.dxf")
+
+
+def test_walls_as_thick_in_feet_as_in_metres_leave_the_unit_open(tmp_path: Path) -> None:
+    """Walls of 0.33 are 10 or 33 cm thick: only the size tells feet from metres, and needs more."""
+    drawing = new_drawing(0)
+    model = drawing.modelspace()
+    for x0, y0, x1, y1 in ((0, 0, 12.5, 10.2), (0.33, 0.33, 6, 9.87), (6.33, 0.33, 12.17, 9.87)):
+        rectangle(model, "A-WALL", x0, y0, x1, y1)
+    drawing.saveas(tmp_path / "plan.dxf")
+    with pytest.raises(InputError, match=r"the unit is not certain .*--units m .*--units ft"):
+        survey_floor(tmp_path / "plan.dxf")
 
 
 def test_a_door_swing_has_a_leaf_or_ends_at_jambs_and_a_round_corner_has_neither() -> None:

@@ -27,11 +27,15 @@ EVIDENCE = (
     "dimensions",
     "bare dimensions",
     "areas",
+    "sides",
+    "furniture",
+    "stairs",
     "bare",
     "round wall",
     "texts",
     "wrong header and doors",
     "wrong header and dimensions",
+    "wrong header and furniture",
 )
 
 
@@ -71,6 +75,14 @@ def house(seed: int, code: int, kind: str) -> Drawing:
         _dimensions(drawing, pen, width, depth, count, thick, said="bare" not in kind)
     if "areas" in kind:
         _areas(drawing, pen, width, depth, count, thick)
+    if "sides" in kind:
+        _sides(pen, drawing, width, depth, count, thick)
+    if "furniture" in kind:
+        _furniture(drawing, pen, rng)
+    if "stairs" in kind:
+        going = float(rng.uniform(0.25, 0.31))
+        for k in range(9):
+            pen.line((0.2, 0.2 + k * going), (1.2, 0.2 + k * going), layer="A-FLOR-STRS")
     if "texts" in kind:
         height = float(rng.uniform(0.1, 0.3)) * pen.per_metre
         drawing.modelspace().add_text("Hall", height=height, dxfattribs={"layer": "A-NOTE"})
@@ -124,6 +136,22 @@ def _areas(drawing: Drawing, pen: _Pen, width: float, depth: float, count: int, 
         text = model.add_text(f"Room {k} {width * depth:.1f} m2", dxfattribs={"layer": "A-AREA-IDEN"})
         text.set_placement(place)
         text.dxf.height = 0.2 * pen.per_metre
+
+
+def _sides(pen: _Pen, drawing: Drawing, width: float, depth: float, count: int, thick: float) -> None:
+    for k in range(count):
+        place = ((k * (width + thick) + 0.4 * width) * pen.per_metre, 0.5 * depth * pen.per_metre)
+        text = drawing.modelspace().add_text(f"{width:.2f}m x {depth:.2f}m", dxfattribs={"layer": "A-NOTE"})
+        text.set_placement(place)
+
+
+def _furniture(drawing: Drawing, pen: _Pen, rng: np.random.Generator) -> None:
+    """A bed and a toilet, each a block of its own."""
+    for name, low, high in (("Bed double", 1.9, 2.2), ("WC-01", 0.58, 0.75)):
+        block = drawing.blocks.new(name)
+        length = float(rng.uniform(low, high)) * pen.per_metre
+        block.add_lwpolyline([(0, 0), (length, 0), (length, 0.6 * length), (0, 0.6 * length)], close=True)
+        drawing.modelspace().add_blockref(name, (pen.per_metre, pen.per_metre), {"layer": "A-FURN"})
 
 
 def rescaled(path: Path, code: int, kind: str, *, own: int = 6) -> Drawing:
