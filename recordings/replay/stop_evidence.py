@@ -33,6 +33,7 @@ from stopgo.recordings.replay.jumps import (
 from stopgo.recordings.replay.matching import long_enough
 from stopgo.recordings.replay.position_errors import PositionErrors, position_errors, visits_of
 from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.shifted_parts import hiding_steps, may_be_shifted
 from stopgo.recordings.replay.unseen_visits import DRIFTS, why_shorter, why_unseen
 
 LEVEL_M = 2.0
@@ -63,6 +64,7 @@ def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
     for k, item in enumerate(replay.comparison.asked):
         evidence = _with_jump(_evidence(replay, k, item, errors), jump_m)
         evidence = _with_hidden_jump(replay, k, evidence, hidden_m)
+        evidence = _with_shifted_part(replay, k, evidence, errors)
         common_m = float(errors.unsure_m[k] + fit_m[k])
         one = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
         placed = one.is_placed and item.deviation_m is not None
@@ -87,16 +89,27 @@ def _with_hidden_jump(replay: Replay, number: int, evidence: StopEvidence, hidde
     item, stop = evidence.item, replay.mission.stops[number]
     if not hidden_m or evidence.answer == "unknown":
         return evidence
-    if evidence.answer == "yes":
-        doubtful = is_outside((item.deviation_m or 0.0) + hidden_m, stop.tolerance_m)
-    else:
-        whole = [match.standstill for match in replay.matches if long_enough(match.standstill, stop)]
-        away = [math.dist(standstill.xy, (stop.x, stop.y)) for standstill in whole]
-        doubtful = bool(away) and not is_outside(min(away) - hidden_m, stop.tolerance_m)
+    doubtful = evidence.answer == "yes" and is_outside((item.deviation_m or 0.0) + hidden_m, stop.tolerance_m)
     if not doubtful:
         return evidence
     why = f"a time without poses hides a step aside of {hidden_m:.2f} m; give another source of poses"
     return changed(evidence, answer="unknown", why=why)
+
+
+def _with_shifted_part(
+    replay: Replay, number: int, evidence: StopEvidence, errors: PositionErrors
+) -> StopEvidence:
+    """Return a no as undecided if a hidden shift of a part of the log explains it."""
+    if evidence.answer != "no" or not replay.inferred:
+        return evidence
+    shifted = may_be_shifted(replay, number, float(errors.spread_m[number]) + SIGMAS * errors.noise_m)
+    return changed(evidence, answer="unknown", why=SHIFTED) if shifted else evidence
+
+
+SHIFTED = (
+    "a time without poses may hide a jump of the poses that brings its standstill off it; "
+    "give another source of poses"
+)
 
 
 def _with_jump(evidence: StopEvidence, jump_m: float) -> StopEvidence:
@@ -278,14 +291,18 @@ def apart_from_plan(replay: Replay) -> Iterator[str]:
     """Yield consecutive stops whose standstills are farther apart, or nearer, than drift can explain.
 
     Turning and shifting a log changes no distance: one of both stops was outside its tolerance. Nothing was
-    unseen, and no gap or jump is between them.
+    unseen, and no gap or jump is between them. A log that is turned by its first path, without headings, may
+    lie so far off that its standstills belong to other stops.
     """
+    if not replay.placed.turns and np.isinf(fit_error_m(replay)).any():
+        return
     track = replay.run.poses
     jump = lasting_jump(track) or _hidden_jump(replay, 0.0)
     for (a, one), (b, other) in pairwise(visits_of(replay)):
         between = track.between(one.standstill.end_ns, other.standstill.begin_ns)
         jumped = jump is not None and one.standstill.end_ns <= jump[0] <= other.standstill.begin_ns
-        if between.gaps.any() or jumped or any(why_unseen(replay, k, 0.0, halted=True) for k in (a, b)):
+        hides = between.gaps.any() or len(hiding_steps(between)) > 0
+        if hides or jumped or any(why_unseen(replay, k, 0.0, halted=True) for k in (a, b)):
             continue
         yield from _apart(replay, a, b, between.length_m, one.standstill.xy, other.standstill.xy)
 

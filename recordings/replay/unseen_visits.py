@@ -16,6 +16,7 @@ from stopgo.recordings.replay.fitting import STRETCH
 from stopgo.recordings.replay.jumps import lasting_jump
 from stopgo.recordings.replay.matching import REACH_M, Match, least_stay_s, long_enough
 from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.shifted_parts import across_a_jump
 
 SIGMAS = 2.0
 LEAST_GAP_S = 1.0
@@ -53,6 +54,7 @@ def why_unseen(
         ]
     reasons = (
         _possibly_longer(track, there, stop) or _across_a_step(replay, there),
+        _across_a_jump(replay, stop, unsure_m),
         _in_a_gap(replay, stop, unsure_m + SIGMAS * noise_m),
         _before_or_after(replay),
         _after_a_jump(track),
@@ -89,6 +91,17 @@ def _across_a_step(replay: Replay, at: Sequence[Match]) -> str:
     spans = [(item.standstill.begin_ns - slack_ns, item.standstill.end_ns + slack_ns) for item in at]
     stepped = any(begin <= ns <= end for ns in steps for begin, end in spans)
     return "the clock was set while it was stationary; give a log with another clock" if stepped else ""
+
+
+def _across_a_jump(replay: Replay, stop: Stop, unsure_m: float) -> str:
+    """Return whether a jump in a time without poses parts a standstill at a stop from the next one."""
+    for one, other in pairwise(replay.matches):
+        near_m = min(math.dist(match.standstill.xy, (stop.x, stop.y)) for match in (one, other))
+        seconds = (other.standstill.end_ns - one.standstill.begin_ns) / 1e9
+        whole = near_m <= stop.tolerance_m + unsure_m and seconds >= least_stay_s(stop)
+        if whole and across_a_jump(replay.run.poses, one, other):
+            return "a time without poses may hide a jump at its standstill; give another source of poses"
+    return ""
 
 
 def why_shorter(replay: Replay, number: int) -> str:

@@ -25,12 +25,16 @@ from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven
 from tests.recordings.replay.test_replaying import held, log_of
 from tests.recordings.truth.disturbances import sensed
 from tests.recordings.truth.drives import (
+    Mishap,
+    Visit,
     about_the_start,
     as_planned,
     given_up,
     mission_with_return,
+    repeated,
     shifted,
     shuffled,
+    toured,
 )
 
 MISSION = wandering(1)
@@ -376,10 +380,11 @@ def test_poses_that_end_before_their_log_do_not_show_the_end_of_the_run() -> Non
     assert "120 s without poses at the end of the log" in judged.text
 
 
-def test_without_headings_a_log_that_places_itself_denies_nothing() -> None:
+@pytest.mark.parametrize("mishap, seed", [(shuffled, 1), (repeated, 1363)])
+def test_without_headings_a_log_that_places_itself_denies_nothing(mishap: Mishap, seed: int) -> None:
     """In another order of the stops the first path has another direction than the planned one."""
-    mission = mission_with_return(1)
-    poses = sensed(shuffled(mission, np.random.default_rng(1)))
+    mission = mission_with_return(seed)
+    poses = sensed(mishap(mission, np.random.default_rng(seed)))
     track = Track.of(poses.ns, poses.xy, np.zeros(len(poses.ns)))
     blind = replace(log_of(track).poses[0], heading=np.full(len(track), np.nan))
     judged = drive_verdict(replay(held(blind), mission, FIRST))
@@ -407,3 +412,30 @@ def test_a_jump_of_the_poses_that_a_gap_hides_leaves_the_stops_undecided(
     track = Track.of(poses.ns[kept], xy[kept], poses.heading[kept])
     judged = drive_verdict(replay(log_of(track), mission, THERE))
     assert judged.answer == "unknown", judged.text
+
+
+@pytest.mark.parametrize("halted, gap_s", [(True, 3.0), (True, 7.0), (False, 3.0)])
+def test_a_jump_that_a_gap_hides_is_no_evidence_against_the_stops_after_it(
+    halted: bool, gap_s: float
+) -> None:
+    """All poses after it lie off by one vector; the robot stood on its stops."""
+    mission = mission_with_return(2)
+    tour = as_planned(mission, np.random.default_rng(2))
+    poses, halts = sensed(tour), tour.drive.halts
+    at = halts[3].begin_s + 4.0 if halted else (halts[3].end_s + halts[4].begin_s) / 2
+    xy = poses.xy + np.where(poses.true_s > at, 1.0, 0.0)[:, None] * (0.3, -0.4)
+    kept = (poses.true_s < at) | (poses.true_s > at + gap_s)
+    track = Track.of(poses.ns[kept], xy[kept], poses.heading[kept])
+    judged = drive_verdict(replay(log_of(track), mission, THERE))
+    assert judged.answer == "unknown", judged.text
+
+
+@pytest.mark.parametrize("number", [4, 6])
+def test_a_gap_is_no_excuse_for_one_stop_that_was_missed(number: int) -> None:
+    """The stops after it hold, so that no jump in the gap explains the one that was missed."""
+    mission = mission_with_return(2)
+    visits = [Visit(k, (0.3, -0.4) if k == number else (0.0, 0.0)) for k in range(len(mission.stops))]
+    drive = toured(mission, visits)
+    gap = (drive.halts[3].end_s + drive.halts[4].begin_s) / 2
+    track = seen(drive, lambda seconds: np.abs(seconds - gap) > 1.0)
+    assert drive_verdict(replay(log_of(track), mission, THERE)).answer == "no"
