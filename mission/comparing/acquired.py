@@ -19,6 +19,8 @@ class Acquired:
 
     sight: Sight
     """Plan of the newest known revision that the run followed."""
+    planned_seen: BoolArray
+    """True for units that enough planned stops see (n,)."""
     seen: BoolArray
     """True for units that enough scanned stops saw (n,)."""
     perhaps: BoolArray
@@ -27,6 +29,8 @@ class Acquired:
     """Gain of a scan at each missing stop, as a fraction of all that is visible."""
     unknown: tuple[str, ...] = ()
     """Scanned stops without visibility data: more was seen than is counted."""
+    is_part: bool = False
+    """True if missions that share the floor are not known: their scans may have seen more."""
 
     @cached_property
     def coverage(self) -> CoverageByGroup:
@@ -37,29 +41,29 @@ class Acquired:
         """Every element with targets, in the floor's order."""
         return self.sight.totals.by_element(self.seen)
 
-    @property
+    @cached_property
     def planned(self) -> CoverageByGroup:
-        return self.sight.planned
+        return self.sight.totals.coverage(self.planned_seen)
 
     @cached_property
     def rooms(self) -> tuple[CoveragePair, ...]:
         """Rooms with targets as planned and as acquired, least seen first; last, units in no room."""
         totals = self.sight.totals
-        planned, acquired = totals.rooms_seen(self.sight.all_seen), totals.rooms_seen(self.seen)
+        planned, acquired = totals.rooms_seen(self.planned_seen), totals.rooms_seen(self.seen)
         return (*_paired(planned[:-1], acquired[:-1]), *_paired(planned[-1:], acquired[-1:]))
 
     @cached_property
     def kinds(self) -> tuple[CoveragePair, ...]:
         """The same of every kind of element."""
         totals = self.sight.totals
-        return _paired(totals.kinds_seen(self.sight.all_seen), totals.kinds_seen(self.seen))
+        return _paired(totals.kinds_seen(self.planned_seen), totals.kinds_seen(self.seen))
 
     @cached_property
     def answer(self) -> Certainty:
         """Answer to: is all seen that was required, of the whole, every room and every kind?"""
         if not self.coverage.short:
             return "yes"
-        if self.unknown or not self.sight.totals.coverage(self.perhaps).short:
+        if self.unknown or self.is_part or not self.sight.totals.coverage(self.perhaps).short:
             return "unknown"
         return "no"
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from msgspec import UNSET
 
 from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import IntArray, frozen
-from stopgo.mission.stages.sight import Sight
+from stopgo.mission.stages.sight import Sight, required_of
 
 SCANNED, UNCONFIRMED = "scanned", "unconfirmed"
 
@@ -26,7 +27,7 @@ def acquired_by(
     plans = _plans_of(missions[-1], sights)
     if not plans:
         return None
-    last = plans[-1]
+    last = required_of(plans[-1], missions[-1])
     planned = {stop.id: stop for mission in missions for stop in mission.stops}
     done = [item.stop for item in stops if _is_scanned(item)]
     doubtful = [item.stop for item in stops if item.is_doubtful]
@@ -35,6 +36,7 @@ def acquired_by(
     wanted = [item.stop for item in stops if item.outcome not in (SCANNED, UNCONFIRMED)]
     return Acquired(
         sight=last,
+        planned_seen=last.all_seen,
         seen=seen,
         perhaps=last.totals.enough(views + _views(doubtful, planned, plans)),
         lost={stop: last.brings(stop, views) for stop in wanted if stop in last.ids},
@@ -42,16 +44,19 @@ def acquired_by(
     )
 
 
-def acquired_together(runs: Sequence[Comparison], sights: Iterable[Sight]) -> Acquired | None:
-    """Return the coverage that runs of one mission acquired together; None without visibility data.
+def acquired_together(
+    runs: Sequence[Comparison], missions: Sequence[Mission], sights: Iterable[Sight]
+) -> Acquired | None:
+    """Return the coverage that runs acquired together; None without visibility data of each mission.
 
+    `missions` are the newest revisions of one plan of a floor: one mission, or those that share the floor.
     Scans of several runs at one position are one view. A scan outside its tolerance is doubtful.
     """
-    newest = max((run.missions[-1] for run in runs), key=lambda mission: mission.revision)
-    plans = _plans_of(newest, sights)
-    if not plans:
+    known = list(sights)
+    plans = [plan for mission in missions for plan in _plans_of(mission, known)]
+    if not plans or {plan.mission_id for plan in plans} != {mission.id for mission in missions}:
         return None
-    last = plans[-1]
+    last, share = plans[-1], missions[-1].share
     done = scanned_positions(runs)
     perhaps = {
         (stop.x, stop.y): stop
@@ -62,14 +67,22 @@ def acquired_together(runs: Sequence[Comparison], sights: Iterable[Sight]) -> Ac
     views = _views_at(done.values(), plans)
     seen = last.totals.enough(views)
     also = [stop for position, stop in perhaps.items() if position not in done]
-    left = [stop.id for stop in newest.stops if (stop.x, stop.y) not in done]
+    stops = [(mission, stop) for mission in missions for stop in mission.stops]
+    left = {name_of(mission, stop.id): stop for mission, stop in stops if (stop.x, stop.y) not in done}
     return Acquired(
         sight=last,
+        planned_seen=last.totals.enough(_views_at((stop for _, stop in stops), plans)),
         seen=seen,
         perhaps=last.totals.enough(views + _views_at(also, plans)),
-        lost={stop: last.brings(stop, views) for stop in left if stop in last.ids},
+        lost={name: last.totals.brings(views, _views_at([stop], plans)) for name, stop in left.items()},
         unknown=tuple(stop.id for stop in done.values() if not any(plan.knows(stop) for plan in plans)),
+        is_part=share is not UNSET and len(missions) < share.of,
     )
+
+
+def name_of(mission: Mission, stop: str) -> str:
+    """Return the name of a stop among those of all missions that share its floor."""
+    return stop if mission.share is UNSET else f"{mission.share.number}:{stop}"
 
 
 def scanned_positions(runs: Iterable[Comparison]) -> dict[tuple[float, float], Stop]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from msgspec import UNSET
+
 from stopgo.mission.comparing.acquired import Acquired, Certainty
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.evidence import missing_events
@@ -46,7 +48,7 @@ def exit_code_of(judgements: Iterable[Judgement]) -> int:
 def judge(comparison: Comparison) -> Judgement:
     """Return the verdict: did the scans see what was required, each from within its stop's tolerance?
 
-    Without visibility data, all stops must have been scanned.
+    All stops must have been scanned without visibility data, and for a mission that shares its floor.
     """
     return Judgement(_answer(comparison), tuple(_sentences(comparison)))
 
@@ -55,7 +57,7 @@ def _answer(comparison: Comparison) -> Certainty:
     acquired = comparison.acquired
     if comparison.outside:
         return "no"
-    if acquired is not None:
+    if acquired is not None and comparison.mission.share is UNSET:
         disputed = any(item.disputed_m is not None for item in comparison.asked)
         return "unknown" if disputed and acquired.answer == "yes" else acquired.answer
     if any(not item.is_doubtful for item in comparison.missing):
@@ -66,6 +68,8 @@ def _answer(comparison: Comparison) -> Certainty:
 def _sentences(comparison: Comparison) -> Iterator[str]:
     if comparison.acquired is not None:
         yield from _coverage(comparison.acquired)
+        if (share := comparison.mission.share) is not UNSET:
+            yield f"The required coverage applies to all {share.of} missions of the floor together."
     else:
         yield (
             f"{comparison.scanned} of {len(comparison.asked)} stops were scanned; "
@@ -119,9 +123,9 @@ def _outcomes(comparison: Comparison) -> Iterator[str]:
 _WORDS = {"arrived": "reached and not scanned", "unconfirmed": "passed without a confirmed scan"}
 
 
-def named(stops: Sequence[str]) -> str:
-    """Return stops as part of a sentence: `s04 and s06`."""
+def named(stops: Sequence[str], what: str = "stops") -> str:
+    """Return stops, or what else has names, as part of a sentence: `s04 and s06`."""
     if len(stops) > MOST_NAMED:
-        return f"{len(stops)} stops ({', '.join(stops[:MOST_NAMED])}, …)"
+        return f"{len(stops)} {what} ({', '.join(stops[:MOST_NAMED])}, …)"
     *others, last = stops
     return f"{', '.join(others)} and {last}" if others else last

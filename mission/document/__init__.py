@@ -230,6 +230,19 @@ BY_HAND = ("use", "avoid")
 """Parameters by which a person moves, adds or forbids single stops."""
 
 
+def floor_plan_id(mission: Mission) -> str:
+    """Return the id of the plan of a floor that a mission is a part of; its own id if it is the whole plan.
+
+    All missions that share a floor have the same one.
+    """
+    if mission.share is UNSET:
+        return mission.id
+    origin = mission.origin
+    parameters = {key: value for key, value in origin.parameters.items() if key not in BY_HAND}
+    basis = [origin.floor_digest, parameters, origin.stopgo, mission.share.kind, mission.share.of]
+    return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]
+
+
 def mission_id(source: FloorSource, settings: Settings, version: str, part: int = 0) -> str:
     """Return the hash of floor, parameters, version and part: known before planning, and the recording id.
 

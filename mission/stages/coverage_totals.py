@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -52,16 +52,28 @@ class CoverageTotals:
     """Index into `elements` (n,)."""
     rooms: tuple[Group, ...]
     elements: tuple[Seen, ...]
-    required: float
-    """Least fraction of the whole."""
+    required: float | None
+    """Least fraction of the whole; None if nothing is required."""
     kind_required: float | None
     """Least fraction of each kind."""
     asked: IntArray = field(default_factory=lambda: frozen([1], np.int64))
     """Number of stops that must see each unit until it counts (n,), or every unit (1,)."""
 
+    @property
+    def without_requirements(self) -> CoverageTotals:
+        """The same, with nothing required: for a mission that covers a floor together with others."""
+        rooms = tuple(replace(room, required=None) for room in self.rooms)
+        return replace(self, required=None, kind_required=None, rooms=rooms)
+
     def enough(self, views: IntArray) -> BoolArray:
         """Return True for units that count as seen, for these numbers of views (n,)."""
         return frozen(views >= self.asked, np.bool_)
+
+    def brings(self, views: IntArray, more: IntArray) -> float:
+        """Return the gain of more views (n,) after others (n,), as a fraction of all visible."""
+        visible = self.amount(self.visible)
+        gained = self.enough(views + more) & ~self.enough(views) & self.visible
+        return self.amount(gained) / visible if visible else 0.0
 
     def coverage(self, seen: BoolArray) -> CoverageByGroup:
         """Return the coverage of a mask of units (n,); rooms and kinds with targets, least seen first."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
@@ -95,14 +96,16 @@ class Sight:
 
     def brings(self, stop: str, views: IntArray) -> float:
         """Return the gain of this stop, as a fraction of all visible, after views from others (n,)."""
-        visible = self.totals.amount(self.totals.visible)
-        after = self.totals.enough(views + self.views_from([stop]))
-        more = after & ~self.totals.enough(views) & self.totals.visible
-        return self.totals.amount(more) / visible if visible else 0.0
+        return self.totals.brings(views, self.views_from([stop]))
 
     @cached_property
     def _number(self) -> dict[str, int]:
         return {stop.id: number for number, stop in enumerate(self.stops)}
+
+
+def required_of(sight: Sight, mission: Mission) -> Sight:
+    """Return the same with what is required of a mission: nothing if it shares its floor with others."""
+    return sight if mission.share is UNSET else replace(sight, totals=sight.totals.without_requirements)
 
 
 def sight_of(route: Route, mission: Mission, figures: Figures) -> Sight:

@@ -49,7 +49,7 @@ def _values(sight: Sight) -> dict[str, Sized]:
     asked = np.broadcast_to(totals.asked, len(totals.weight))
     change = _changes(np.stack([totals.room, totals.visible, asked], axis=1))
     more = {"asked": asked[change].astype(np.int32)} if (asked > 1).any() else {}
-    shares = [totals.required, _encoded_fraction(totals.kind_required)]
+    shares = [_encoded_fraction(totals.required), _encoded_fraction(totals.kind_required)]
     return {
         "mission": [sight.mission_id, sight.digest, totals.rule],
         "revision": np.array([sight.revision]),
@@ -137,7 +137,7 @@ def _coverage_totals(row: Cells, targets: Targets, rule: str) -> CoverageTotals:
         element=frozen(targets.element[targets.unit_segment], np.int64),
         rooms=tuple(Group(name, _decoded_fraction(fraction), why) for name, fraction, why in rooms),
         elements=tuple(Seen(*pair) for pair in zip(row["element_ids"], row["element_kinds"], strict=True)),
-        required=float(row["shares"][0]),
+        required=_decoded_fraction(row["shares"][0]),
         kind_required=_decoded_fraction(row["shares"][1]),
         asked=frozen(np.repeat(row["asked"], counts) if "asked" in row else [1], np.int64),
     )

@@ -195,7 +195,7 @@ def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: Pict
     sight = subject.sight if acquired is None else acquired.sight
     if sight is None:
         return
-    planned = sight.all_seen
+    planned = sight.all_seen if acquired is None else acquired.planned_seen
     seen = planned if acquired is None else acquired.seen
 
     targets = sight.targets

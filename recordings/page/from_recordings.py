@@ -15,29 +15,34 @@ from stopgo.recordings.embedded.floor_lines import FloorLines, floor_lines
 from stopgo.recordings.embedded.plan import origin_in
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.embedded.reasons import reasons_in
-from stopgo.recordings.page.reviewed import RecordingReview, Review, missions_of, sights_of, what_next
+from stopgo.recordings.page.reviewed import (
+    RecordingReview,
+    Review,
+    missions_of,
+    plan_id_of,
+    sights_of,
+    what_next,
+)
 from stopgo.recordings.page.subject import ReportSubject
 
 
 def subject_of(review: Review) -> ReportSubject:
-    """Return the mission of all recordings, its plan and its runs.
+    """Return the mission of all recordings, or those that share a floor, with plan and runs.
 
     Raises
     ------
     InputError
-        When they are of several missions, or none of them contains its mission.
+        When they are of several plans, or none of them contains its mission.
     """
-    items = review.recordings
-    ids = sorted({item.recording.mission_id for item in items})
-    if len(ids) > 1:
-        raise InputError(f"report: needs recordings of one mission, not {len(ids)}: {', '.join(ids)}")
-    read = [item.recording for item in items]
-    missions, sights = missions_of(read), sights_of(read)
+    items, read = review.recordings, [item.recording for item in review.recordings]
+    plan_id, missions, sights = _one_plan(read), missions_of(read), sights_of(read)
     if not missions:
         raise InputError(
             "report: no recording contains its mission, all are of another version; plan and record again"
         )
-    both = review.together.get(ids[0])
+    if not review.comparisons and len({mission.id for mission in missions}) > 1:
+        raise InputError("report: plans of several missions and no run; give one plan, or the runs too")
+    both = review.together.get(plan_id)
     return ReportSubject(
         missions=missions,
         comparisons=tuple(sorted(review.comparisons, key=lambda item: item.log.began_ns or 0)),
@@ -53,10 +58,19 @@ def subject_of(review: Review) -> ReportSubject:
             for run in item.comparisons
             if both is None and (lines := what_next(run, item.recording.path))
         },
-        together=() if both is None else (*both.sentences, *review.next_together(ids[0])),
+        together=() if both is None else (*both.sentences, *review.next_together(plan_id)),
         rooms_together=() if both is None else both.rooms,
         problems=tuple(f"{item.recording.path.name}: {text}" for item in items for text in item.problems),
     )
+
+
+def _one_plan(read: Sequence[Recording]) -> str:
+    """Return the id of the plan of a floor that all recordings are of."""
+    found = {plan_id_of(item): item.mission_id for item in read}
+    if len(found) > 1:
+        names = ", ".join(sorted(found.values()))
+        raise InputError(f"report: needs recordings of one mission, not {len(found)}: {names}")
+    return next(iter(found), "")
 
 
 def _first(read: Sequence[Recording], of: Any) -> Any:

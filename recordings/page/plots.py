@@ -73,9 +73,11 @@ def _growth(comparison: Comparison) -> Iterator[str]:
             percentages.append(100 * totals.amount(seen & totals.visible) / visible)
     if len(times) > 1:
         ends = np.array([0.0, times[-1]])
-        required = PlotLine(ends, np.full(2, 100 * totals.required), VERMILION, "4 3")
+        least = () if totals.required is None else (100 * totals.required,)
+        required = [PlotLine(ends, np.full(2, value), VERMILION, "4 3") for value in least]
         acquired_line = PlotLine(np.array(times), np.array(percentages), BLUE, steps=True)
-        yield _plot("coverage acquired, %; dashed: required", [required, acquired_line])
+        title = "coverage acquired, %" + ("; dashed: required" if required else "")
+        yield _plot(title, [*required, acquired_line])
 
 
 def _decimated(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,11 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from msgspec import UNSET
+
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
 from stopgo.mission.comparing.run_verdict import exit_code_of, judge
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, floor_plan_id
 from stopgo.mission.errors import InputError
 from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.drawing import entities
@@ -83,33 +85,35 @@ class Review:
 
     @cached_property
     def together(self) -> dict[str, RunsTogether]:
-        """Runs of every mission of which there are several, by the mission's id."""
-        return {
-            mission_id: together(runs, sights_of(item.recording for item in items))
-            for mission_id, items in self._by_mission.items()
-            if len(runs := [run for item in items for run in item.comparisons]) > 1
-        }
+        """Runs of every plan of a floor that has several, or several missions, by the plan's id."""
+        found = {}
+        for plan_id, items in self._by_plan.items():
+            runs = [run for item in items for run in item.comparisons]
+            if len(runs) > 1 or (runs and runs[0].mission.share is not UNSET):
+                read = [item.recording for item in items]
+                found[plan_id] = together(runs, missions_of(read), sights_of(read))
+        return found
 
-    def next_together(self, mission_id: str) -> tuple[str, ...]:
-        """Return the command for one follow-up mission after all runs of a mission, if one is needed."""
-        items = self._by_mission[mission_id]
-        return self.together[mission_id].what_next(item.recording.path for item in items if item.comparisons)
+    def next_together(self, plan_id: str) -> tuple[str, ...]:
+        """Return the command for one follow-up mission after all runs of a plan, if one is needed."""
+        items = self._by_plan[plan_id]
+        return self.together[plan_id].what_next(item.recording.path for item in items if item.comparisons)
 
     @property
-    def _by_mission(self) -> dict[str, list[RecordingReview]]:
+    def _by_plan(self) -> dict[str, list[RecordingReview]]:
         found: dict[str, list[RecordingReview]] = {}
         for item in self.recordings:
-            found.setdefault(item.recording.mission_id, []).append(item)
+            found.setdefault(plan_id_of(item.recording), []).append(item)
         return found
 
     def as_text(self) -> str:
-        """Return the review for a person: each recording, then the runs of each mission together."""
+        """Return the review for a person: each recording, then the runs of each plan of a floor together."""
         each = [
-            item.as_text(alone=item.recording.mission_id not in self.together) for item in self.recordings
+            item.as_text(alone=plan_id_of(item.recording) not in self.together) for item in self.recordings
         ]
         both = [
-            "\n".join((*runs.verdicts, *runs.sentences, *self.next_together(mission_id)))
-            for mission_id, runs in self.together.items()
+            "\n".join((*runs.verdicts, *runs.sentences, *self.next_together(plan_id)))
+            for plan_id, runs in self.together.items()
         ]
         return "\n\n".join([*each, *both])
 
@@ -168,6 +172,12 @@ def _review(recording: Recording, read: Sequence[Recording]) -> RecordingReview:
     missions, sights = missions_of(of_mission), sights_of(of_mission)
     comparisons = [compare(log, missions, sights) for log in recording.logs] if missions else []
     return RecordingReview(recording, tuple(comparisons), problems_of(recording))
+
+
+def plan_id_of(recording: Recording) -> str:
+    """Return the id of the plan of a floor that a recording is of: its mission's, unless that shares it."""
+    shared = (floor_plan_id(mission) for mission in recording.missions if mission.share is not UNSET)
+    return next(shared, recording.mission_id)
 
 
 def missions_of(recordings: Iterable[Recording]) -> tuple[Mission, ...]:

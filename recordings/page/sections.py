@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from stopgo.mission.comparing.acquired import Acquired
+from stopgo.mission.comparing.acquiring import name_of
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
 from stopgo.mission.console.table import duration
 from stopgo.mission.document.schedule import schedule
@@ -14,7 +15,7 @@ from stopgo.mission.run.events import Scanned
 from stopgo.mission.stages.figures import CoveragePair, GroupCoverage, percent
 from stopgo.recordings.page.floor_picture import errors_in_picture, legend, line_sample, plan_picture
 from stopgo.recordings.page.plots import plots
-from stopgo.recordings.page.runs_together import run_names, when_and_who
+from stopgo.recordings.page.runs_together import newest_of, number_of, run_names, when_and_who
 from stopgo.recordings.page.stop_table import stop_table
 from stopgo.recordings.page.style import ANSWERS, BLUE, ERROR, GREY, PURPLE, STATES, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
@@ -31,7 +32,7 @@ def body(subject: ReportSubject) -> str:
     if not runs:
         parts += [_plan_band(subject), _plan_tiles(subject), _pictured(subject, None), _plan_tables(subject)]
         parts += [stop_table(subject.reasons)]
-    if len(runs) > 1:
+    if len(runs) > 1 or subject.together:
         parts += [_runs_compared(subject)]
     parts += [
         tag("div", *_run(subject, comparison, alone=len(runs) == 1), class_="run") for comparison in runs
@@ -40,9 +41,10 @@ def body(subject: ReportSubject) -> str:
 
 
 def _title(subject: ReportSubject) -> str:
-    mission = subject.mission
-    about = f"mission {mission.id[:12]}, revision {mission.revision}, floor {mission.origin.floor}"
-    return tag("h1", shown(mission.name), " ", tag("small", shown(about)))
+    newest = newest_of(subject.missions)
+    missions = "; ".join(f"mission {mission.id[:12]}, revision {mission.revision}" for mission in newest)
+    about = f"{missions}, floor {subject.mission.origin.floor}"
+    return tag("h1", shown(subject.name), " ", tag("small", shown(about)))
 
 
 def _problems(subject: ReportSubject) -> Iterator[str]:
@@ -151,8 +153,8 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
     )
     if comparison.acquired is not None:
         groups, planned = comparison.acquired.coverage, comparison.acquired.planned
-        required = percent(groups.whole.required)
-        planned_text = f"required {required}, planned {percent(planned.whole.coverage)}"
+        asked = "" if groups.whole.required is None else f"required {percent(groups.whole.required)}, "
+        planned_text = f"{asked}planned {percent(planned.whole.coverage)}"
         yield tile("coverage acquired", percent(groups.whole.coverage), planned_text)
     yield tile("run time", driven, f"planned {duration(comparison.planned_s)}")
     limit = f"tolerance {1000 * tolerance:.0f} mm"
@@ -251,7 +253,7 @@ def _coverage_tables(acquired: Acquired) -> Iterator[str]:
     yield section("Rooms, worst first", _coverage_grid(acquired.rooms, "room"))
     yield section("Kinds", _coverage_grid(acquired.kinds, "kind"))
     totals = acquired.sight.totals
-    planned = {item.name: item for item in totals.by_element(acquired.sight.all_seen)}
+    planned = {item.name: item for item in totals.by_element(acquired.planned_seen)}
     pairs = [(planned[item.name], item) for item in acquired.elements if item.visible]
     worst = sorted(pairs, key=lambda pair: (pair[1].seen - pair[0].seen, pair[1].name))
     short = [pair for pair in worst if pair[1].seen < pair[0].seen]
@@ -292,8 +294,9 @@ def _runs_compared(subject: ReportSubject) -> str:
     verdicts = (shown(subject.judgement(run).headline) for run in runs)
     rows = [row([tag("b", "verdict"), *verdicts])]
     rows += [row([tag("b", name), *(figure(run) for run in runs)]) for name, figure in _ROWS]
-    stops = dict.fromkeys(item.stop for run in runs for item in run.stops)
-    by_stop = [{item.stop: item for item in run.stops} for run in runs]
+    by_stop = [{name_of(run.mission, item.stop): item for item in run.stops} for run in runs]
+    numbered = sorted(zip(runs, by_stop, strict=True), key=lambda pair: number_of(pair[0].mission))
+    stops = dict.fromkeys(stop for _, items in numbered for stop in items)
     cells = [row([shown(stop), *(_outcome(items.get(stop)) for items in by_stop)]) for stop in stops]
     lines = [tag("li", shown(line)) for line in subject.together]
     return (

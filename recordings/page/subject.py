@@ -19,12 +19,12 @@ from stopgo.recordings.embedded.floor_lines import FloorLines
 
 @dataclass(frozen=True, eq=False)
 class ReportSubject:
-    """One mission; what is not known is empty or None."""
+    """One mission, or those that share a floor; what is not known is empty or None."""
 
     missions: tuple[Mission, ...]
-    """Revisions in ascending order; at least one."""
+    """Revisions in ascending order, of each mission; at least one."""
     comparisons: tuple[Comparison, ...] = ()
-    """Runs of the mission, the earliest first."""
+    """Runs of the missions, the earliest first."""
     sight: Sight | None = None
     """Visibility of the newest plan's stops."""
     floor: FloorLines | None = None
@@ -58,6 +58,12 @@ class ReportSubject:
         return self.missions[-1]
 
     @property
+    def name(self) -> str:
+        """Name of the mission, or of the floor with the number of its missions."""
+        count = len({mission.id for mission in self.missions})
+        return self.mission.name if count == 1 else f"{self.mission.origin.floor}, {count} missions"
+
+    @property
     def title(self) -> str:
         what = "plan" if not self.comparisons else "run" if len(self.comparisons) == 1 else "runs"
-        return f"{self.mission.name}: {what}"
+        return f"{self.name}: {what}"

@@ -61,7 +61,7 @@ def _together(replays: Sequence[Replay], plans: Review | None) -> RunsTogether |
     if plans is None or len(replays) < 2 or any(one.inferred for one in replays):
         return None
     sights = sights_of(item.recording for item in plans.recordings)
-    return together([one.comparison for one in replays], sights)
+    return together([one.comparison for one in replays], (), sights)
 
 
 def _shown(replay: Replay) -> Comparison:

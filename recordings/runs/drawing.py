@@ -36,7 +36,7 @@ from stopgo.mission.run.events import (
 from stopgo.mission.run.health_text import health_text, health_words
 from stopgo.mission.run.run_log import Track
 from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
-from stopgo.mission.stages.sight import Sight
+from stopgo.mission.stages.sight import Sight, required_of
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
 from stopgo.recordings.drawing.pens import ORDER, Pen, style
@@ -76,7 +76,7 @@ class RunDrawing:
         self._began_ns: int | None = None
         self._last_xy: FloatArray | None = None
         self._boot_id = ""
-        self._acquired = AcquiredDrawing(sights[-1]) if sights else None
+        self._acquired = AcquiredDrawing(required_of(sights[-1], mission)) if sights else None
         self._thinner, self._trail, self._cross_track = Thinner(), Trail(), DelayedDeviation(mission)
         self._stops: dict[str, bool | None] = {}
         self._vehicle_health: tuple[bool | None, ...] | None = None
