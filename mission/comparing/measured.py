@@ -71,6 +71,9 @@ class Measured:
     None for a laser in the log: it navigates, and its points decide nothing.
     """
 
+    part: BoolArray | None = None
+    """Of a mission that shares its floor, true for the units that its stops see (n,): only these count."""
+
     @property
     def decides(self) -> bool:
         """True for clouds of the surveying scanner."""
@@ -105,7 +108,8 @@ class Measured:
 
     @cached_property
     def coverage(self) -> CoverageByGroup:
-        return self.totals.coverage(self.hit)
+        asked = self.totals if self.part is None else self.totals.of_part(self.part)
+        return asked.coverage(self.hit)
 
     @cached_property
     def deviations(self) -> tuple[tuple[str, int, float, float], ...]:

@@ -65,6 +65,10 @@ class CoverageTotals:
         rooms = tuple(replace(room, required=None) for room in self.rooms)
         return replace(self, required=None, kind_required=None, rooms=rooms)
 
+    def of_part(self, units: BoolArray) -> CoverageTotals:
+        """Return the same requirements for a part of the units (n,)."""
+        return replace(self, visible=frozen(self.visible & units, np.bool_))
+
     def enough(self, views: IntArray) -> BoolArray:
         """Return True for units that count as seen, for these numbers of views (n,)."""
         return frozen(views >= self.asked, np.bool_)

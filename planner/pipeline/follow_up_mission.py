@@ -62,6 +62,18 @@ class PlannedFloor:
         """Visibility from every candidate in the mission's part of the floor."""
         return visibility(candidates(self.space, part=self._part))
 
+    @cached_property
+    def stops_see(self) -> BoolArray:
+        """True for units that enough of the mission's stops see (n,)."""
+        stops = np.array([(stop.x, stop.y, stop.heading) for stop in self.mission.stops]).reshape(-1, 3)
+        views = _views(self.space, SightLines(self.space), stops)
+        return _seen_by(views, totals_of_plan(self.seen))
+
+    @property
+    def is_part(self) -> bool:
+        """True if the mission shares its floor with others: what is required holds for all together."""
+        return self.mission.share is not UNSET
+
     @property
     def _part(self) -> int:
         positions = np.array([(stop.x, stop.y) for stop in self.mission.stops]).reshape(-1, 2)
@@ -97,13 +109,11 @@ def as_driven(planned: PlannedFloor, poses: ScanPoses) -> AsDriven:
     NegativeResult
         When no target on the floor is visible.
     """
-    lines = SightLines(planned.space)
-    stops = np.array([(stop.x, stop.y, stop.heading) for stop in planned.mission.stops]).reshape(-1, 3)
     totals = totals_of_plan(planned.seen)
     return AsDriven(
-        totals=totals,
-        planned=_seen_by(_views(planned.space, lines, stops), totals),
-        driven=_seen_by(_views(planned.space, lines, poses), totals),
+        totals=totals.without_requirements if planned.is_part else totals,
+        planned=planned.stops_see,
+        driven=_seen_by(_views(planned.space, SightLines(planned.space), poses), totals),
     )
 
 

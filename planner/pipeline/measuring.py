@@ -62,6 +62,7 @@ def measured(
         histogram=frozen(counts.histogram, np.int64),
         unplanned=tuple(_unplanned(counts, planned.space, least_sweeps)),
         misplaced_m=tuple(misplaced) if surveyed else None,
+        part=planned.stops_see if planned.is_part else None,
     )
 
 

@@ -116,8 +116,9 @@ def _floor_sentences(replay: Replay) -> Iterator[str]:
 def _coverage_sentences(sight: AsDriven) -> Iterator[str]:
     whole = sight.coverage.whole
     for group in (whole, *(group for group in sight.coverage.short if group is not whole)):
-        name, least = group.name if group is not whole else "what is visible", percent(group.required)
-        yield f"Of {name}, {percent(group.coverage)} was visible; {least} is required."
+        name = group.name if group is not whole else "what is visible"
+        asked = "" if group.required is None else f"; {percent(group.required)} is required"
+        yield f"Of {name}, {percent(group.coverage)} was visible{asked}."
 
 
 def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str]:
@@ -129,7 +130,8 @@ def _cloud_sentences(measured: Measured, sight: AsDriven | None) -> Iterator[str
         return
     whole = measured.coverage.whole
     for group in (whole, *(group for group in measured.coverage.short if group is not whole)):
-        name, least = group.name if group is not whole else "what is visible", percent(group.required)
+        what = "what is visible" if measured.part is None else "what the mission's stops see"
+        name, least = group.name if group is not whole else what, percent(group.required)
         yield f"Of {name}, {percent(group.coverage)} was measured; {least} is required."
     absent = [] if sight is None else [item for item in measured.absent(sight.driven) if item.empty == 1.0]
     if absent:

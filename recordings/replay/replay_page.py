@@ -80,8 +80,8 @@ def run_texts(replay: Replay) -> Iterator[RunLines]:
         yield (
             "Visible from the robot's stationary poses",
             tuple(
-                f"{group.name}: {percent(group.coverage)} (planned {percent(planned.coverage)}, "
-                f"required {percent(group.required)})"
+                f"{group.name}: {percent(group.coverage)} (planned {percent(planned.coverage)}"
+                + (")" if group.required is None else f", required {percent(group.required)})")
                 for planned, group in replay.sight.pairs
             ),
         )
