@@ -24,9 +24,9 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, lru_cache
 from importlib import import_module
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -496,6 +496,18 @@ def _on_one_processor() -> Iterator[None]:
         os.sched_setaffinity(0, processors)
 
 
+@lru_cache(maxsize=1)
+def _uses(modules: int, reals: frozenset[int]) -> list[tuple[ModuleType, str, int]]:
+    """Modules inside, and their attributes that are one of these objects; anew when modules were imported."""
+    inside = [module for name, module in sys.modules.items() if f"{name}.".startswith(INSIDE)]
+    return [
+        (module, attribute, id(value))
+        for module in inside
+        for attribute, value in vars(module).items()
+        if id(value) in reals
+    ]
+
+
 @contextmanager
 def stepped_into() -> Iterator[World]:
     """The bridge and its tests in a world of their own, until the block ends."""
@@ -505,11 +517,8 @@ def stepped_into() -> Iterator[World]:
         patch.setitem(transport.OPENING, "udpin", lambda url: UdpIn(world, url))
         patch.setitem(transport.OPENING, "udpout", lambda url: UdpOut(world, url))
         shims = {id(real): shim for real, shim in world.shims.items() if shim is not None}
-        for name, module in list(sys.modules.items()):
-            if f"{name}.".startswith(INSIDE):
-                for attribute, value in list(vars(module).items()):
-                    if id(value) in shims:
-                        patch.setattr(module, attribute, shims[id(value)])
+        for module, attribute, real in _uses(len(sys.modules), frozenset(shims)):
+            patch.setattr(module, attribute, shims[real])
         try:
             yield world
         finally:

@@ -34,7 +34,7 @@ from tests.faults.sizes import size
 from tests.faults.test_gateway import moment
 from tests.own_time import World
 
-SEEDS = range(size(short=2, full=240))
+SEEDS = range(size(short=1, full=240))
 OTHER = Who(255, 190)
 TRUE_M = 0.05
 """By how much an estimate may differ from the truth."""

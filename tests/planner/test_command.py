@@ -19,6 +19,7 @@ from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import Settings
 from stopgo.plan_files import plan_files
 from tests.disk import small_disk
+from tests.faults.sizes import some
 from tests.planner.worlds import FLOORS, SHARED
 
 Draw = Callable[["Drawing"], None]
@@ -272,7 +273,7 @@ ODD: dict[str, Draw] = {
 }
 
 
-@pytest.mark.parametrize("name", ODD)
+@pytest.mark.parametrize("name", some(list(ODD), every=2))
 def test_an_anomalous_drawing_is_planned(run: Callable[..., Run], name: str, tmp_path: Path) -> None:
     code, out, error = run("plan", drawn(tmp_path / "odd.dxf", ODD[name]), "-o", tmp_path / "out", "--json")
     assert (code, error) == (0, "")

@@ -21,7 +21,7 @@ from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
 from stopgo.planner.space.navigable import navigable
-from tests.faults.sizes import FULL, size, some
+from tests.faults.sizes import FULL, some
 from tests.planner.checking.test_claims import counted
 from tests.planner.checks import check_plan, check_rooms_are_joined
 from tests.planner.worlds import FLOORS, changed, moved, planned, shared, shifted, turned
@@ -43,7 +43,7 @@ def test_a_real_floor_is_planned_well(name: str) -> None:
     assert nouns[Selection].coverage >= 0.9
 
 
-@pytest.mark.parametrize("name", [name for name in AGAIN if name != LARGEST])
+@pytest.mark.parametrize("name", some([name for name in AGAIN if name != LARGEST], every=3))
 def test_what_a_plan_of_a_real_floor_claims_is_so(name: str) -> None:
     mission, nouns = the_plan(name)
     found, problems = counted(mission, nouns)
@@ -86,7 +86,9 @@ def in_another_order(name: str) -> FloorPlan:
     )
 
 
-@pytest.mark.parametrize("name", [name for name in AGAIN if "rooms" in name or "duplex" in name])
+@pytest.mark.parametrize(
+    "name", some([name for name in AGAIN if "rooms" in name or "duplex" in name], every=2)
+)
 def test_elements_drawn_twice_do_not_change_a_plan(name: str) -> None:
     original = shared(name)
     other = replace(original, elements=original.elements + original.elements[::3])
@@ -108,12 +110,12 @@ OTHERS = (
     Settings(door_candidates=True, coverage=1.0, d_dis=0.1),
     Settings(fov=120.0, d_dis=0.2),
 )
-"""In the short form, each on the smaller of the two floors."""
+"""In the short form, every fifth pair of these and a floor."""
 
 
 @pytest.mark.parametrize(
     ("name", "settings"),
-    [(name, settings) for settings in OTHERS for name in REAL[: size(short=1, full=2)]],
+    some([(name, settings) for name in REAL for settings in OTHERS], every=5),
     ids=lambda case: case if isinstance(case, str) else ", ".join(changed(case)),
 )
 def test_other_settings_are_planned_well(name: str, settings: Settings) -> None:

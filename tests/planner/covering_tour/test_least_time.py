@@ -199,7 +199,7 @@ TRIED = [
 ]
 
 
-@pytest.mark.parametrize(("world", "case"), some(TRIED, every=3))
+@pytest.mark.parametrize(("world", "case"), some(TRIED, every=5))
 def test_no_choice_of_stops_and_order_takes_less_than_the_bound(world: str, case: int) -> None:
     driven, made = two_step(world, case), joint(world, case)
     assert made.time is not None
@@ -212,7 +212,7 @@ def test_no_choice_of_stops_and_order_takes_less_than_the_bound(world: str, case
 
 
 @pytest.mark.parametrize(
-    ("world", "case"), some([(world, case) for world in WORLDS for case in range(len(CASES))], every=2)
+    ("world", "case"), some([(world, case) for world in WORLDS for case in range(len(CASES))], every=4)
 )
 def test_a_plan_is_never_slower_and_sees_what_is_asked_for(world: str, case: int) -> None:
     driven, made = two_step(world, case), joint(world, case)
@@ -226,8 +226,9 @@ def test_a_plan_is_never_slower_and_sees_what_is_asked_for(world: str, case: int
     assert made.selection.coverage >= made.selection.required - 1e-9
 
 
-@pytest.mark.parametrize("case", range(len(CASES)))
-@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize(
+    ("world", "case"), some([(world, case) for world in WORLDS for case in range(len(CASES))], every=3)
+)
 def test_the_times_of_the_search_are_those_of_the_schedule(world: str, case: int) -> None:
     """Of the route it begins with, and of the one that it ends with."""
     driven = two_step(world, case)
@@ -297,7 +298,7 @@ def test_one_stop_stays_one() -> None:
     assert made.time.bound == pytest.approx(made.time.seconds) == 62.0
 
 
-@pytest.mark.parametrize("seed", range(size(short=2, full=40)))
+@pytest.mark.parametrize("seed", range(size(short=1, full=40)))
 def test_floors_at_random_are_never_planned_slower(seed: int) -> None:
     random = np.random.default_rng(seed)
     width, depth = random.uniform(6, 12, size=2).round(2).tolist()

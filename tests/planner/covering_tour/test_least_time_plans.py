@@ -25,6 +25,7 @@ from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.planner import plan
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
 from stopgo.planner.task_allocation.dividing import division_cost
+from tests.faults.sizes import some
 from tests.planner.worlds import box, column, floor_of, hall, shell
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
@@ -108,7 +109,7 @@ def test_a_floor_where_nothing_is_to_be_seen_is_reported_as_ever(tmp_path: Path)
         plan(floor_of(box(0, 0, 1, 1), elements=(shell(0, 0, 1, 1),)), Settings(minimise="time"))
 
 
-@pytest.mark.parametrize("changes", [{"robots": 2}, {"shift": 300.0}], ids=str)
+@pytest.mark.parametrize("changes", some([{"robots": 2}, {"shift": 300.0}], every=2), ids=str)
 def test_shared_out_it_is_never_slower_either(changes: dict[str, Any]) -> None:
     from stopgo.mission.stages.division import DividedRoute
 

@@ -17,6 +17,7 @@ from stopgo.planner.floors.linework.swings import swings_of
 from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.units.known_sizes import going_of
 from stopgo.planner.floors.written_measures import area_in, is_only_area, length_in
+from tests.faults.sizes import size
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 real = pytest.mark.skipif(not DATA.is_dir(), reason=f"the real inputs are not in {DATA}")
@@ -81,7 +82,11 @@ def test_a_header_of_millimetres_that_makes_a_house_4_cm_wide_is_doubted(read: R
 @pytest.mark.parametrize("kind", EVIDENCE)
 def test_no_unit_is_believed_that_is_wrong(tmp_path: Path, kind: str) -> None:
     """Six units; evidence that decides is believed, and only where too little is drawn the user is asked."""
-    drawn = [verdict(house(seed, code, kind), code, tmp_path / "a.dxf") for seed in (1, 2) for code in CODES]
+    drawn = [
+        verdict(house(seed, code, kind), code, tmp_path / "a.dxf")
+        for seed in range(1, 1 + size(short=1, full=2))
+        for code in CODES
+    ]
     assert "wrong" not in drawn
     asked = drawn.count("asked")
     assert asked <= (0 if kind in DECISIVE else 3 if kind in TELLING else len(drawn))

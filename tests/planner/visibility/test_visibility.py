@@ -71,7 +71,7 @@ def by_force(found: Candidates, rows: Iterable[int], reach: float) -> np.ndarray
     )
 
 
-@pytest.mark.parametrize(("name", "degrees"), some(TURNED, every=2))
+@pytest.mark.parametrize(("name", "degrees"), some(TURNED, every=4))
 def test_a_real_floor_agrees_with_brute_force(name: str, degrees: float) -> None:
     found = candidates(navigable(moved(shared(name), turned(degrees)), Settings()))
     seen = exact(found)

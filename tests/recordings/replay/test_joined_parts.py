@@ -10,6 +10,7 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.files.mission_json import write
+from tests.faults.sizes import some
 from tests.recordings.truth import disturbances, drives
 from tests.recordings.truth.disturbances import Sensed
 from tests.recordings.truth.drives import Mishap, mission_with_return
@@ -42,7 +43,7 @@ def judged(given: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, s
     return code, json.loads(out)["verdict"] if code != 2 else err
 
 
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda writer: writer.__name__)
+@pytest.mark.parametrize("writer", some(WRITERS, every=3), ids=lambda writer: writer.__name__)
 def test_a_run_in_two_logs_is_one_run(
     writer: Writer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -20,7 +20,7 @@ from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.replay.stop_evidence import stop_evidence
 from stopgo.recordings.replay.unseen_visits import possible_s
-from tests.faults.sizes import size
+from tests.faults.sizes import size, some
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 from tests.recordings.replay.test_replaying import held, log_of
 from tests.recordings.truth.disturbances import sensed
@@ -57,7 +57,7 @@ def test_a_constant_drift_that_explains_every_standstill_is_no_evidence_for_them
     assert drive_verdict(found).answer == "unknown"
 
 
-@pytest.mark.parametrize("turn, scale", [(0.01, 1.0), (0.02, 1.0), (0.0, 1.01), (0.01, 0.99)])
+@pytest.mark.parametrize("turn, scale", some([(0.01, 1.0), (0.02, 1.0), (0.0, 1.01), (0.01, 0.99)], every=2))
 @pytest.mark.parametrize("placing", [THERE, FIRST, Placing(align="stops")], ids=["map", "first", "stops"])
 def test_a_tour_that_was_turned_or_stretched_is_never_a_yes(
     turn: float, scale: float, placing: Placing

@@ -22,7 +22,7 @@ MOST_UNTOLD = 0.1
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("part", range(PARTS))
 def test_no_verdict_on_a_log_is_false(part: int, tmp_path: Path) -> None:
-    every = size(short=29, full=1)
+    every = size(short=47, full=1)
     chosen = list(cases())[part :: PARTS * every]
     found = []
     for number, case in enumerate(chosen):
@@ -37,7 +37,7 @@ def test_no_verdict_on_a_log_is_false(part: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_no_verdict_on_a_log_of_an_autopilots_own_run_is_false(part: int, tmp_path: Path) -> None:
-    every = size(short=23, full=1)
+    every = size(short=37, full=1)
     found = list(auto_answers(tmp_path, every=PARTS * every, first=part * every))
     assert [(item.name, item.text) for item in found if item.kind.startswith("false")] == []
     if every == 1:

@@ -83,7 +83,7 @@ def reason_after(site: Site, does: Does) -> str:
 
 
 @pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
-@pytest.mark.parametrize("does", [manual, manual_by_message, disarmed, jumped_over, set_back])
+@pytest.mark.parametrize("does", some([manual, manual_by_message, disarmed, jumped_over, set_back], every=2))
 def test_a_station_whose_messages_arrive_is_named_for_whatever_it_changes(
     tmp_path: Path, shared: None, profile: str, does: Does
 ) -> None:
@@ -98,7 +98,7 @@ def test_a_station_is_named_by_the_vehicles_answers_alone(
     assert STATION in reason_after(Site(tmp_path, "ardupilot", speed_up=1.0), does)
 
 
-@pytest.mark.parametrize("does", [manual, disarmed, jumped_over])
+@pytest.mark.parametrize("does", some([manual, disarmed, jumped_over], every=2))
 def test_a_station_on_another_line_is_not_known(tmp_path: Path, does: Does) -> None:
     assert UNKNOWN in reason_after(Site(tmp_path, "ardupilot", speed_up=1.0), does)
 

@@ -26,7 +26,7 @@ LONG = real_tour(scan=Scan(profile="default", duration_s=20.0, timeout_s=60.0))
 
 @pytest.mark.parametrize(
     ("profile", "cause"),
-    some([(profile, cause) for profile in ("ardupilot", "px4") for cause in LASTS], every=2),
+    some([(profile, cause) for profile in ("ardupilot", "px4") for cause in LASTS], every=5),
 )
 def test_a_failsafe_that_holds_the_vehicle_is_named_and_resume_waits_for_its_end(
     tmp_path: Path, profile: str, cause: int

@@ -31,7 +31,7 @@ def test_a_run_is_reported_from_start_to_finish(tmp_path: Path) -> None:
     assert min(away) > 0.05 and max(away) < 0.3
 
 
-@pytest.mark.parametrize("profile", some(["ardupilot", "px4", "strict"], every=2))
+@pytest.mark.parametrize("profile", some(["ardupilot", "px4", "strict"], every=3))
 def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: Path) -> None:
     from stopgo.bridge.station.watch import watch_run
 

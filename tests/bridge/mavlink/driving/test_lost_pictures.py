@@ -34,8 +34,10 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return taken
 
 
-@pytest.mark.parametrize("own", [(), (OWN,)])
-@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
+@pytest.mark.parametrize(
+    ("profile", "own"),
+    some([(profile, own) for profile in ("ardupilot", "px4") for own in ((OWN,), ())], every=4),
+)
 def test_a_lost_report_is_requested_of_the_scanner_and_no_stop_is_scanned_twice(
     tmp_path: Path, begun: list[bool], profile: str, own: tuple[VehicleFault, ...]
 ) -> None:
@@ -52,7 +54,7 @@ def test_a_lost_report_is_requested_of_the_scanner_and_no_stop_is_scanned_twice(
 
 
 @pytest.mark.parametrize(
-    ("stall_s", "own"), some([(stall, own) for stall in (10.0, 15.0) for own in ((), (OWN,))], every=3)
+    ("stall_s", "own"), some([(stall, own) for stall in (10.0, 15.0) for own in ((), (OWN,))], every=4)
 )
 def test_a_stall_of_the_link_at_a_trigger_spoils_no_later_scan(
     tmp_path: Path, begun: list[bool], own: tuple[VehicleFault, ...], stall_s: float

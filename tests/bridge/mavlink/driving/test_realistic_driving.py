@@ -40,8 +40,11 @@ def world() -> Iterator[World]:
         yield stepped
 
 
-@pytest.mark.parametrize("profile", some(["ardupilot", "px4"], every=2))
-@pytest.mark.parametrize("changed", [{}, STIFF], ids=["as the log's", "stiff"])
+@pytest.mark.parametrize(
+    ("profile", "changed"),
+    some([(profile, changed) for changed in ({}, STIFF) for profile in ("ardupilot", "px4")], every=4),
+    ids=str,
+)
 def test_stops_of_5_cm_are_reached_in_twice_the_planned_time_and_on_the_legs(
     tmp_path: Path, world: World, profile: str, changed: dict[str, float]
 ) -> None:
@@ -61,7 +64,9 @@ def test_stops_of_5_cm_are_reached_in_twice_the_planned_time_and_on_the_legs(
     assert max(min(_beside(pair, pose) for pair in legs) for pose in poses) < 0.1
 
 
-@pytest.mark.parametrize(("profile", "parameter"), [("ardupilot", "GUID_TIMEOUT"), ("px4", "COM_OF_LOSS_T")])
+@pytest.mark.parametrize(
+    ("profile", "parameter"), some([("ardupilot", "GUID_TIMEOUT"), ("px4", "COM_OF_LOSS_T")], every=2)
+)
 def test_one_that_gives_up_sooner_is_driven_faster_to_its_stops(
     tmp_path: Path, world: World, profile: str, parameter: str
 ) -> None:
@@ -85,7 +90,7 @@ def _beside(leg: Any, pose: Pose) -> float:
 
 
 @pytest.mark.parametrize("profile", some(["px4", "ardupilot"], every=2))
-@pytest.mark.parametrize(("kind", "lasts_s"), [("gap", 0.8), ("gap", 8.0), ("restart", 4.0)])
+@pytest.mark.parametrize(("kind", "lasts_s"), some([("gap", 0.8), ("gap", 8.0), ("restart", 4.0)], every=2))
 def test_a_short_silence_and_a_restart_are_taken_up_by_itself(
     tmp_path: Path, profile: str, kind: VehicleFaultKind, lasts_s: float
 ) -> None:

@@ -91,7 +91,7 @@ DEGREES = (33.3, 70.2, 140.1)
 TURNED = [(name, DEGREES[(k + n) % 3]) for k, name in enumerate((*PAPER, *LAYERED)) for n in range(3)]
 
 
-@pytest.mark.parametrize(("name", "degrees"), some(TURNED, every=4))
+@pytest.mark.parametrize(("name", "degrees"), some(TURNED, every=8))
 def test_each_face_of_a_turned_floor_is_one_edge_of_open_space(name: str, degrees: float) -> None:
     floor = moved(shared(name), turned(degrees))
     seen = at(floor, floor.outline[0].exterior[:1])

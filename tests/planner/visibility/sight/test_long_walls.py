@@ -11,7 +11,7 @@ from stopgo.mission.errors import InputError
 from stopgo.planner.geometry.shapes import GRID, to_grid
 from stopgo.planner.visibility.sight.kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
 from stopgo.planner.visibility.sight.sight import scene_of, sight
-from tests.faults.sizes import size
+from tests.faults.sizes import size, some
 from tests.planner.kernels import machine_code
 from tests.planner.long_walls import RANGES, told
 from tests.planner.visibility.sight.test_sight import World
@@ -19,7 +19,7 @@ from tests.planner.visibility.sight.test_sight import World
 COORDINATE = 2**29
 
 
-@pytest.mark.parametrize("reach", RANGES)
+@pytest.mark.parametrize("reach", some(RANGES, every=2))
 def test_long_walls_are_seen_as_far_as_the_range_and_no_farther(
     reach: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
