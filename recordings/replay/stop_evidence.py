@@ -166,7 +166,7 @@ def _why_unseen(replay: Replay, number: int, errors: PositionErrors, *, halted: 
 def _of_visit(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
     """Return the answer for a stop that the log places the robot at."""
     within, why = _within(item, number, errors), ""
-    if item.disputed_m is not None:
+    if item.is_disputed:
         why = f"{item.disputed_text}; the scan's cloud would show it"
     elif within == "unknown":
         why = DRIFTS if errors.drifts or errors.most_m[number] > 0 else NOISE
