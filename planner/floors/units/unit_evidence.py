@@ -10,9 +10,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from ezdxf.document import Drawing
 from ezdxf.entities import DXFEntity
-from scipy.spatial import cKDTree
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.drawing import BROKEN_INPUT
@@ -235,11 +235,14 @@ def _names_apart(shapes: Iterable[Shape]) -> float | None:
                 continue
             if word.at and names_a_room(word.text, at_home=True):
                 places.append(word.at[0])
-    points = np.unique(np.array(places).reshape(-1, 2), axis=0)
-    if len(points) < _NAMES:
+    xy = np.unique(np.array(places).reshape(-1, 2), axis=0)
+    if len(xy) < _NAMES:
         return None
-    away, _ = cKDTree(points).query(points, k=2)
-    return float(np.median(away[:, 1]))
+    points = shapely.points(xy)
+    _, away = shapely.STRtree(points).query_nearest(
+        points, exclusive=True, return_distance=True, all_matches=False
+    )
+    return float(np.median(away))
 
 
 def _dimensions(shapes: Iterable[Shape]) -> Iterator[Dimension]:
