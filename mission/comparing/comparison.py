@@ -76,7 +76,15 @@ class StopComparison:
     @property
     def is_doubtful(self) -> bool:
         """True if nothing shows for certain that it was scanned, or that it was not."""
-        return self.outcome == "unconfirmed" or self.disputed_m is not None or self.is_open
+        return self.outcome == "unconfirmed" or self.is_disputed or self.is_open
+
+    @property
+    def is_disputed(self) -> bool:
+        """True if its last event and the poses sent meanwhile disagree, and one may be within tolerance."""
+        if self.disputed_m is None:
+            return False
+        least_m = self.disputed_m - (self.deviation_m or 0.0)  # of the poses, from the stop
+        return not (self.outside_tolerance and is_outside(least_m, self.tolerance_m or 0.0))
 
     @property
     def disputed_text(self) -> str:
@@ -88,7 +96,7 @@ class StopComparison:
     @property
     def outside_text(self) -> str:
         """Position error of a scanned or passed stop outside tolerance, in words; empty if within."""
-        if self.disputed_m is not None or self.outcome not in DONE or not self.outside_tolerance:
+        if self.is_disputed or self.outcome not in DONE or not self.outside_tolerance:
             return ""
         return f"{DONE[self.outcome]} {position_error_text(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
 

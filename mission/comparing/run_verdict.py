@@ -58,7 +58,7 @@ def _answer(comparison: Comparison) -> Certainty:
     if comparison.outside:
         return "no"
     if acquired is not None and comparison.mission.share is UNSET:
-        disputed = any(item.disputed_m is not None for item in comparison.asked)
+        disputed = any(item.is_disputed for item in comparison.asked)
         return "unknown" if disputed and acquired.answer == "yes" else acquired.answer
     if any(not item.is_doubtful for item in comparison.missing):
         return "no"
@@ -87,7 +87,7 @@ def _sentences(comparison: Comparison) -> Iterator[str]:
 def _missing_evidence(comparison: Comparison) -> Iterator[str]:
     """Yield what the evidence lacks, and what would supply it."""
     for item in comparison.asked:
-        if item.disputed_m is not None:
+        if item.is_disputed:
             yield f"{item.stop} is undecided: {item.disputed_text}; check the scan's cloud."
     if any(item.outcome == "unconfirmed" for item in comparison.asked):
         yield "The scanner's files would show which of the unconfirmed scans were made."

@@ -29,7 +29,7 @@ def seen_surface(route: Route) -> SeenSurface | None:
             hit = rays.reached(stop, part) * _between_rays(route, stop, part)[:, None]
             seen[part] = np.maximum(seen[part], hit)
     kinds = np.array([item.kind for item in elements])[targets.element[targets.unit_segment]]
-    area = targets.unit_length[:, None] * cells.tall
+    area = targets.unit_length[:, None] * cells.tall * cells.upright[:, None]
     return SeenSurface(
         height_m=scanner_height(route.settings),
         kinds={

@@ -18,6 +18,8 @@ ON_SURFACE_M = 0.02
 """A hit this far before or behind a cell's plane, along its normal, is on the cell."""
 PROBE_M = 0.05
 """Distance from which a cell's surface is looked for."""
+UPRIGHT = 0.05
+"""Height of an upright surface's normal, at most: up to 3° from upright."""
 NONE = -1
 
 
@@ -38,10 +40,17 @@ class ModelScene:
 
     def away(self, origins: FloatArray, directions: FloatArray) -> FloatArray:
         """Distance to the first triangle along each ray (n,); infinite where there is none."""
+        return self._away(self._met(origins, directions), origins, directions)
+
+    def _met(self, origins: FloatArray, directions: FloatArray) -> IntArray:
+        """First triangle along each ray (n,), else NONE."""
         met: IntArray = self._scene.run(
             np.ascontiguousarray(origins, dtype=np.float32),
             np.ascontiguousarray(directions, dtype=np.float32),
         )
+        return met
+
+    def _away(self, met: IntArray, origins: FloatArray, directions: FloatArray) -> FloatArray:
         found = np.full(len(directions), np.inf)
         hit = met != NONE
         normal, a = self._normal[met[hit]], self._a[met[hit]]
@@ -57,6 +66,42 @@ class ModelScene:
             away = self.away(strips.middle + side * PROBE_M * strips.normal, -side * strips.normal)
             found |= np.abs(away - PROBE_M) <= ON_SURFACE_M
         return found
+
+    def normals(self, points: FloatArray, outward: FloatArray) -> FloatArray:
+        """Normals (n, 3) of the surfaces at points, looked for from both sides; 0 where there is none.
+
+        Where an upright and a sloping surface meet, the upright one counts.
+        """
+        found = np.zeros(points.shape)
+        for side in (1.0, -1.0):
+            origins, directions = points + side * PROBE_M * outward, -side * outward
+            met = self._met(origins, directions)
+            on = np.abs(self._away(met, origins, directions) - PROBE_M) <= ON_SURFACE_M
+            better = on & (~found.any(axis=1) | (np.abs(self._normal[met, 2]) < np.abs(found[:, 2])))
+            found[better] = self._normal[met[better]]
+        return found
+
+
+def sloped(strips: Strips, scene: ModelScene, height: float) -> tuple[Strips, BoolArray]:
+    """The strips with those of sloping surfaces laid on them, and True for the units of these (units,).
+
+    A plan draws a sloping wall or a roof as its section at the scanner's height. An upright strip meets the
+    surface there alone; laid on the slope it is what the scanner sees of that unit.
+    """
+    first = strips.first_cell[:-1]
+    level = np.clip(height, strips.low, strips.low + strips.tall)
+    at = np.column_stack([strips.middle[first, :2], level])
+    normal = scene.normals(at, strips.normal[first])
+    across = np.einsum("ij,ij->i", normal, strips.normal[first])
+    slope = (np.abs(normal[:, 2]) > UPRIGHT) & (np.abs(across) > UPRIGHT) & ~strips.under
+    unit = strips.unit_of_cell
+    own = slope[unit]
+    above = strips.middle[own, 2] - level[unit[own]]
+    aside = -above * normal[unit[own], 2] / across[unit[own]]
+    middle, normals = strips.middle.copy(), strips.normal.copy()
+    middle[own] += aside[:, None] * strips.normal[own]
+    normals[own] = normal[unit[own]]
+    return replace(strips, middle=frozen(middle), normal=frozen(normals)), slope
 
 
 def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:

@@ -33,7 +33,7 @@ from stopgo.mission.stages import NavigableSpace, Targets, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE
 from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
-from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model
+from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model, sloped
 from stopgo.planner.scan_simulation.registration import OrientedCloud, registered, surface_of
 from stopgo.planner.scan_simulation.scan_network import network_of
 from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, pose_of, scanned
@@ -103,7 +103,10 @@ def verify(
 def _areas(
     site: _ScanSite, scene: ModelScene, tally: _PointTally, promise: _PromisedCoverage
 ) -> tuple[ProvenArea, ...]:
-    """Area of the promised targets by kind: as the plan claims, and as the model's solids show."""
+    """Area of the promised targets by kind: as the plan claims, and as the model's solids show.
+
+    Like the plan's, the area is that of upright surfaces; sloping ones count by their length alone.
+    """
     surface = None if promise.coverage is None else promise.coverage.surface
     if surface is None or promise.units is None:
         return ()
@@ -111,6 +114,8 @@ def _areas(
     unit = strips.unit_of_cell
     upright = np.abs(strips.normal[:, 2]) < 0.5
     there = scene.existing(strips) & upright & promise.units[unit]
+    if site.sloping is not None:
+        there &= ~site.sloping[unit]
     kind = np.array([item.kind for item in site.space.floor.elements])
     of_cell = kind[targets.element[targets.unit_segment]][unit]
     found = []
@@ -145,14 +150,19 @@ class _ScanSite:
     strips: Strips
     scene: ModelScene | None = None
     """The model's solids, if rays are cast at these."""
+    sloping: BoolArray | None = None
+    """True for units on sloping surfaces of these solids (units,)."""
 
     @classmethod
     def of(cls, space: NavigableSpace, simulation: Simulation, model: ModelSolids | None) -> _ScanSite:
         doors = _closed_doors(space)
         solids = extruded(space.floor, doors, simulation.ceiling_m)
         strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
-        scene = None if model is None else ModelScene(model, solids.origin)
-        return cls(space, simulation, doors, solids, strips, scene)
+        if model is None:
+            return cls(space, simulation, doors, solids, strips)
+        scene = ModelScene(model, solids.origin)
+        strips, sloping = sloped(strips, scene, simulation.height_m)
+        return cls(space, simulation, doors, solids, strips, scene, sloping)
 
     def scanned(self, pose: ScannerPose) -> ScanCount:
         """Simulate one scan, at the model's solids if they are known."""

@@ -155,6 +155,8 @@ class UnitCells:
     low: FloatArray
     """Lower height of each unit's element (n,)."""
     high: FloatArray
+    upright: BoolArray
+    """True for units with an upright face (n,); others, as on a roof, have no area that is counted."""
 
     @classmethod
     def of(cls, space: NavigableSpace, solids: ModelSolids) -> UnitCells:
@@ -164,11 +166,12 @@ class UnitCells:
         bottom = low[:, None] + np.arange(rows) * CELL_M
         top = np.minimum(bottom + CELL_M, high[:, None])
         tall, z = np.maximum(top - bottom, 0.0), (bottom + top) / 2
-        return cls(z, (tall > 1e-9) & _on_faces(space, solids.triangles, z), tall, low, high)
+        on_face, upright = _on_faces(space, solids.triangles, z)
+        return cls(z, (tall > 1e-9) & on_face, tall, low, high, upright)
 
 
-def _on_faces(space: NavigableSpace, triangles: FloatArray, z: FloatArray) -> BoolArray:
-    """True for heights (n, k) of the units at which the model has an upright face: no opening is there.
+def _on_faces(space: NavigableSpace, triangles: FloatArray, z: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """True for heights (n, k) at which the model has an upright face, and for units (n,) that have one.
 
     A unit without any upright face, as on a sloping wall, has all its heights.
     """
@@ -183,8 +186,9 @@ def _on_faces(space: NavigableSpace, triangles: FloatArray, z: FloatArray) -> Bo
     for k in range(z.shape[1]):
         here = (z[unit, k] >= low - ON_FACE_M) & (z[unit, k] <= high + ON_FACE_M)
         found[unit[here], k] = True
-    found[~np.isin(np.arange(len(z)), unit)] = True
-    return found
+    has_face = np.isin(np.arange(len(z)), unit)
+    found[~has_face] = True
+    return found, has_face
 
 
 def _is_upright(triangles: FloatArray) -> BoolArray:

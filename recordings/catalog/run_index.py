@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from stopgo.recordings.page.reviewed import RecordingReview
 
 INDEX = ".stopgo-runs.json"
-VERSION = 1
+VERSION = 2
 """Version of the index; an index of another version is rebuilt."""
 SUFFIX = ".rrd"
 

@@ -85,12 +85,9 @@ def _hidden_jump(replay: Replay, noise_m: float) -> tuple[int, float] | None:
 
 
 def _with_hidden_jump(replay: Replay, number: int, evidence: StopEvidence, hidden_m: float) -> StopEvidence:
-    """Return a yes or no as undecided if a jump in a time without poses may have made it."""
-    item, stop = evidence.item, replay.mission.stops[number]
-    if not hidden_m or evidence.answer == "unknown":
-        return evidence
-    doubtful = evidence.answer == "yes" and is_outside((item.deviation_m or 0.0) + hidden_m, stop.tolerance_m)
-    if not doubtful:
+    """Return a yes as undecided if a jump in a time without poses may have made it."""
+    away_m, limit_m = evidence.item.deviation_m or 0.0, replay.mission.stops[number].tolerance_m
+    if evidence.answer != "yes" or not hidden_m or not is_outside(away_m + hidden_m, limit_m):
         return evidence
     why = f"a time without poses hides a step aside of {hidden_m:.2f} m; give another source of poses"
     return changed(evidence, answer="unknown", why=why)
@@ -169,7 +166,7 @@ def _why_unseen(replay: Replay, number: int, errors: PositionErrors, *, halted: 
 def _of_visit(replay: Replay, number: int, item: StopComparison, errors: PositionErrors) -> StopEvidence:
     """Return the answer for a stop that the log places the robot at."""
     within, why = _within(item, number, errors), ""
-    if item.disputed_m is not None:
+    if item.is_disputed:
         why = f"{item.disputed_text}; the scan's cloud would show it"
     elif within == "unknown":
         why = DRIFTS if errors.drifts or errors.most_m[number] > 0 else NOISE

@@ -66,6 +66,15 @@ def test_a_pose_in_an_event_is_compared_with_the_poses_sent(x: float, answer: st
         assert "3500 mm apart" in comparison_table(run)
 
 
+def test_a_scan_that_both_sources_place_outside_tolerance_is_a_no() -> None:
+    """The event says 0.2 m off S1, the poses 3.5 m: one of both is wrong, and neither is within."""
+    events = (*visit("S1", 0, 4.2, 0), *visit("S2", 70, 4, 3), END)
+    run = compared(*events, poses=line(0, (7.5, 0), (7.5, 0), 64))
+    assert run.stops[0].disputed_m is not None
+    assert judge(run).answer == "no"
+    assert "undecided" not in judge(run).text
+
+
 def test_a_disputed_scan_is_not_counted_as_coverage() -> None:
     mission, sight = planned()
     log = told(

@@ -92,7 +92,17 @@ class House:
 
     def _shape(self, thing: Any, size: Any) -> None:
         x, y, z = (float(value) for value in size)
-        corners = [(i * x, j * y, k * z) for k in (0, 1) for j in (0, 1) for i in (0, 1)]
+        self._mesh(thing, [(i * x, j * y, k * z) for k in (0, 1) for j in (0, 1) for i in (0, 1)])
+
+    def leaning(self, kind: str, name: str, box: Box, aside: float, storey: Any) -> Any:
+        """A box whose top is moved by `aside` metres along x."""
+        thing = self.box(kind, name, box, storey)
+        x, y, z = (float(value) for value in np.subtract(box[3:], box[:3]))
+        self._mesh(thing, [(i * x + k * aside, j * y, k * z) for k in (0, 1) for j in (0, 1) for i in (0, 1)])
+        return thing
+
+    def _mesh(self, thing: Any, corners: list[tuple[float, float, float]]) -> None:
+        """Replace the body of a product by six faces on eight corners."""
         faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
         made = ifcopenshell.api.geometry.add_mesh_representation(
             self.model, context=self._body, vertices=[corners], faces=[faces]

@@ -118,3 +118,30 @@ def test_a_plan_that_claims_more_than_the_model_shows_is_not_met(
     mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
     assert main(["prove", mission, "--floor", floor, "--solids", "model", "--angular-step", "0.5"]) == 1
     assert "area of walls: 100.0 % claimed, the model's solids show" in capsys.readouterr().out
+
+
+def test_a_leaning_wall_is_acquired_where_the_plan_promises_it(
+    read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("embreex")
+    house = two_rooms()
+    bare = planned_walls(read, house, tmp_path)
+    storey = house.model.by_type("IfcBuildingStorey")[0]
+    house.leaning("IfcWall", "leaning", (0.6, 0.2, 0, 0.8, 4.2, 2.8), 0.8, storey)
+    walls = planned_walls(read, house, tmp_path)
+    assert walls["total_m2"] < bare["total_m2"] - 8, "the slope hides the west wall and has no upright area"
+    capsys.readouterr()
+    mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
+    step = ["--angular-step", "0.5", "--json"]
+    assert main(["prove", mission, "--floor", floor, "--solids", "model", *step]) == 0
+    proof = json.loads(capsys.readouterr().out)
+    (area,) = [item for item in proof["areas"] if item["kind"] == "walls"]
+    assert area["claimed"] == pytest.approx(area["shown"], abs=0.02)
+    assert area["total_m2"] == pytest.approx(area["claimed_m2"], rel=0.05)
+    (promised,) = [item for item in proof["kinds"] if item["name"] == "walls"]
+    assert promised["kept"] == pytest.approx(promised["promised"], abs=0.1)
+
+
+def planned_walls(read: Read, house: House, tmp_path: Path) -> dict:
+    read(house)
+    return planned(tmp_path / "house.ifc", "--coverage", "1")["kinds"]["walls"]
