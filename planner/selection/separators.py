@@ -9,17 +9,18 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
 
 
 def components_of(links: csr_array, rows: IntArray) -> list[IntArray]:
     """Connected components of the rows, the largest first, then by the lowest row."""
-    rows = np.unique(rows).astype(np.int64)
+    rows = _without(links, rows)
     if not len(rows):
         return []
-    count, label = connected_components(links[rows][:, rows], directed=False)
-    found = [rows[label == k] for k in range(count)]
+    _, label = connected_components(links[rows][:, rows], directed=False)
+    ends = np.cumsum(np.bincount(label))
+    found = np.split(rows[np.argsort(label, kind="stable")], ends[:-1])
     return sorted(found, key=lambda component: (-len(component), int(component[0])))
 
 
@@ -109,17 +110,35 @@ def _separators(
         elsewhere = np.concatenate([np.empty(0, np.int64), *regions[:k], *regions[k + 1 :]])
         inner = components_of(links, np.intersect1d(rows, region))
         for component in inner if len(inner) > 1 else []:
-            others = np.setdiff1d(np.concatenate(inner), component)
-            for beyond in components_of(links, np.setdiff1d(region, neighbours(links, component))):
-                if np.intersect1d(beyond, others).size:
+            is_other = _mask(links, *inner)
+            is_other[component] = False
+            others = np.flatnonzero(is_other)
+            for beyond in components_of(links, _without(links, region, neighbours(links, component))):
+                if is_other[beyond].any():
                     between = neighbours(links, beyond)
-                    here = np.setdiff1d(region, np.union1d(beyond, between))
+                    here = _without(links, region, beyond, between)
                     yield NodeSeparator(between, here, beyond, elsewhere), component, others
 
 
 def neighbours(links: csr_array, rows: IntArray) -> IntArray:
     """Other rows that have a link to one of these."""
-    return np.setdiff1d(links[rows].indices, rows).astype(np.int64)
+    return _without(links, links[rows].indices, rows)
+
+
+def _without(links: csr_array, rows: IntArray, *others: IntArray) -> IntArray:
+    """The rows that are in none of the others, once each and ascending."""
+    kept = _mask(links, rows)
+    for some in others:
+        kept[some] = False
+    return np.flatnonzero(kept).astype(np.int64)
+
+
+def _mask(links: csr_array, *sets: IntArray) -> BoolArray:
+    """True for each row that is in one of the sets (all rows,)."""
+    found = np.zeros(links.shape[0], dtype=bool)
+    for some in sets:
+        found[some] = True
+    return found
 
 
 def meets(cover: Cover, rows: IntArray) -> bool:
