@@ -70,14 +70,16 @@ class House:
         ifcopenshell.api.aggregate.assign_object(self.model, relating_object=self.building, products=[storey])
         return storey
 
-    def box(self, kind: str, name: str, box: Box, storey: Any = None, **said: Any) -> Any:
-        """A product that is a box, placed at its lowest corner."""
+    def box(
+        self, kind: str, name: str, box: Box, storey: Any = None, *, aside: float = 0.0, **said: Any
+    ) -> Any:
+        """A product that is a box, placed at its lowest corner; its top is moved by `aside` metres along x."""
         thing = self._make(kind, name)
         for key, value in said.items():
             setattr(thing, key, value)
         self._place(thing, box[:3])
         size = np.subtract(box[3:], box[:3])
-        self._shape(thing, size)
+        self._shape(thing, size, aside)
         if kind == "IfcSpace":
             ifcopenshell.api.aggregate.assign_object(self.model, relating_object=storey, products=[thing])
         elif storey is not None:
@@ -90,19 +92,9 @@ class House:
         matrix[:3, 3] = at
         ifcopenshell.api.geometry.edit_object_placement(self.model, product=thing, matrix=matrix)
 
-    def _shape(self, thing: Any, size: Any) -> None:
+    def _shape(self, thing: Any, size: Any, aside: float = 0.0) -> None:
         x, y, z = (float(value) for value in size)
-        self._mesh(thing, [(i * x, j * y, k * z) for k in (0, 1) for j in (0, 1) for i in (0, 1)])
-
-    def leaning(self, kind: str, name: str, box: Box, aside: float, storey: Any) -> Any:
-        """A box whose top is moved by `aside` metres along x."""
-        thing = self.box(kind, name, box, storey)
-        x, y, z = (float(value) for value in np.subtract(box[3:], box[:3]))
-        self._mesh(thing, [(i * x + k * aside, j * y, k * z) for k in (0, 1) for j in (0, 1) for i in (0, 1)])
-        return thing
-
-    def _mesh(self, thing: Any, corners: list[tuple[float, float, float]]) -> None:
-        """Replace the body of a product by six faces on eight corners."""
+        corners = [(i * x + k * aside, j * y, k * z) for k in (0, 1) for j in (0, 1) for i in (0, 1)]
         faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
         made = ifcopenshell.api.geometry.add_mesh_representation(
             self.model, context=self._body, vertices=[corners], faces=[faces]

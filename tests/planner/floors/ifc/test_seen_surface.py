@@ -127,7 +127,7 @@ def test_a_leaning_wall_is_acquired_where_the_plan_promises_it(
     house = two_rooms()
     bare = planned_walls(read, house, tmp_path)
     storey = house.model.by_type("IfcBuildingStorey")[0]
-    house.leaning("IfcWall", "leaning", (0.6, 0.2, 0, 0.8, 4.2, 2.8), 0.8, storey)
+    house.box("IfcWall", "leaning", (0.6, 0.2, 0, 0.8, 4.2, 2.8), storey, aside=0.8)
     walls = planned_walls(read, house, tmp_path)
     assert walls["total_m2"] < bare["total_m2"] - 8, "the slope hides the west wall and has no upright area"
     capsys.readouterr()
@@ -139,6 +139,7 @@ def test_a_leaning_wall_is_acquired_where_the_plan_promises_it(
     assert area["claimed"] == pytest.approx(area["shown"], abs=0.02)
     assert area["total_m2"] == pytest.approx(area["claimed_m2"], rel=0.05)
     (promised,) = [item for item in proof["kinds"] if item["name"] == "walls"]
+    assert promised["beyond"] < 1, "the far side of the wall is not acquired"
     assert promised["kept"] == pytest.approx(promised["promised"], abs=0.1)
 
 
