@@ -73,7 +73,7 @@ class House:
     def box(
         self, kind: str, name: str, box: Box, storey: Any = None, *, aside: float = 0.0, **said: Any
     ) -> Any:
-        """A product that is a box, placed at its lowest corner; its top is moved by `aside` metres along x."""
+        """A box, placed at its lowest corner; its top is moved by `aside` metres along x."""
         thing = self._make(kind, name)
         for key, value in said.items():
             setattr(thing, key, value)
