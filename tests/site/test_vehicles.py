@@ -36,9 +36,10 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Site:
 
 
 @pytest.fixture
-def fleet(site: Site, tmp_path: Path) -> Iterator[SiteFleet]:
-    """The site's vehicle on a page that may arm it."""
-    options, stopped = SiteOptions(tmp_path, "", commander="anna", timeout_s=1.0), threading.Event()
+def fleet(site: Site, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[SiteFleet]:
+    """The site's vehicle on a page that may arm it, and waits 1 s for an answer, or as long as is asked."""
+    timeout_s, stopped = getattr(request, "param", 1.0), threading.Event()
+    options = SiteOptions(tmp_path, "", commander="anna", timeout_s=timeout_s)
     made = SiteFleet(Switchboard().link(), options, None, EventFeed(), SiteFiles.at(tmp_path), stopped)
     made.add_vehicle("rover", RosterVehicle(mavlink=str(site.url), vehicle=1, arm=True, set_origin=True))
     yield made
@@ -63,6 +64,7 @@ def shown(fleet: SiteFleet) -> dict[str, Any]:
     return fleet.feed.value("robot", "rover") or {}
 
 
+@pytest.mark.parametrize("fleet", [LAST_RESORT_S], indirect=True)
 def test_a_vehicle_is_pushed_to_started_stopped_and_resumed(site: Site, fleet: SiteFleet) -> None:
     orders, feed = fleet.orders, fleet.feed
     with site.up():
