@@ -71,7 +71,9 @@ class KilledClock(SimulatedClock):
             raise PowerCut
 
 
-def killed_run(mission: Mission, seed: int, *, waits_s: float = 0.0) -> tuple[list[PoseReport | AnyEvent], float]:
+def killed_run(
+    mission: Mission, seed: int, *, waits_s: float = 0.0
+) -> tuple[list[PoseReport | AnyEvent], float]:
     """The reports of a run in the order of sending, and the metres that the robot truly drove.
 
     After the restart the robot stands for some time until it is told to go on.
