@@ -22,7 +22,7 @@ MOST_STEPS = 1000
 """Number of last steps that show the robot's usual one."""
 
 
-Pose = tuple[int, float, float, float]
+TimedPose = tuple[int, float, float, float]
 """Time in nanoseconds, x, y and heading."""
 
 
@@ -34,13 +34,13 @@ class Thinner:
     """
 
     def __init__(self) -> None:
-        self._kept: Pose | None = None
-        self._held: Pose | None = None
+        self._kept: TimedPose | None = None
+        self._held: TimedPose | None = None
         """Newest pose, if it is left out so far."""
 
     def thin(self, track: Track) -> Track:
         """Return the poses to keep, the held one of the track before among them."""
-        kept: list[Pose] = []
+        kept: list[TimedPose] = []
         for pose in zip(track.ns.tolist(), *track.xy.T.tolist(), track.heading.tolist(), strict=True):
             if self._held is not None and self._is_late(pose):
                 kept.append(self._keep(self._held))
@@ -54,24 +54,24 @@ class Thinner:
         """Return the newest pose if it was left out, else none; from then on it is kept."""
         return _track([] if self._held is None else [self._keep(self._held)])
 
-    def _keep(self, pose: Pose) -> Pose:
+    def _keep(self, pose: TimedPose) -> TimedPose:
         self._kept, self._held = pose, None
         return pose
 
-    def _is_late(self, pose: Pose) -> bool:
+    def _is_late(self, pose: TimedPose) -> bool:
         """True if a pose is too long after the last kept one, or the clock went back."""
         assert self._kept is not None
         return not 0 <= pose[0] - self._kept[0] <= KEPT_S * 1e9
 
 
-def _same(a: Pose, b: Pose) -> bool:
+def _same(a: TimedPose, b: TimedPose) -> bool:
     return (
         math.hypot(b[1] - a[1], b[2] - a[2]) < SAME_M
         and abs(math.remainder(b[3] - a[3], math.tau)) < SAME_RAD
     )
 
 
-def _track(poses: list[Pose]) -> Track:
+def _track(poses: list[TimedPose]) -> Track:
     ns = frozen([pose[0] for pose in poses], np.int64)
     xy = np.array([pose[1:3] for pose in poses], dtype=np.float64).reshape(-1, 2)
     return Track(ns, frozen(xy), frozen([pose[3] for pose in poses]))
