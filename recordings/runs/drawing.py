@@ -103,9 +103,16 @@ class RunDrawing:
         All poses are of one boot; no path joins the poses of two.
         """
         if boot_id != self._boot_id:
-            self._trail.end()
+            self._end_path()
             self._boot_id = boot_id
-        poses = self._thinner.thin(track)
+        self._draw_poses(self._thinner.thin(track))
+
+    def _end_path(self) -> None:
+        """Draw the newest pose, even if nothing moved; no path joins it and the next one."""
+        self._draw_poses(self._thinner.held())
+        self._trail.end()
+
+    def _draw_poses(self, poses: Track) -> None:
         if not len(poses):
             return
         if self._last_xy is None:
@@ -114,7 +121,7 @@ class RunDrawing:
             draw_robot(draw, *robots, radius=self.mission.robot.radius, colour=palette.DRIVEN)
         self._move(poses)
         self._extend_path(poses)
-        self._cross_track.poses(poses, boot_id)
+        self._cross_track.poses(poses, self._boot_id)
         self._last_xy = poses.xy[-1]
 
     def state(self, report: StateReport) -> None:
@@ -151,7 +158,7 @@ class RunDrawing:
     def missing(self, gap: PosesMissing) -> None:
         """Log how long the robot's position was unknown; its path ends before, and begins again after."""
         self.read_start_time(gap)
-        self._trail.end()
+        self._end_path()
         line = rr.TextLog(gap.words, level="WARN")
         self._at(self.names.log, line, gap.robot_ns)
 
@@ -279,7 +286,9 @@ class RunDrawing:
         self._at(self.names.solid(entities.UNSEEN), rr.LineStrips3D(raised), gap.end_ns)
 
     def measure(self, until_ns: int | None = None) -> None:
-        """Plot the cross-track error, up to a time until which all events are known."""
+        """Plot the cross-track error, up to a time until which all events are known, or of all poses."""
+        if until_ns is None:
+            self._draw_poses(self._thinner.held())
         ns, errors_m = self._cross_track.measured(until_ns)
         known = np.isfinite(errors_m)
         if known.any():

@@ -22,33 +22,59 @@ MOST_STEPS = 1000
 """Number of last steps that show the robot's usual one."""
 
 
+TimedPose = tuple[int, float, float, float]
+"""Time in nanoseconds, x, y and heading."""
+
+
 class Thinner:
-    """Leaves out poses that equal the one before, over any number of tracks."""
+    """Leaves out poses that equal the one before, over any number of tracks.
+
+    Where all steps of a robot are shorter than `KEPT_S`, those of the kept poses are, too; a longer one keeps
+    both its ends. So the kept poses have the gaps of all poses.
+    """
 
     def __init__(self) -> None:
-        self._last: tuple[int, float, float, float] | None = None
+        self._kept: TimedPose | None = None
+        self._held: TimedPose | None = None
+        """Newest pose, if it is left out so far."""
 
     def thin(self, track: Track) -> Track:
-        """Return the poses that differ from the last one returned."""
-        indices = []
-        last = self._last
-        rows = zip(track.ns.tolist(), *track.xy.T.tolist(), track.heading.tolist(), strict=True)
-        for index, pose in enumerate(rows):
-            if last is None or not _same(last, pose):
-                indices.append(index)
-                last = pose
-        self._last = last
-        return Track(
-            frozen(track.ns[indices], np.int64), frozen(track.xy[indices]), frozen(track.heading[indices])
-        )
+        """Return the poses to keep, the held one of the track before among them."""
+        kept: list[TimedPose] = []
+        for pose in zip(track.ns.tolist(), *track.xy.T.tolist(), track.heading.tolist(), strict=True):
+            if self._held is not None and self._is_late(pose):
+                kept.append(self._keep(self._held))
+            if self._kept is None or self._is_late(pose) or not _same(self._kept, pose):
+                kept.append(self._keep(pose))
+            else:
+                self._held = pose
+        return _track(kept)
+
+    def held(self) -> Track:
+        """Return the newest pose if it was left out, else none; from then on it is kept."""
+        return _track([] if self._held is None else [self._keep(self._held)])
+
+    def _keep(self, pose: TimedPose) -> TimedPose:
+        self._kept, self._held = pose, None
+        return pose
+
+    def _is_late(self, pose: TimedPose) -> bool:
+        """True if a pose is too long after the last kept one, or the clock went back."""
+        assert self._kept is not None
+        return not 0 <= pose[0] - self._kept[0] <= KEPT_S * 1e9
 
 
-def _same(a: tuple[int, float, float, float], b: tuple[int, float, float, float]) -> bool:
+def _same(a: TimedPose, b: TimedPose) -> bool:
     return (
-        b[0] - a[0] < KEPT_S * 1e9
-        and math.hypot(b[1] - a[1], b[2] - a[2]) < SAME_M
+        math.hypot(b[1] - a[1], b[2] - a[2]) < SAME_M
         and abs(math.remainder(b[3] - a[3], math.tau)) < SAME_RAD
     )
+
+
+def _track(poses: list[TimedPose]) -> Track:
+    ns = frozen([pose[0] for pose in poses], np.int64)
+    xy = np.array([pose[1:3] for pose in poses], dtype=np.float64).reshape(-1, 2)
+    return Track(ns, frozen(xy), frozen([pose[3] for pose in poses]))
 
 
 @dataclass(frozen=True, eq=False)

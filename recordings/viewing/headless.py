@@ -119,6 +119,25 @@ def wait_until(condition: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
+def take_picture(client: ViewerClient, view: str, path: Path) -> None:
+    """Write a PNG of one view; a viewer that is too busy to draw at once is asked again.
+
+    Raises
+    ------
+    InputError
+        When the viewer does not draw it.
+    """
+
+    def is_taken() -> bool:
+        try:
+            client.save_screenshot(str(path), view)
+        except TimeoutError:  # the limit of the viewer, too short on a loaded machine
+            return False
+        return True
+
+    wait_until(is_taken)
+
+
 def container(parts: Blueprint, path: str) -> dict[str, Any]:
     """Return the part of a layout about tabs, a row, a column or a grid; empty for other parts."""
     found: dict[str, Any] = parts.get(path, {}).get("ContainerBlueprint", {})
@@ -159,7 +178,7 @@ def _pictures(client: ViewerClient, folder: Path) -> Iterator[tuple[str, bytes]]
         name = view_name(parts, f"/{part}") or "view"
         _go_to_the_end(client, name)
         path = folder / "view.png"
-        client.save_screenshot(str(path), part.partition("/")[2])
+        take_picture(client, part.partition("/")[2], path)
         yield name, path.read_bytes()
 
 

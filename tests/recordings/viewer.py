@@ -14,6 +14,7 @@ from stopgo.recordings.viewing.headless import (
     container,
     has_vulkan,
     outermost,
+    take_picture,
     view_name,
     viewer,
 )
@@ -41,7 +42,7 @@ def look(client: ViewerClient, tab: str, into: Path) -> dict[str, tuple[View, Pa
     for view in client.get_state().views:
         if view.view_id in shown:
             pictures[view.view_id] = into / f"{view.view_id}.png"
-            client.save_screenshot(str(pictures[view.view_id]), view.view_id)
+            take_picture(client, view.view_id, pictures[view.view_id])
     views = [view for view in client.get_state().views if view.view_id in shown]
     return {view.name: (view, pictures[view.view_id]) for view in views}
 

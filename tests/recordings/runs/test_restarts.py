@@ -13,10 +13,12 @@ import pytest
 
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.command_line import main
+from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import write
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport
+from stopgo.recordings.embedded.reading import read_recording
 from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.world import Field
 from tests.faults.sizes import size
@@ -69,8 +71,13 @@ class KilledClock(SimulatedClock):
             raise PowerCut
 
 
-def killed_run(mission: Mission, seed: int) -> tuple[list[PoseReport | AnyEvent], float]:
-    """The reports of a run in the order of sending, and the metres that the robot truly drove."""
+def killed_run(
+    mission: Mission, seed: int, *, waits_s: float = 0.0
+) -> tuple[list[PoseReport | AnyEvent], float]:
+    """The reports of a run in the order of sending, and the metres that the robot truly drove.
+
+    After the restart the robot stands for some time until it is told to go on.
+    """
     chance = random.Random(seed)
     clock = KilledClock(chance.uniform(8.0, 20.0))
     robot = Field(clock=clock)
@@ -85,6 +92,7 @@ def killed_run(mission: Mission, seed: int) -> tuple[list[PoseReport | AnyEvent]
         robot.base._stand(clock.last)  # a real one does not go back when its program ends
         clock.jump(-chance.uniform(5.0, 30.0))
         robot.boot()
+    clock.wait(waits_s)
     assert robot.order("resume").outcome == "ok"
     robot.work()
     return list(in_order(robot.journal.events(), clock.reports)), clock.driven_m
@@ -126,3 +134,23 @@ def test_a_killed_robot_drove_what_it_drove(
     replayed = json.loads(capsys.readouterr().out)
     assert replayed["way"]["driven_m"] == pytest.approx(truth_m, rel=0.01)
     assert [gap["restarted"] for gap in replayed["run"]["gaps"]] == [True]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_recording_shows_the_gaps_that_were_watched(seed: int, tmp_path: Path) -> None:
+    """A recording leaves out poses of a standstill, of which there are many after this restart."""
+    mission = wandering(seed, stops=5)
+    reports, _ = killed_run(mission, seed, waits_s=40.0)
+    path = tmp_path / "field.rrd"
+    with FieldRecording(path, mission) as recording:
+        collector = RunCollector(recording)
+        collector.mission(mission)
+        for report in reports:
+            tell(collector, report)  # type: ignore[arg-type]
+    watched = collector.compared()
+    assert watched is not None
+    (log,) = read_recording(path).logs
+    assert len(log.poses) < 0.7 * len(watched.log.poses)
+    recorded = compare(log, [mission])
+    assert recorded.sighted.gaps == watched.sighted.gaps
+    assert recorded.sighted.seen_m == pytest.approx(watched.sighted.seen_m, abs=0.01)
