@@ -247,7 +247,7 @@ class PlanProof:
     areas: tuple[ProvenArea, ...] = ()
     """By kind, if rays were cast at the model's solids."""
     accuracy_mm: float | None = None
-    """Greatest position error that is asked for; None if none is."""
+    """Required accuracy; None if none is required."""
 
     @cached_property
     def unmet(self) -> tuple[str, ...]:
@@ -302,7 +302,7 @@ def _short_pairs(proof: PlanProof) -> list[str]:
 
 
 def _short_errors(proof: PlanProof) -> list[str]:
-    """Return the stops whose position error exceeds the accuracy that is asked for."""
+    """Return the stops whose position error exceeds the required accuracy."""
     asked = math.inf if proof.accuracy_mm is None else proof.accuracy_mm
     return [
         f"{stop}: position error {1000 * error:.1f} mm, {asked:g} mm required"
