@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -184,8 +185,21 @@ class ScanNetwork:
     closing_m: float | None
     """Greatest closing error round a loop of registered pairs; None without a loop."""
     closing_deg: float | None
-    adrift_m: float
-    """Position error of the worst stop, relative to the first stop of its component."""
+    errors_m: dict[str, float]
+    """Position error of each stop after the adjustment of all pairs that register, in the frame of `frame`,
+    else of its component's first stop."""
+    frame: str | None = None
+    """Stop whose frame the mission's predicted errors are in; None if there is no such stop."""
+
+    @property
+    def worst(self) -> str:
+        """The stop with the greatest position error."""
+        return max(self.errors_m, key=self.errors_m.__getitem__)
+
+    @property
+    def adrift_m(self) -> float:
+        """Position error of the worst stop."""
+        return self.errors_m[self.worst]
 
     @property
     def closed(self) -> bool:
@@ -232,12 +246,14 @@ class PlanProof:
     clouds: tuple[ScanCloud, ...] = ()
     areas: tuple[ProvenArea, ...] = ()
     """By kind, if rays were cast at the model's solids."""
+    accuracy_mm: float | None = None
+    """Required accuracy; None if none is required."""
 
     @cached_property
     def unmet(self) -> tuple[str, ...]:
         """Promises of the plan that the simulation does not meet, in words."""
         parts = (*_short_whole(self), *_short_parts(self), *_short_areas(self))
-        return (*parts, *_short_stops(self), *_short_pairs(self))
+        return (*parts, *_short_stops(self), *_short_pairs(self), *_short_errors(self))
 
     @property
     def met(self) -> bool:
@@ -282,6 +298,16 @@ def _short_pairs(proof: PlanProof) -> list[str]:
         f"{item.a} and {item.b}: planned to register, but do not"
         for item in promised
         if frozenset((item.a, item.b)) not in good
+    ]
+
+
+def _short_errors(proof: PlanProof) -> list[str]:
+    """Return the stops whose position error exceeds the required accuracy."""
+    asked = math.inf if proof.accuracy_mm is None else proof.accuracy_mm
+    return [
+        f"{stop}: position error {1000 * error:.1f} mm, {asked:g} mm required"
+        for stop, error in proof.network.errors_m.items()
+        if 1000 * error > asked
     ]
 
 

@@ -22,6 +22,7 @@ from stopgo.mission.proof.plan_proof import (
     Simulation,
 )
 from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.network import error_limits
 
 SCHEMA = "stopgo/proof"
 VERSION = 1
@@ -73,6 +74,8 @@ def _network_json(network: ScanNetwork) -> dict[str, Any]:
         "closing_m": network.closing_m,
         "closing_deg": network.closing_deg,
         "adrift_m": network.adrift_m,
+        "frame": network.frame,
+        "errors_m": {stop: round(error, 6) for stop, error in network.errors_m.items()},
         "pairs": [_pair(item) for item in network.pairs],
     }
 
@@ -173,12 +176,26 @@ def network_words(proof: PlanProof) -> list[str]:
             f"loops close to {1000 * network.closing_m:.1f} mm and {network.closing_deg or 0.0:.3f}°"
         )
     if network.registered:
-        lines.append(f"the worst stop has a position error of {1000 * network.adrift_m:.1f} mm")
+        lines += error_words(proof)
     if not network.closed:
         lines += [f"connected: {', '.join(piece)}" for piece in network.pieces if len(piece) > 1]
         alone = [piece[0] for piece in network.pieces if len(piece) == 1]
         lines += [f"not connected: {', '.join(alone)}"] if alone else []
     return lines
+
+
+def error_words(proof: PlanProof) -> list[str]:
+    """Return the lines on the position errors of the stops, and on how many are as small as predicted."""
+    network, limits = proof.network, error_limits(proof.mission)
+    frame = "" if network.frame is None else f" in the frame of {network.frame}"
+    error = f"{1000 * network.adrift_m:.1f} mm"
+    worst = f"the worst stop, {network.worst}, has a position error of {error}{frame}"
+    if network.frame is None or not limits:
+        return [worst]
+    within = sum(network.errors_m[stop] <= limit for stop, limit in limits.items())
+    greatest = 1000 * max(limits.values())
+    predicted = f"predicted: at most {greatest:.1f} mm with a probability of 99 %"
+    return [worst, f"{predicted}; {within} of {len(limits)} stops are within their own prediction"]
 
 
 def pair_words(pair: ScanPair) -> str:

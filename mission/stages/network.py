@@ -23,6 +23,9 @@ ELLIPSE_POINTS = 49
 FLOOR_M = 0.4e-3
 """Registration error that no length of wall averages out: that of the thinned cloud, metres."""
 
+CONFIDENCE = 2.576
+"""Standard deviations that a normal error exceeds, to either side, once in 100."""
+
 
 def predicted_error_m(hold_m: float) -> float:
     """Return the predicted standard deviation of a pair in its weakest direction, metres."""
@@ -104,6 +107,18 @@ def magnified_errors(mission: Mission, *, most_m: float) -> MagnifiedErrors | No
         outlines[stop.id] = np.stack([stop.x + cos * x - sin * y, stop.y + sin * x + cos * y], axis=1)
         words[stop.id] = error_in_words(stop)
     return MagnifiedErrors(factor, outlines, words)
+
+
+def frame_of(mission: Mission) -> str | None:
+    """Return the stop that holds the frame of the predicted errors; None if no stop does."""
+    exact = [stop.id for stop in mission.stops if stop.error and stop.error.major_m == 0]
+    return exact[0] if len(exact) == 1 else None
+
+
+def error_limits(mission: Mission) -> dict[str, float]:
+    """Return the predicted position error of each stop's scan with a probability of 0.99, metres."""
+    claimed = {stop.id: stop.error for stop in mission.stops if stop.error}
+    return {stop: CONFIDENCE * error.major_m for stop, error in claimed.items()}
 
 
 def error_in_words(stop: Stop) -> str:

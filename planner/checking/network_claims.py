@@ -16,11 +16,11 @@ from stopgo.mission.document import Mission, Stop, mission_id
 from stopgo.mission.document.problems import Problem
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
-from stopgo.mission.stages.network import network_of
+from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_of
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
-from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, links_of
+from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
 from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.overlap.network_error import (
@@ -95,8 +95,9 @@ def _understated_errors(mission: Mission, space: NavigableSpace) -> Iterator[Pro
     claimed = {k: stop.error for k, stop in enumerate(mission.stops) if stop.error is not msgspec.UNSET}
     if not claimed:
         return
-    exact = [k for k, error in claimed.items() if error.major_m == 0]
-    counted = error_ellipses(_covariances(mission, space, exact if len(exact) == 1 else ()))
+    frame = frame_of(mission)
+    anchors = [k for k, stop in enumerate(mission.stops) if stop.id == frame]
+    counted = error_ellipses(_covariances(mission, space, anchors))
     for k, error in claimed.items():
         for axis, key in enumerate(("major_m", "minor_m")):
             claim, found = getattr(error, key), counted[k, axis]

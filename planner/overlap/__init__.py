@@ -7,14 +7,13 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import Candidates
+from stopgo.mission.stages.network import CONFIDENCE
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.pairs import FLOOR_M, NOISE_M, Overlaps, Pairs
 
 ACCURACY_M = 0.01
 """Error that a registered pair may have, also at LEVER_M from the scanner."""
-CONFIDENCE = 2.576
-"""Standard deviations that a normal error exceeds, to either side, once in 100."""
 LEAST_HOLD_M = round((CONFIDENCE * NOISE_M) ** 2 / (ACCURACY_M**2 - (CONFIDENCE * FLOOR_M) ** 2), 4)
 """Least registration strength of a pair: metres of wall that face its weakest direction."""
 LEAST_COMMON_M = 1.0

@@ -17,10 +17,10 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState, Route
 from stopgo.mission.stages.figures import percent
-from stopgo.mission.stages.network import Network
+from stopgo.mission.stages.network import CONFIDENCE, Network
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.overlap import CONFIDENCE, LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
+from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.overlap.network_error import error_ellipses, information_of, network_errors

@@ -97,6 +97,8 @@ class Registered:
     pair: ScanPair
     there: FloatArray
     """(4, 4)."""
+    information: FloatArray
+    """Normal matrix of the common surfaces for x, y and heading about the first scanner (3, 3)."""
 
 
 def registered(
@@ -155,6 +157,17 @@ class _CloudPair:
         fraction, direction = self.weakest
         return None if fraction >= WEAKEST else direction
 
+    @property
+    def information(self) -> FloatArray:
+        """N = Σ j jᵀ (3, 3), j = (nx, ny, p × n): shared points p of the first cloud, and their normals n.
+
+        It is the Hessian of point-to-plane registration in the plane (Censi, ICRA 2007).
+        """
+        at, facing = (part[self.shared[0]][:, :2] for part in (self.one.points, self.one.normals))
+        arm = at[:, 0] * facing[:, 1] - at[:, 1] * facing[:, 0]
+        rows = np.column_stack([facing, arm])
+        return np.asarray(rows.T @ rows)
+
     def moved_m(self, simulation: Simulation) -> float:
         """Distance by which the error of the robot's pose moves the farthest shared points."""
         shared = np.linalg.norm(self.other.points[self.shared[1]], axis=1)
@@ -207,7 +220,7 @@ def _registered(
         least_error_m=min(error[0] for error in errors),
         starts=len(errors),
     )
-    return Registered(pair, ends[worst])
+    return Registered(pair, ends[worst], two.information)
 
 
 def _starts(two: _CloudPair, simulation: Simulation, pair: tuple[int, int]) -> list[FloatArray]:

@@ -35,7 +35,7 @@ from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
 from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model, sloped
 from stopgo.planner.scan_simulation.registration import OrientedCloud, registered, surface_of
-from stopgo.planner.scan_simulation.scan_network import network_of
+from stopgo.planner.scan_simulation.scan_network import scan_network
 from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, pose_of, scanned
 from stopgo.planner.scan_simulation.strips import Strips, strips_of
 from stopgo.planner.scan_simulation.unit_requirements import UnitRequirements
@@ -96,7 +96,7 @@ def verify(
         pairs.append(pair)
         say(f"registering pairs of scans, {len(pairs)} done")
     promise = _PromisedCoverage.of(mission, space, coverage)
-    proof = _proof(mission, site, tally, promise, network_of(names, positions, pairs), clouds)
+    proof = _proof(mission, site, tally, promise, scan_network(mission, positions, pairs), clouds)
     return proof if site.scene is None else replace(proof, areas=_areas(site, site.scene, tally, promise))
 
 
@@ -222,6 +222,7 @@ def _proof(
         quality=tally.quality(),
         network=network,
         clouds=tuple(clouds),
+        accuracy_mm=settings.accuracy,
     )
 
 

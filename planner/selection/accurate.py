@@ -12,8 +12,9 @@ import numpy as np
 
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.stages import Selection
+from stopgo.mission.stages.network import CONFIDENCE
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.overlap import CONFIDENCE, overlaps_of, registers
+from stopgo.planner.overlap import overlaps_of, registers
 from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.overlap.network_error import information_of, network_errors, worst_errors
 from stopgo.planner.selection import cover_problem, coverage_steps

@@ -14,11 +14,11 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.plan import PartPlan
 from stopgo.mission.settings import PARAMETERS, Settings
+from stopgo.mission.stages.network import CONFIDENCE
 from stopgo.planner import plan
 from stopgo.planner.checking.network_claims import network_overclaims
 from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.overlap import CONFIDENCE
 from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.overlap.network_error import TARGET_M, network_errors, worst_errors
 from stopgo.planner.overlap.registered import predicted_errors

@@ -12,9 +12,10 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
+from stopgo.mission.stages.network import CONFIDENCE
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
-from stopgo.planner.overlap import ACCURACY_M, CONFIDENCE, LEAST_HOLD_M, links_of, overlaps_of
+from stopgo.planner.overlap import ACCURACY_M, LEAST_HOLD_M, links_of, overlaps_of
 from stopgo.planner.overlap.boundary import MOST_SPACING_M
 from stopgo.planner.overlap.pairs import EDGE_M, LEVER_M, error_of
 from stopgo.planner.space.navigable import navigable

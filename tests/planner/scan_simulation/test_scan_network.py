@@ -1,0 +1,93 @@
+"""Simulated pairs of scans: components, and position errors after the adjustment of all pairs together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace as changed
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from stopgo.mission.document import PositionError
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.proof.plan_proof import ScanPair
+from stopgo.mission.settings import Settings
+from stopgo.planner.scan_simulation.registration import Registered
+from stopgo.planner.scan_simulation.scan_network import scan_network
+from tests.mission.worlds import mission_of, stop
+from tests.planner.scan_simulation.test_verification import verified
+from tests.planner.worlds import two_rooms
+
+FIRM = np.diag([500.0, 500.0, 5000.0])
+CORNERS = ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0))
+AT = np.array([(*corner, 1.3) for corner in CORNERS])
+"""Positions of the scans."""
+MISSION = mission_of(*(stop(f"s{k}", corner) for k, corner in enumerate(CORNERS, start=1)))
+
+
+def pair(
+    a: int,
+    b: int,
+    error: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    information: FloatArray = FIRM,
+    registers: bool = True,
+) -> Registered:
+    """A pair whose second scan lies `error` (x, y, heading) off in the first."""
+    x, y, turn = error
+    there = np.eye(4)
+    there[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
+    there[:3, 3] = AT[b] - AT[a] + (x, y, 0.0)
+    off_m = math.hypot(x, y) if registers else 1.0
+    found = ScanPair(f"s{a + 1}", f"s{b + 1}", 0.5, None, off_m, math.degrees(abs(turn)))
+    return Registered(found, there, information)
+
+
+def errors(*pairs: Registered) -> list[float]:
+    return list(scan_network(MISSION, AT, pairs).errors_m.values())
+
+
+def test_pairs_without_error_leave_none() -> None:
+    assert errors(*(pair(k, k + 1) for k in range(3))) == pytest.approx([0.0] * 4)
+
+
+def test_errors_of_a_chain_add_up() -> None:
+    """The second scan is turned by 0.1 mrad: what hangs on it moves with its distance from it."""
+    found = errors(pair(0, 1, (0.001, 0.0, 1e-4)), pair(1, 2), pair(2, 3))
+    assert found[:2] == pytest.approx([0.0, 0.001])
+    assert found[2] == pytest.approx(0.001 - 4 * 1e-4, abs=1e-6)
+    assert found[3] == pytest.approx(math.hypot(0.001 - 4 * 1e-4, 6 * 1e-4), abs=1e-6)
+
+
+def test_a_loop_shares_out_what_one_pair_is_off() -> None:
+    loop = [pair(k, k + 1) for k in range(3)]
+    off = (0.008, 0.0, 0.0)
+    assert 0.001 < max(errors(*loop, pair(3, 0, off))) < 0.008
+    assert max(errors(*loop, pair(3, 0, off, information=FIRM * 1e-6))) < 1e-6
+
+
+def test_a_scan_that_registers_with_none_is_a_component_of_its_own() -> None:
+    pairs = [pair(0, 1), pair(1, 2, (0.002, 0.0, 0.0)), pair(2, 3, registers=False)]
+    network = scan_network(MISSION, AT, pairs)
+    assert [len(piece) for piece in network.pieces] == [3, 1]
+    assert (network.worst, network.adrift_m) == ("s3", pytest.approx(0.002))
+    assert network.errors_m["s4"] == 0.0
+
+
+def test_errors_are_in_the_frame_that_the_plan_has() -> None:
+    claims = [PositionError(*(2 * [0.0 if k == 2 else 0.003]), 0.0) for k in range(4)]
+    stops = tuple(replace(one, error=claim) for one, claim in zip(MISSION.stops, claims, strict=True))
+    framed = replace(MISSION, stops=stops)
+    network = scan_network(framed, AT, [pair(0, 1), pair(1, 2, (0.002, 0.0, 0.0))])
+    assert network.frame == "s3"
+    assert list(network.errors_m.values()) == pytest.approx([0.002, 0.002, 0.0, 0.0])
+
+
+def test_an_accuracy_that_the_scans_miss_is_not_met() -> None:
+    proof = verified(two_rooms(0.9), Settings(range=4.0))
+    worst = 1000 * proof.network.adrift_m
+    assert not [line for line in proof.unmet if "position error" in line]
+    strict = changed(proof, accuracy_mm=worst / 2)
+    assert f"{proof.network.worst}: position error {worst:.1f} mm, {worst / 2:g} mm required" in strict.unmet
+    assert changed(proof, accuracy_mm=worst * 1.01).unmet == proof.unmet
