@@ -38,7 +38,7 @@ from stopgo.mission.errors import InputError
 
 NET_S = 120.0
 """Of real time, in which some thread of a world must go on: else they wait for one another."""
-INSIDE = ("stopgo.bridge.", "tests.bridge.", "tests.faults.")
+INSIDE = ("tests.waiting.", "stopgo.bridge.", "tests.bridge.", "tests.faults.")
 """Modules that live in the world."""
 
 

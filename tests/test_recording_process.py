@@ -7,7 +7,6 @@ import pickle
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import MappingProxyType
@@ -24,6 +23,7 @@ from stopgo.planner.floors import read_floor
 from stopgo.recording_process import RecordingProcess, recording_process
 from stopgo.recordings.rrd.read import check
 from tests.disk import small_disk
+from tests.waiting import wait_until
 
 SAMPLE = Path(__file__).parents[1] / "recordings" / "samples" / "office.dxf"
 
@@ -139,10 +139,7 @@ def test_the_process_ends_when_its_owner_is_killed() -> None:
     child = int(owner.stdout.readline())
     owner.send_signal(signal.SIGKILL)
     owner.communicate()
-    deadline = time.monotonic() + 60
-    while _runs(child) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not _runs(child)
+    wait_until(lambda: not _runs(child))
 
 
 def _runs(number: int) -> bool:

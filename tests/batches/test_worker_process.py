@@ -6,13 +6,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from stopgo.batches.engine import worker_process
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux")
 
@@ -46,13 +45,6 @@ def test_workers_begin_after_the_process_that_forks_them_was_killed() -> None:
         wait_until(lambda: has_ended(forking))
     with worker_process() as pool:
         assert pool.submit(os.getppid).result() not in (forking, os.getpid())
-
-
-def wait_until(reached: Callable[[], bool]) -> None:
-    last = time.monotonic() + 60.0
-    while not reached():
-        assert time.monotonic() < last
-        time.sleep(0.01)
 
 
 def has_ended(process: int) -> bool:

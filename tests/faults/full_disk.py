@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 from stopgo.bridge.commands.spawn import robot_process
@@ -15,8 +13,8 @@ from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import NegativeResult
 from tests.bridge.world import Field, corridor
+from tests.waiting import wait_until
 
-LAST_NET_S = 60.0
 ROOM_BYTES = 1024 * 1024
 
 
@@ -58,7 +56,7 @@ def with_a_process(folder: Path) -> None:
     ):
         station.push(an_hours_drive())
         station.command("start")
-        until(lambda: station.status().stop_state == "NAVIGATING")
+        wait_until(lambda: station.status().stop_state == "NAVIGATING")
         paused = station.command("pause")
         while "cannot be written" not in paused.message:
             go_on(station, ballast)
@@ -68,7 +66,7 @@ def with_a_process(folder: Path) -> None:
         print(station.command("abort").outcome, station.status().state)
         newest = station.status().last_event
         ballast.unlink()
-        until(lambda: station.status().last_event > newest)
+        wait_until(lambda: station.status().last_event > newest)
         print(*[type(event).__name__ for event in station.log(since=newest)])
 
 
@@ -91,14 +89,7 @@ def go_on(station: Station, ballast: Path) -> None:
         station.command("resume")
     except NegativeResult as no:
         assert no.reason == "storage"
-    until(drives)
-
-
-def until(reached: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + LAST_NET_S
-    while not reached():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_until(drives)
 
 
 def fill(ballast: Path) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,9 @@ from stopgo.site.robot_orders import OrderRequest, PushRequest, StopRequest
 from stopgo.site.site_folder import SiteFiles
 from stopgo.site.web_server import SiteFleet, SiteOptions
 from tests.bridge.mavlink.auto.site import Site
+from tests.waiting import LAST_RESORT_S, wait_until
 
 SPEED_UP = 20.0
-LAST_RESORT_S = 60.0
 REPORT = StateReport(
     robot="rover", boot_id="b", seq=1, robot_ns=1, state="IDLE", run_id=None, mission_id=None, revision=None,
     stop=None, stop_state=None, done=(), skipped=(), battery=1.0, last_event=0,
@@ -46,14 +45,6 @@ def fleet(site: Site, tmp_path: Path, request: pytest.FixtureRequest) -> Iterato
     stopped.set()
     for thread in made.threads:
         thread.join()
-
-
-def wait_until(seen: Callable[[], Any]) -> Any:
-    deadline = time.monotonic() + LAST_RESORT_S
-    while not (found := seen()):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    return found
 
 
 def events(feed: EventFeed) -> set[str]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,10 +18,9 @@ from stopgo.mission.document import with_digest
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.auto.site import Site
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.usefixtures("own_time")
-
-WAIT_S = 60.0
 
 
 @contextmanager
@@ -37,13 +35,6 @@ def opened(site: Site) -> Iterator[OpenVehicle]:
     finally:
         stopped.set()
         thread.join()
-
-
-def wait_until(seen: Callable[[], object]) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not seen():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 @pytest.fixture
