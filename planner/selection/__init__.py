@@ -136,10 +136,15 @@ class Searches:
 
     @staticmethod
     def default(settings: Settings) -> Search:
-        """Drop-and-repair; it ignores the conditions, and its caller connects the components."""
+        """Drop-and-repair; it ignores the conditions, and its caller connects the components.
+
+        The first bound holds for later problems too, which only have more demands.
+        """
+        bound = 0
 
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
-            bound = lower_bound(cover, found=len(start))
+            nonlocal bound
+            bound = bound or lower_bound(cover, found=len(start))
             return improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN), bound
 
         return search
