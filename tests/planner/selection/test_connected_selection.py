@@ -84,3 +84,14 @@ def test_components_follow_from_links() -> None:
     links = csr_array(np.array([[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]))
     rows: IntArray = np.array([3, 1, 0])
     assert [component.tolist() for component in components_of(links, rows)] == [[0, 1], [3]]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_many_rows_meet_the_demands_as_few_would(seed: int) -> None:
+    """Above half of all rows those that are missing are counted."""
+    random = np.random.default_rng(seed)
+    sees = csr_array(random.random((12, 30)) < 0.2)
+    cover = Cover.of_whole(csr_array(sees.astype(np.int64)), random.integers(1, 9, 30), 90)
+    for count in range(13):
+        rows = np.sort(random.permutation(12)[:count])
+        assert meets(cover, rows) == (not cover.missing(cover.covered_by(rows)).any())
