@@ -101,7 +101,6 @@ def joined_row(name: str, proof: PlanProof, seconds: float) -> list[str]:
     held = [pairs[ends] for ends in promised & set(pairs)]
     worst = f"{1000 * max(p.error_m for p in held):.1f} mm, {max(p.error_deg for p in held):.3f}°"
     closing, limits = proof.network.closing_m, error_limits(proof.mission)
-    within = sum(proof.network.errors_m[stop] <= limit for stop, limit in limits.items())
     errors = f"{1000 * max(limits.values(), default=0.0):.1f} mm, {1000 * proof.network.adrift_m:.1f} mm"
     return [
         *(name, str(len(proof.mission.stops))),
@@ -111,7 +110,11 @@ def joined_row(name: str, proof: PlanProof, seconds: float) -> list[str]:
             f"{len(good - promised)} of {len(set(pairs) - promised)}",
             f"{len(network.pieces)}, {len(proof.network.pieces)}",
         ),
-        *("-" if closing is None else f"{1000 * closing:.1f} mm", errors, f"{within} of {len(limits)}"),
+        *(
+            "-" if closing is None else f"{1000 * closing:.1f} mm",
+            errors,
+            f"{proof.within_prediction} of {len(limits)}",
+        ),
         f"{seconds:.0f}",
     ]
 

@@ -11,6 +11,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -273,13 +274,14 @@ def registers(row: dict[str, Any]) -> bool:
     return good and row["free_deg"] is None
 
 
+def _shares(least: float, pair: Figures) -> bool:
+    return pair.share >= least
+
+
 RULES: dict[str, Callable[[Figures], bool]] = {
     "predicted error ≤ 1 cm (99 %)": lambda pair: pair.registers,
     "the same, and overlap 0.1 (`--overlap 0.1`)": lambda pair: pair.registers and pair.share >= 0.1,
-    **{
-        f"overlap ratio {least:g} alone": lambda pair, least=least: pair.share >= least  # type: ignore[misc]
-        for least in (0.1, 0.2, 0.3, 0.5)
-    },
+    **{f"overlap ratio {least:g} alone": partial(_shares, least) for least in (0.1, 0.2, 0.3, 0.5)},
 }
 
 

@@ -13,6 +13,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.geometry import BoolArray, FloatArray
 from stopgo.mission.stages import Targets
 from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.network import error_limits
 
 ALLOWED_FRACTION = 0.01
 """Tolerated loss against the plan's coverage: targets grazed by rays fall between two rays."""
@@ -258,6 +259,12 @@ class PlanProof:
     @property
     def met(self) -> bool:
         return not self.unmet
+
+    @property
+    def within_prediction(self) -> int:
+        """Number of stops whose position error is at most the one that the mission predicts (0.99)."""
+        limits = error_limits(self.mission)
+        return sum(self.network.errors_m[stop] <= limit for stop, limit in limits.items())
 
 
 def _short_whole(proof: PlanProof) -> list[str]:

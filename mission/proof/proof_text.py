@@ -192,10 +192,12 @@ def error_words(proof: PlanProof) -> list[str]:
     worst = f"the worst stop, {network.worst}, has a position error of {error}{frame}"
     if network.frame is None or not limits:
         return [worst]
-    within = sum(network.errors_m[stop] <= limit for stop, limit in limits.items())
     greatest = 1000 * max(limits.values())
     predicted = f"predicted: at most {greatest:.1f} mm with a probability of 99 %"
-    return [worst, f"{predicted}; {within} of {len(limits)} stops are within their own prediction"]
+    return [
+        worst,
+        f"{predicted}; {proof.within_prediction} of {len(limits)} stops are within their own prediction",
+    ]
 
 
 def pair_words(pair: ScanPair) -> str:

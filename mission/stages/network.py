@@ -22,7 +22,6 @@ ELLIPSE_POINTS = 49
 """Points of a drawn ellipse, the first again at the end."""
 FLOOR_M = 0.4e-3
 """Registration error that no length of wall averages out: that of the thinned cloud, metres."""
-
 CONFIDENCE = 2.576
 """Standard deviations that a normal error exceeds, to either side, once in 100."""
 

@@ -9,7 +9,7 @@ frame the mission's predicted errors are.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -85,17 +85,12 @@ def _adjusted(
         for i, sign in ((a, -1.0), (b, 1.0)):
             if i in place:
                 right[place[i] : place[i] + 3] += sign * error
-        for i, j, block in _blocks(a, b, weight):
+        for i, j, block in ((a, a, weight), (b, b, weight), (a, b, -weight), (b, a, -weight)):
             if i in place and j in place:
                 normal[place[i] : place[i] + 3, place[j] : place[j] + 3] += block
     motion = np.zeros((len(xy), 3))
     motion[free] = np.linalg.solve(normal, right).reshape(-1, 3)
     return motion[:, :2] + motion[:, 2:] * np.column_stack([-xy[:, 1], xy[:, 0]])
-
-
-def _blocks(a: int, b: int, weight: FloatArray) -> Iterator[tuple[int, int, FloatArray]]:
-    """Yield what a pair adds to the normal matrix."""
-    yield from ((a, a, weight), (b, b, weight), (a, b, -weight), (b, a, -weight))
 
 
 def _about_origin(at: FloatArray) -> FloatArray:

@@ -138,7 +138,7 @@ class Searches:
     def default(settings: Settings) -> Search:
         """Drop-and-repair; it ignores the conditions, and its caller connects the components.
 
-        The first bound holds for later problems too, which only have more demands.
+        It is for one task: the first bound holds for later problems too, which only have more demands.
         """
         bound = 0
 

@@ -144,8 +144,9 @@ def _mask(links: csr_array, *sets: IntArray) -> BoolArray:
 def meets(cover: Cover, rows: IntArray) -> bool:
     """True if these rows meet every demand."""
     if 2 * len(rows) < cover.rows:
-        return not cover.missing(cover.covered_by(rows)).any()
-    others = np.ones(cover.rows, dtype=bool)
-    others[rows] = False
-    covered = cover.seers - cover.covered_by(np.flatnonzero(others))
+        covered = cover.covered_by(rows)
+    else:
+        others = np.ones(cover.rows, dtype=bool)
+        others[rows] = False
+        covered = cover.seers - cover.covered_by(np.flatnonzero(others))
     return not cover.missing(covered).any()

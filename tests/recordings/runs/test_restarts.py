@@ -14,6 +14,7 @@ import pytest
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.command_line import main
 from stopgo.mission.comparing.compare import compare
+from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import write
@@ -104,6 +105,18 @@ def in_order(events: tuple[AnyEvent, ...], poses: list[PoseReport]) -> Iterator[
     yield from sorted(reports, key=lambda item: (boots.index(item.boot_id), item.robot_ns))
 
 
+def recorded(path: Path, mission: Mission, reports: list[PoseReport | AnyEvent]) -> Comparison:
+    """Record a run, and return what a station that heard it compares."""
+    with FieldRecording(path, mission) as recording:
+        collector = RunCollector(recording)
+        collector.mission(mission)
+        for report in reports:
+            tell(collector, report)  # type: ignore[arg-type]
+    watched = collector.compared()
+    assert watched is not None
+    return watched
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_killed_robot_drove_what_it_drove(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -112,13 +125,7 @@ def test_a_killed_robot_drove_what_it_drove(
     reports, truth_m = killed_run(mission, seed)
     assert len({item.boot_id for item in reports}) == 2
     path = tmp_path / "field.rrd"
-    with FieldRecording(path, mission) as recording:
-        collector = RunCollector(recording)
-        collector.mission(mission)
-        for report in reports:
-            tell(collector, report)  # type: ignore[arg-type]
-    watched = collector.compared()
-    assert watched is not None
+    watched = recorded(path, mission, reports)
     capsys.readouterr()
     assert main(["review", "--json", str(path)]) == 0
     (reviewed,) = json.loads(capsys.readouterr().out)["runs"]
@@ -142,15 +149,9 @@ def test_a_recording_shows_the_gaps_that_were_watched(seed: int, tmp_path: Path)
     mission = wandering(seed, stops=5)
     reports, _ = killed_run(mission, seed, waits_s=40.0)
     path = tmp_path / "field.rrd"
-    with FieldRecording(path, mission) as recording:
-        collector = RunCollector(recording)
-        collector.mission(mission)
-        for report in reports:
-            tell(collector, report)  # type: ignore[arg-type]
-    watched = collector.compared()
-    assert watched is not None
+    watched = recorded(path, mission, reports)
     (log,) = read_recording(path).logs
     assert len(log.poses) < 0.7 * len(watched.log.poses)
-    recorded = compare(log, [mission])
-    assert recorded.sighted.gaps == watched.sighted.gaps
-    assert recorded.sighted.seen_m == pytest.approx(watched.sighted.seen_m, abs=0.01)
+    reviewed = compare(log, [mission])
+    assert reviewed.sighted.gaps == watched.sighted.gaps
+    assert reviewed.sighted.seen_m == pytest.approx(watched.sighted.seen_m, abs=0.01)
