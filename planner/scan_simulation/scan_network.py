@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -51,17 +52,7 @@ def scan_network(
         for (a, b), item in zip(ends, good, strict=True)
     ]
     around = len(good) > len(names) - len(pieces)
-    held = [piece for piece in ordered if sees_two_points(piece, seen)]
-    frame = frame_of(mission) or (CONTROL_FRAME if held else names[ordered[0][0]])
-    if frame != CONTROL_FRAME:
-        held = [piece for piece in ordered if number[frame] in piece]
-    errors: dict[int, float] = {}
-    for piece in held:
-        fixed = piece[0] if frame == CONTROL_FRAME else number[frame]
-        motion = _adjusted(xy, [k for k in piece if k != fixed], ends, good)
-        if frame == CONTROL_FRAME:
-            motion -= _off_control(motion, [(k, point) for k, point in seen if k in piece])
-        errors |= {k: float(np.hypot(*(shift_at(xy[k]) @ motion[k]))) for k in piece}
+    frame, errors = _framed_errors(mission, ordered, _Adjustment(xy, ends, good, seen))
     return ScanNetwork(
         pairs=tuple(item.pair for item in pairs),
         pieces=tuple(tuple(names[index] for index in piece) for piece in ordered),
@@ -89,29 +80,60 @@ def _chains(links: PairPoses) -> dict[int, tuple[int, FloatArray]]:
     return found
 
 
-def _adjusted(
-    xy: FloatArray, free: Sequence[int], ends: Sequence[tuple[int, int]], pairs: Sequence[Registered]
-) -> FloatArray:
-    """Motions (n, 3) by which all pairs together misplace the free scans; zero for the others."""
-    row = {k: 3 * place for place, k in enumerate(free)}
-    about = [_about_origin(xy[a]) for a, _ in ends]
-    weights = [one @ pair.information @ one.T for one, pair in zip(about, pairs, strict=True)]
-    right = np.zeros(3 * len(free))
-    for (a, b), pair, weight in zip(ends, pairs, weights, strict=True):
-        error = weight @ _motion(xy[a], xy[b], pair.there)
-        for scan, sign in ((a, -1.0), (b, 1.0)):
-            if scan in row:
-                right[row[scan] : row[scan] + 3] += sign * error
-    motion = np.zeros((len(xy), 3))
-    motion[list(free)] = np.linalg.solve(normal_matrix(row, ends, weights), right).reshape(-1, 3)
-    return motion
+def _framed_errors(
+    mission: Mission, pieces: Sequence[list[int]], adjustment: _Adjustment
+) -> tuple[str, dict[int, float]]:
+    """The frame of the errors, and the position errors of the scans that it holds, metres."""
+    frame = frame_of(mission)
+    held = [] if frame else [piece for piece in pieces if sees_two_points(piece, adjustment.seen)]
+    if held:
+        return CONTROL_FRAME, {
+            k: error for piece in held for k, error in adjustment.on_control(piece).items()
+        }
+    names = [stop.id for stop in mission.stops]
+    fixed = names.index(frame) if frame else pieces[0][0]
+    return names[fixed], adjustment.by_scan(next(piece for piece in pieces if fixed in piece), fixed)
 
 
-def _off_control(motion: FloatArray, seen: Sequence[SeenPoint]) -> FloatArray:
-    """The one motion (3,) that best explains how far motions (n, 3) of scans put the points that they see."""
-    shifts = [shift_at(point) for _, point in seen]
-    off_m = [shift @ motion[k] for shift, (k, _) in zip(shifts, seen, strict=True)]
-    return np.linalg.lstsq(np.concatenate(shifts), np.concatenate(off_m), rcond=None)[0]
+@dataclass(frozen=True, eq=False)
+class _Adjustment:
+    """Adjustment of the pairs of a network by least squares."""
+
+    xy: FloatArray
+    """Positions of the scans (n, 2)."""
+    ends: Sequence[tuple[int, int]]
+    pairs: Sequence[Registered]
+    seen: Sequence[SeenPoint]
+
+    def by_scan(self, piece: Sequence[int], fixed: int) -> dict[int, float]:
+        """Position errors of a component's scans, metres, if one of them is fixed."""
+        return self._errors(piece, self._motions([k for k in piece if k != fixed]))
+
+    def on_control(self, piece: Sequence[int]) -> dict[int, float]:
+        """Position errors of a component's scans, metres, moved together onto the control points they see."""
+        motions = self._motions(piece[1:])
+        seen = [(shift_at(point), motions[k]) for k, point in self.seen if k in piece]
+        off_m = np.concatenate([shift @ motion for shift, motion in seen])
+        together = np.linalg.lstsq(np.concatenate([shift for shift, _ in seen]), off_m, rcond=None)[0]
+        return self._errors(piece, motions - together)
+
+    def _errors(self, piece: Sequence[int], motions: FloatArray) -> dict[int, float]:
+        return {k: float(np.hypot(*(shift_at(self.xy[k]) @ motions[k]))) for k in piece}
+
+    def _motions(self, free: Sequence[int]) -> FloatArray:
+        """Motions (n, 3) by which all pairs together misplace the free scans; zero for the others."""
+        row = {k: 3 * place for place, k in enumerate(free)}
+        about = [_about_origin(self.xy[a]) for a, _ in self.ends]
+        weights = [one @ pair.information @ one.T for one, pair in zip(about, self.pairs, strict=True)]
+        right = np.zeros(3 * len(free))
+        for (a, b), pair, weight in zip(self.ends, self.pairs, weights, strict=True):
+            error = weight @ _motion(self.xy[a], self.xy[b], pair.there)
+            for scan, sign in ((a, -1.0), (b, 1.0)):
+                if scan in row:
+                    right[row[scan] : row[scan] + 3] += sign * error
+        found = np.zeros((len(self.xy), 3))
+        found[list(free)] = np.linalg.solve(normal_matrix(row, self.ends, weights), right).reshape(-1, 3)
+        return found
 
 
 def _about_origin(at: FloatArray) -> FloatArray:
