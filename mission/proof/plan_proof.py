@@ -187,10 +187,10 @@ class ScanNetwork:
     """Greatest closing error round a loop of registered pairs; None without a loop."""
     closing_deg: float | None
     errors_m: dict[str, float]
-    """Position error of each stop after the adjustment of all pairs that register, in the frame of `frame`,
-    else of its component's first stop."""
-    frame: str | None = None
-    """Stop whose frame the mission's predicted errors are in; None if there is no such stop."""
+    """Position error of each stop after the adjustment of all pairs that register; none of a stop that
+    nothing connects with the frame."""
+    frame: str
+    """Stop whose frame the errors are in, or CONTROL_FRAME."""
 
     @property
     def worst(self) -> str:
@@ -262,9 +262,9 @@ class PlanProof:
 
     @property
     def within_prediction(self) -> int:
-        """Number of stops whose position error is at most the one that the mission predicts (0.99)."""
-        limits = error_limits(self.mission)
-        return sum(self.network.errors_m[stop] <= limit for stop, limit in limits.items())
+        """Number of stops with a position error of at most the one that the mission predicts (0.99)."""
+        limits, errors = error_limits(self.mission), self.network.errors_m
+        return sum(errors.get(stop, math.inf) <= limit for stop, limit in limits.items())
 
 
 def _short_whole(proof: PlanProof) -> list[str]:
@@ -309,12 +309,17 @@ def _short_pairs(proof: PlanProof) -> list[str]:
 
 
 def _short_errors(proof: PlanProof) -> list[str]:
-    """Return the stops whose position error exceeds the required accuracy."""
-    asked = math.inf if proof.accuracy_mm is None else proof.accuracy_mm
+    """Return the stops whose position error exceeds the required accuracy, or that have none."""
+    network, asked = proof.network, proof.accuracy_mm
+    if asked is None:
+        return []
+    errors = {stop.id: network.errors_m.get(stop.id) for stop in proof.mission.stops}
     return [
-        f"{stop}: position error {1000 * error:.1f} mm, {asked:g} mm required"
-        for stop, error in proof.network.errors_m.items()
-        if 1000 * error > asked
+        f"{stop}: not connected with {network.frame}, position error of {asked:g} mm required"
+        if error is None
+        else f"{stop}: position error {1000 * error:.1f} mm, {asked:g} mm required"
+        for stop, error in errors.items()
+        if error is None or 1000 * error > asked
     ]
 
 

@@ -22,7 +22,7 @@ from stopgo.mission.proof.plan_proof import (
     Simulation,
 )
 from stopgo.mission.stages.figures import percent
-from stopgo.mission.stages.network import error_limits
+from stopgo.mission.stages.network import CONTROL_FRAME, error_limits, frame_of
 
 SCHEMA = "stopgo/proof"
 VERSION = 1
@@ -187,10 +187,9 @@ def network_words(proof: PlanProof) -> list[str]:
 def error_words(proof: PlanProof) -> list[str]:
     """Return the lines on the position errors of the stops, and on how many are as small as predicted."""
     network, limits = proof.network, error_limits(proof.mission)
-    frame = "" if network.frame is None else f" in the frame of {network.frame}"
-    error = f"{1000 * network.adrift_m:.1f} mm"
-    worst = f"the worst stop, {network.worst}, has a position error of {error}{frame}"
-    if network.frame is None or not limits:
+    error = f"{1000 * network.adrift_m:.1f} mm in the frame of {network.frame}"
+    worst = f"the worst stop, {network.worst}, has a position error of {error}"
+    if not limits or network.frame != (frame_of(proof.mission) or CONTROL_FRAME):
         return [worst]
     greatest = 1000 * max(limits.values())
     predicted = f"predicted: at most {greatest:.1f} mm with a probability of 99 %"

@@ -24,6 +24,8 @@ FLOOR_M = 0.4e-3
 """Registration error that no length of wall averages out: that of the thinned cloud, metres."""
 CONFIDENCE = 2.576
 """Standard deviations that a normal error exceeds, to either side, once in 100."""
+CONTROL_FRAME = "control points"
+"""Name of the frame of errors that control points hold, where a stop's name stands otherwise."""
 
 
 def predicted_error_m(hold_m: float) -> float:

@@ -101,43 +101,50 @@ def scan_covariances(
     count = len(xy)
     joined = _joined(count, ends, [*anchors, *_held(count, ends, seen)])
     free = [k for k in range(count) if joined[k] and k not in anchors]
-    normal = _normal_matrix({k: 3 * place for place, k in enumerate(free)}, ends, information, seen)
+    normal = normal_matrix({k: 3 * place for place, k in enumerate(free)}, ends, information, seen)
     covariance = np.linalg.inv(normal) if free else normal
     found = np.zeros((count, 2, 2))
     found[~np.array(joined, dtype=bool)] = np.inf
     for place, k in enumerate(free):
         own = covariance[3 * place : 3 * place + 3, 3 * place : 3 * place + 3]
-        there = np.array([[1.0, 0.0, -xy[k, 1]], [0.0, 1.0, xy[k, 0]]])
+        there = shift_at(xy[k])
         found[k] = there @ own @ there.T
     return found
 
 
-def _normal_matrix(
+def normal_matrix(
     row: dict[int, int],
     ends: Sequence[tuple[int, int]],
     information: Sequence[FloatArray],
-    seen: Sequence[SeenPoint],
+    seen: Sequence[SeenPoint] = (),
 ) -> FloatArray:
-    """Normal matrix of the free scans, whose first rows these are."""
+    """Return the normal matrix of the free scans, whose first rows these are."""
     normal = np.zeros((3 * len(row), 3 * len(row)))
     for (a, b), block in zip(ends, information, strict=True):
         for i, j, sign in ((a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)):
             if i in row and j in row:
                 normal[row[i] : row[i] + 3, row[j] : row[j] + 3] += sign * block
-    for k, (x, y) in seen:
+    for k, point in seen:
         if k in row:
-            move = np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]) / TARGET_M
+            move = shift_at(point) / TARGET_M
             normal[row[k] : row[k] + 3, row[k] : row[k] + 3] += move.T @ move
     return normal
 
 
 def _held(count: int, ends: Sequence[tuple[int, int]], seen: Sequence[SeenPoint]) -> list[int]:
     """Scans of the components that see two control points or more."""
-    found: list[int] = []
-    for component in _components(count, ends) if seen else []:
-        points = {tuple(np.round(point, 3).tolist()) for k, point in seen if k in component}
-        found += component if len(points) > 1 else []
-    return found
+    components = _components(count, ends) if seen else []
+    return [k for component in components if sees_two_points(component, seen) for k in component]
+
+
+def shift_at(point: FloatArray) -> FloatArray:
+    """Return the matrix (2, 3) from a small motion (vx, vy, ω) about the origin to the shift at a point."""
+    return np.array([[1.0, 0.0, -point[1]], [0.0, 1.0, point[0]]])
+
+
+def sees_two_points(scans: Sequence[int], seen: Sequence[SeenPoint]) -> bool:
+    """Return True if these scans together see two different control points or more."""
+    return len({tuple(np.round(point, 3).tolist()) for k, point in seen if k in scans}) > 1
 
 
 def _components(count: int, ends: Sequence[tuple[int, int]]) -> list[list[int]]:

@@ -17,7 +17,7 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState, Route
 from stopgo.mission.stages.figures import percent
-from stopgo.mission.stages.network import CONFIDENCE, Network
+from stopgo.mission.stages.network import CONFIDENCE, CONTROL_FRAME, Network
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
@@ -49,7 +49,7 @@ class PredictedErrors:
     ellipses: FloatArray
     """Of each stop's scan in the order of driving (n, 3): half axes in metres, and radians from +x."""
     frame: str
-    """The stop that holds the frame, or "control points"."""
+    """The stop that holds the frame, or CONTROL_FRAME."""
 
     @property
     def m(self) -> FloatArray:
@@ -67,7 +67,7 @@ def predicted_errors(route: Route) -> PredictedErrors:
     information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
     covariances, frame = network_errors(xy, ends, information, seen_control(route.space, xy))
     ellipses = error_ellipses(covariances)
-    return PredictedErrors(ellipses, "control points" if frame is None else stops[frame])
+    return PredictedErrors(ellipses, CONTROL_FRAME if frame is None else stops[frame])
 
 
 def error_of_stop(route: Route, k: int) -> PositionError | UnsetType:

@@ -31,6 +31,8 @@ from stopgo.mission.proof.plan_proof import (
 )
 from stopgo.mission.stages import NavigableSpace, Targets, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE
+from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
 from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model, sloped
@@ -96,7 +98,9 @@ def verify(
         pairs.append(pair)
         say(f"registering pairs of scans, {len(pairs)} done")
     promise = _PromisedCoverage.of(mission, space, coverage)
-    proof = _proof(mission, site, tally, promise, scan_network(mission, positions, pairs), clouds)
+    xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - local_origin(space.floor)
+    network = scan_network(mission, xy, pairs, seen_control(space, xy))
+    proof = _proof(mission, site, tally, promise, network, clouds)
     return proof if site.scene is None else replace(proof, areas=_areas(site, site.scene, tally, promise))
 
 

@@ -259,7 +259,7 @@ class PlanningRoom:
             If another mission than the one that it replaces lies there.
         """
         variant = self.variant(number)
-        if not (variant.folder / DRAWING).exists():
+        if variant.shown["state"] != "done":
             raise InputError(f"variant {number}: has no plan to save")
         place = self._folder.path(f"plans/{file_name(name)}")
         mission = read(variant.folder / "mission.json")

@@ -21,7 +21,7 @@ from stopgo.site.event_feed import EventFeed
 from stopgo.site.kept_variants import kept_variants
 from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest, WorkLane
 from stopgo.site.planning_routes import options_json
-from stopgo.site.planning_work import ReadTask, VariantTask, read_work, settings_of, variant_work
+from stopgo.site.planning_work import DRAWING, ReadTask, VariantTask, read_work, settings_of, variant_work
 from stopgo.site.run_pages import RunRoom
 from stopgo.site.site_folder import SiteFiles
 from tests.planner.floors.ifc.house import two_rooms as house_model
@@ -170,7 +170,8 @@ def test_a_variant_is_cancelled(room: PlanningRoom) -> None:
     number = room.plan(VariantRequest(floor="house.dxf"))
     room.cancel(number)
     assert waited(room, number)["state"] == "cancelled"
-    with pytest.raises(InputError, match="no plan"):
+    (room.variant(number).folder / DRAWING).write_text("{}")  # as if cancelled before the mission was written
+    with pytest.raises(InputError, match="no plan to save"):
         room.save(number, "cancelled")
 
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from stopgo.mission.document import PositionError
+from stopgo.mission.document import Mission, PositionError
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.proof.plan_proof import ScanPair
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages.network import CONTROL_FRAME
 from stopgo.planner.scan_simulation.registration import Registered
 from stopgo.planner.scan_simulation.scan_network import scan_network
 from tests.mission.worlds import mission_of, stop
@@ -21,7 +22,7 @@ from tests.planner.worlds import two_rooms
 
 FIRM = np.diag([500.0, 500.0, 5000.0])
 CORNERS = ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0))
-AT = np.array([(*corner, 1.3) for corner in CORNERS])
+AT = np.array(CORNERS)
 """Positions of the scans."""
 MISSION = mission_of(*(stop(f"s{k}", corner) for k, corner in enumerate(CORNERS, start=1)))
 
@@ -38,7 +39,7 @@ def pair(
     x, y, turn = error
     there = np.eye(4)
     there[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
-    there[:3, 3] = AT[b] - AT[a] + (x, y, 0.0)
+    there[:2, 3] = AT[b] - AT[a] + (x, y)
     off_m = math.hypot(x, y) if registers else 1.0
     found = ScanPair(f"s{a + 1}", f"s{b + 1}", 0.5, None, off_m, math.degrees(abs(turn)))
     return Registered(found, there, information)
@@ -72,16 +73,44 @@ def test_a_scan_that_registers_with_none_is_a_component_of_its_own() -> None:
     network = scan_network(MISSION, AT, pairs)
     assert [len(piece) for piece in network.pieces] == [3, 1]
     assert (network.worst, network.adrift_m) == ("s3", pytest.approx(0.002))
-    assert network.errors_m["s4"] == 0.0
+
+
+def framed(*, holds: int | None) -> Mission:
+    """The mission with predicted errors of 3 mm, in the frame of one stop, or of control points."""
+    claims = [PositionError(*(2 * [0.0 if k == holds else 0.003]), 0.0) for k in range(4)]
+    stops = tuple(replace(one, error=claim) for one, claim in zip(MISSION.stops, claims, strict=True))
+    return replace(MISSION, stops=stops)
 
 
 def test_errors_are_in_the_frame_that_the_plan_has() -> None:
-    claims = [PositionError(*(2 * [0.0 if k == 2 else 0.003]), 0.0) for k in range(4)]
-    stops = tuple(replace(one, error=claim) for one, claim in zip(MISSION.stops, claims, strict=True))
-    framed = replace(MISSION, stops=stops)
-    network = scan_network(framed, AT, [pair(0, 1), pair(1, 2, (0.002, 0.0, 0.0))])
+    """The fourth scan hangs on none: its error in this frame is not zero, it is not known."""
+    network = scan_network(framed(holds=2), AT, [pair(0, 1), pair(1, 2, (0.002, 0.0, 0.0))])
     assert network.frame == "s3"
-    assert list(network.errors_m.values()) == pytest.approx([0.002, 0.002, 0.0, 0.0])
+    assert network.errors_m == pytest.approx({"s1": 0.002, "s2": 0.002, "s3": 0.0})
+
+
+def test_without_a_frame_of_the_plan_errors_are_in_that_of_the_largest_component() -> None:
+    network = scan_network(MISSION, AT, [pair(1, 2), pair(2, 3, (0.002, 0.0, 0.0))])
+    assert network.frame == "s2"
+    assert network.errors_m == pytest.approx({"s2": 0.0, "s3": 0.0, "s4": 0.002})
+
+
+def test_control_points_hold_the_frame_of_the_scans_that_see_two() -> None:
+    """The second scan sees both points where they are; the fourth scan hangs on none."""
+    mission = framed(holds=None)
+    pairs = [pair(0, 1, (0.003, 0.0, 0.0)), pair(1, 2, (0.0, 0.002, 0.0))]
+    points = [(1, np.array(at)) for at in ((5.0, 1.0), (5.0, 3.0))]
+    network = scan_network(mission, AT, pairs, points)
+    assert network.frame == CONTROL_FRAME
+    assert network.errors_m == pytest.approx({"s1": 0.003, "s2": 0.0, "s3": 0.002})
+    assert scan_network(mission, AT, pairs, points[:1]).frame == "s1"
+
+
+def test_scans_turn_onto_the_control_points_that_several_of_them_see() -> None:
+    """The second scan puts its point 6 mm off, the first its own right: a turn of 1 mrad explains both."""
+    points = [(0, np.array([0.0, 1.0])), (1, np.array([6.0, 1.0]))]
+    network = scan_network(framed(holds=None), AT, [pair(0, 1, (0.0, 0.006, 0.0))], points)
+    assert network.errors_m == pytest.approx({"s1": 0.001, "s2": 0.001}, rel=0.1)
 
 
 def test_an_accuracy_that_the_scans_miss_is_not_met() -> None:
@@ -91,3 +120,12 @@ def test_an_accuracy_that_the_scans_miss_is_not_met() -> None:
     strict = changed(proof, accuracy_mm=worst / 2)
     assert f"{proof.network.worst}: position error {worst:.1f} mm, {worst / 2:g} mm required" in strict.unmet
     assert changed(proof, accuracy_mm=worst * 1.01).unmet == proof.unmet
+
+
+def test_a_scan_that_hangs_on_none_is_neither_accurate_nor_within_its_prediction() -> None:
+    proof = verified(two_rooms(0.9), Settings(range=4.0))
+    names = [stop.id for stop in proof.mission.stops]
+    errors = {names[0]: 0.0}
+    torn = changed(proof, network=changed(proof.network, errors_m=errors, frame=names[0]), accuracy_mm=1000.0)
+    assert f"{names[1]}: not connected with {names[0]}, position error of 1000 mm required" in torn.unmet
+    assert torn.within_prediction == 1 < proof.within_prediction
