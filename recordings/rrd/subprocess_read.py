@@ -28,7 +28,7 @@ for number, path in enumerate(paths):
 """
 """Program that reads each file to its end, and prints its number first.
 
-It needs one part of Rerun. The package itself would load everything that draws, which takes longer than reading.
+It needs one part of Rerun. All of Rerun takes longer to load than a recording takes to read.
 """
 
 
