@@ -16,7 +16,7 @@ import pytest
 from hypothesis import settings
 
 from stopgo.mission.console import running_step
-from tests.faults.sizes import FULL, size
+from tests.faults.sizes import FULL, is_long, size
 from tests.shell import forget_the_shell
 from tests.workers import file_of
 
@@ -80,11 +80,15 @@ WAITING = {TESTS / name for name in ("bridge", "faults", "journeys")}
 """Folders whose tests mostly wait for other processes; those of the other folders mostly compute."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Deal both kinds of files out evenly, so that at any time some tests compute while others wait.
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the long form, and deal both kinds of files out.
 
-    The folders that wait are taken from the last one: their longest files are there, and none may end alone.
+    They are dealt out evenly, so that at any time some tests compute while others wait. The folders that wait
+    are taken from the last one: their longest files are there, and none may end alone.
     """
+    if not FULL:
+        config.hook.pytest_deselected(items=[item for item in items if is_long(item.nodeid)])
+        items[:] = [item for item in items if not is_long(item.nodeid)]
     kinds: tuple[list[object], list[object]] = [], []
     for file, path in {file_of(item): item.path for item in items}.items():
         kinds[not WAITING.isdisjoint(path.parents)].append(file)

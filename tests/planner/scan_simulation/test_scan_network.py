@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from stopgo.mission.document import Mission, PositionError
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.proof.plan_proof import ScanPair
+from stopgo.mission.proof.plan_proof import PlanProof, ScanPair
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages.network import CONTROL_FRAME
 from stopgo.planner.scan_simulation.registration import Registered
@@ -113,8 +113,12 @@ def test_scans_turn_onto_the_control_points_that_several_of_them_see() -> None:
     assert network.errors_m == pytest.approx({"s1": 0.001, "s2": 0.001}, rel=0.1)
 
 
-def test_an_accuracy_that_the_scans_miss_is_not_met() -> None:
-    proof = verified(two_rooms(0.9), Settings(range=4.0))
+@pytest.fixture(scope="module")
+def proof() -> PlanProof:
+    return verified(two_rooms(0.9), Settings(range=4.0))
+
+
+def test_an_accuracy_that_the_scans_miss_is_not_met(proof: PlanProof) -> None:
     worst = 1000 * proof.network.adrift_m
     assert not [line for line in proof.unmet if "position error" in line]
     strict = changed(proof, accuracy_mm=worst / 2)
@@ -122,8 +126,7 @@ def test_an_accuracy_that_the_scans_miss_is_not_met() -> None:
     assert changed(proof, accuracy_mm=worst * 1.01).unmet == proof.unmet
 
 
-def test_a_scan_that_hangs_on_none_is_neither_accurate_nor_within_its_prediction() -> None:
-    proof = verified(two_rooms(0.9), Settings(range=4.0))
+def test_a_scan_that_hangs_on_none_is_neither_accurate_nor_within_its_prediction(proof: PlanProof) -> None:
     names = [stop.id for stop in proof.mission.stops]
     errors = {names[0]: 0.0}
     torn = changed(proof, network=changed(proof.network, errors_m=errors, frame=names[0]), accuracy_mm=1000.0)

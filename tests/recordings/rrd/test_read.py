@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -50,6 +52,16 @@ def test_a_damaged_byte_never_ends_the_process(plan: Path, tmp_path: Path, place
         read_recording(path)
     except InputError as refused:
         assert "\n" not in str(refused)
+
+
+def test_the_other_process_reads_all_of_a_recording_with_little_of_rerun(plan: Path) -> None:
+    program = subprocess_read.CHILD.replace("        pass", "        raise")
+    program += 'assert "rerun.chunk" in sys.modules and "rerun.archetypes" not in sys.modules'
+    arguments = json.dumps([sys.path, [str(plan)]])
+    done = subprocess.run(
+        [sys.executable, "-c", program], input=arguments, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "0\n", "")
 
 
 ENDING = """
