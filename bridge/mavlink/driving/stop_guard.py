@@ -80,7 +80,7 @@ class StopGuard:
             self._show_sign(drives=False)
 
     def _replace(self) -> None:
-        """Start another process and tell it what to do: at once, then at most one in `APART_SIGNS`."""
+        """Start another process, and show it a sign of life: at once, then at most one in `APART_SIGNS`."""
         if self._signs < self._replaced_until:
             return
         self._replaced_until = self._signs + APART_SIGNS
