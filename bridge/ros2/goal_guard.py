@@ -1,7 +1,8 @@
 """Guard of a robot that Nav2 drives: a process that cancels its goals if the program ends or hangs.
 
 Nav2 ends a goal without the program that sent it. The guard is a node of its own, so that it needs no
-discovery when it must act. Each byte on its input is a sign of life: 1 while the program drives, else 0.
+discovery when it must act. Each byte on its input is a sign of life: 1 while the program drives, else 0. The
+guard answers each of them, so that the program knows one that hangs.
 """
 
 from __future__ import annotations
@@ -27,11 +28,17 @@ END_S = 2.0
 FIRST, LAST = 0, -1
 DRIVES, STANDS = b"1", b"0"
 READY = b"ready\n"
+ANSWER = b"."
+MOST_UNANSWERED = 50
+"""Number of signs without an answer after which the guard counts as hung; a stop takes it 20."""
+MOST_UNREADY = 300
+"""The same until it is ready."""
+MOST_BYTES = 4096
 CANCEL = "action_msgs/srv/CancelGoal"
 READY_S = 30.0
 """Longest wait for the first guard."""
 NOT_READY = "the process that stops the robot if this program ends is not ready"
-ENDED = "the process that stops the robot if this program ends has ended; it is started again"
+ENDED = "the process that stops the robot if this program ends has ended or hangs; it is started again"
 
 
 class GoalGuard:
@@ -51,7 +58,8 @@ class GoalGuard:
         self._closing = threading.Event()
         self._lock = threading.Lock()
         self._process = self._started()
-        self._is_missing = not self._is_ready(within_s=READY_S)
+        self._is_missing, self._unanswered = True, 0
+        self._hear(within_s=READY_S)
         if self._is_missing:
             report(NOT_READY)
         self._thread = threading.Thread(target=self._show_life, name="goal guard", daemon=True)
@@ -59,8 +67,9 @@ class GoalGuard:
 
     def _started(self) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
-            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-        )
+            self._command,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, start_new_session=True,
+        )  # fmt: skip
 
     @property
     def pid(self) -> int:
@@ -74,8 +83,14 @@ class GoalGuard:
         with suppress(OSError):
             self._write(STANDS)
             self._pipe.close()
-        with suppress(subprocess.TimeoutExpired):
+        try:
             self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._kill()
+
+    def _kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
 
     @property
     def _pipe(self) -> Any:
@@ -92,26 +107,34 @@ class GoalGuard:
     def _write(self, sign: bytes) -> None:
         with self._lock:
             self._pipe.write(sign)
-            self._pipe.flush()
+            self._unanswered += 1
 
     def _show_life(self) -> None:
         while not self._closing.wait(SIGN_S):
             try:
                 self._write(DRIVES if self._drives() else STANDS)
-                self._hear_ready()
+                was_missing = self._is_missing
+                self._hear()
+                if self._is_missing != was_missing:
+                    self._report("")
+                self._check_answers()
             except OSError:
                 self._replace()
 
-    def _hear_ready(self) -> None:
-        """Report a new guard once its node is there; until then the robot must not drive."""
-        if self._is_missing and self._is_ready(within_s=0.0):
-            self._is_missing = False
-            self._report("")
-
-    def _is_ready(self, within_s: float) -> bool:
+    def _hear(self, within_s: float = 0.0) -> None:
+        """Take that the node is there, before which nothing may drive, and answers to signs of life."""
         out = self._process.stdout
         assert out is not None
-        return bool(select.select([out], [], [], within_s)[FIRST]) and out.readline() == READY
+        if select.select([out], [], [], within_s)[FIRST]:
+            said = os.read(out.fileno(), MOST_BYTES)
+            self._is_missing = self._is_missing and READY not in said
+            with self._lock:
+                self._unanswered = max(0, self._unanswered - said.count(ANSWER))
+
+    def _check_answers(self) -> None:
+        """Raise TimeoutError if the process hangs."""
+        if self._unanswered > (MOST_UNREADY if self._is_missing else MOST_UNANSWERED):
+            raise TimeoutError
 
     def _replace(self) -> None:
         """Start another process, at most one in `END_S`."""
@@ -122,8 +145,8 @@ class GoalGuard:
         with self._lock:
             with suppress(OSError):
                 self._pipe.close()
-            self._process.wait()
-            self._process = self._started()
+            self._kill()
+            self._process, self._unanswered = self._started(), 0
 
 
 class Signs:
@@ -159,7 +182,10 @@ def guard(node: RosNode, wanted: dict[str, Any], source: int) -> None:
     signs = Signs(time.monotonic())
     while not signs.ended:
         if select.select([source], [], [], SIGN_S)[FIRST]:
-            signs.take(os.read(source, 4096), time.monotonic())
+            data = os.read(source, MOST_BYTES)
+            signs.take(data, time.monotonic())
+            with suppress(OSError):  # the program has ended: it must be stopped all the same
+                os.write(sys.stdout.fileno(), ANSWER * len(data))
         if signs.must_stop(time.monotonic()):
             robot.stop()
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -24,9 +25,14 @@ PROGRAM = "stop_process.py"
 SIGN_S = 0.1
 FRESH_SIGNS = 50
 """Number of signs of life after which new frames are made: signed ones must not be too old."""
+APART_SIGNS = 20
+"""Number of signs between two processes, where one after another ends."""
 FRAMES = 40
 """HOLD this often, for four seconds: the link may lose some."""
 END_S = 2.0
+STUCK_S = 1
+"""Longest time for which a sign of life waits for a process that reads none, in whole seconds."""
+ENDED = "the process that stops the vehicle if this program ends has ended or hangs; started again"
 
 
 class StopGuard:
@@ -37,20 +43,31 @@ class StopGuard:
         self._peer = peer
         self._drives = drives
         self._stopped = stopped
-        self._signs = 0
+        self._signs = self._replaced_until = 0
         self._frames: list[str] = []
         self._closing = threading.Event()
         self._line, self._process = _started()
         self._thread = threading.Thread(target=self._show_life, name="stop guard", daemon=True)
         self._thread.start()
 
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
     def close(self) -> None:
         """End the process: the vehicle needs no guard any more."""
         self._closing.set()
         self._thread.join()
         self._line.close()
-        with suppress(subprocess.TimeoutExpired):
+        try:
             self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._kill()
+
+    def _kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
 
     def _show_life(self) -> None:
         while not self._closing.wait(SIGN_S):
@@ -58,12 +75,21 @@ class StopGuard:
                 self._show_sign(drives=self._drives())
                 self._take_report()
             except OSError:
-                say("the process that stops the vehicle if this program ends has ended; started again")
-                self._line.close()
-                self._closing.wait(END_S)
-                self._line, self._process = _started()
+                self._replace()
         with suppress(OSError):
             self._show_sign(drives=False)
+
+    def _replace(self) -> None:
+        """Start another process, and show it a sign of life: at once, then at most one in `APART_SIGNS`."""
+        if self._signs < self._replaced_until:
+            return
+        self._replaced_until = self._signs + APART_SIGNS
+        say(ENDED)
+        self._line.close()
+        self._kill()
+        self._line, self._process = _started()
+        with suppress(OSError):
+            self._show_sign(drives=self._drives())
 
     def _show_sign(self, *, drives: bool) -> None:
         """Send a sign of life, with the link's present descriptors and frames for a stop."""
@@ -85,6 +111,7 @@ def _started() -> tuple[socket.socket, subprocess.Popen[bytes]]:
     """Start the process, in a session of its own: no signal for this program's group ends it."""
     source = files(__package__).joinpath(PROGRAM).read_text(encoding="utf-8")
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", STUCK_S, 0))
     with its:
         process = subprocess.Popen(
             [sys.executable, "-I", "-S", "-c", source, str(its.fileno())],

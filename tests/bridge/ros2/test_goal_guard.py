@@ -7,6 +7,8 @@ import signal
 from pathlib import Path
 from queue import Queue
 
+import pytest
+
 from stopgo.bridge.ros2.goal_guard import DRIVES, ENDED, SILENT_S, STANDS, GoalGuard, Signs
 
 LAST_RESORT_S = 60.0
@@ -48,15 +50,24 @@ def test_nothing_drives_before_the_guard_is_ready(tmp_path: Path) -> None:
         guard.close()
 
 
-def test_a_guard_that_was_killed_is_reported_and_replaced() -> None:
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_guard_that_was_killed_or_frozen_is_reported_and_replaced(how: signal.Signals) -> None:
     reports: Queue[str] = Queue()
     guard = GoalGuard({}, lambda: True, reports.put, module="tests.bridge.ros2.idle_guard")
     try:
-        killed = guard.pid
-        os.kill(killed, signal.SIGKILL)
+        first = guard.pid
+        os.kill(first, how)
         assert reports.get(timeout=LAST_RESORT_S) == ENDED
         while reports.get(timeout=LAST_RESORT_S):
             pass
-        assert guard.pid != killed
+        assert guard.pid != first
     finally:
         guard.close()
+
+
+def test_a_guard_that_is_frozen_does_not_keep_the_program_from_its_end() -> None:
+    guard = GoalGuard({}, lambda: False, lambda why: None, module="tests.bridge.ros2.idle_guard")
+    os.kill(guard.pid, signal.SIGSTOP)
+    guard.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(guard.pid, 0)

@@ -18,6 +18,7 @@ from stopgo.bridge.mavlink.driving.stop_guard import is_available
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.telemetry import Message
+from tests.waiting import wait_until
 
 pytestmark = [
     pytest.mark.skipif(not is_available(), reason="no descriptors over sockets here"),
@@ -40,8 +41,12 @@ with wire(read_url(sys.argv[1]), me=Who(253, 191), signing_key=key) as opened:
     guard = StopGuard(peer, lambda: drives, lambda: print("stopped", flush=True))
     time.sleep(0.3)
     print("ready", flush=True)
-    if sys.stdin.readline() == "close\\n":
-        guard.close()
+    for line in sys.stdin:
+        if line == "close\\n":
+            guard.close()
+            print("closed", flush=True)
+            break
+        print(guard.pid, flush=True)
 """
 
 
@@ -60,6 +65,18 @@ def driver(url: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
 def ready(process: subprocess.Popen[str]) -> None:
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
+
+
+def answer(process: subprocess.Popen[str], line: str) -> str:
+    """The next line of output, after a line of input."""
+    assert process.stdin is not None and process.stdout is not None
+    process.stdin.write(line + "\n")
+    process.stdin.flush()
+    return process.stdout.readline()
+
+
+def guard_of(process: subprocess.Popen[str]) -> int:
+    return int(answer(process, "pid"))
 
 
 @pytest.fixture
@@ -98,6 +115,27 @@ def test_a_program_that_is_killed_or_frozen_while_it_drives_leaves_a_vehicle_on_
         if how == signal.SIGSTOP:
             os.kill(process.pid, signal.SIGCONT)
             assert process.stdout is not None and process.stdout.readline() == "stopped\n"
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_guard_that_was_killed_or_frozen_is_replaced(vehicle: socket.socket, how: signal.Signals) -> None:
+    with driver(url_of(vehicle), "drives", "") as process:
+        ready(process)
+        first = guard_of(process)
+        os.kill(first, how)
+        wait_until(lambda: guard_of(process) != first)
+        process.kill()
+        assert is_hold(holds(vehicle, dialect.MAVLink(None))[0])
+
+
+def test_a_guard_that_is_frozen_does_not_keep_the_program_from_its_end(vehicle: socket.socket) -> None:
+    with driver(url_of(vehicle), "stands", "") as process:
+        ready(process)
+        frozen = guard_of(process)
+        os.kill(frozen, signal.SIGSTOP)
+        assert answer(process, "close") == "closed\n"
+        with pytest.raises(ProcessLookupError):
+            os.kill(frozen, 0)
 
 
 def test_signed_frames_are_accepted_one_after_another(vehicle: socket.socket) -> None:
