@@ -9,11 +9,11 @@ import sys
 import time
 from pathlib import Path
 
-from stopgo.bridge.ros2.goal_guard import ANSWER, MOST_BYTES
+from stopgo.bridge.ros2.goal_guard import ANSWER, MOST_BYTES, READY
 
 if "marks" in (wanted := json.loads(sys.argv[1])):
     time.sleep(0.5)
     Path(wanted["marks"]).touch()
-print("ready", flush=True)
+os.write(sys.stdout.fileno(), READY)
 while signs := os.read(sys.stdin.fileno(), MOST_BYTES):
     os.write(sys.stdout.fileno(), ANSWER * len(signs))
