@@ -141,11 +141,13 @@ class Searches:
         It is for one task: the first bound holds for later problems too, which only have more demands.
         """
         bound = 0
+        settled: set[int] = set()
 
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
             nonlocal bound
             bound = bound or lower_bound(cover, found=len(start))
-            return improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN), bound
+            better = improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN, settled=settled)
+            return better, bound
 
         return search
 
