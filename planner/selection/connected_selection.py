@@ -123,6 +123,14 @@ def connected_rows(task: ConnectedCover, rows: IntArray) -> IntArray:
 
 def _without_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
     """The rows without those needed neither for coverage nor for connection."""
+    before = len(rows) + 1
+    while len(rows) < before:  # a row may be needed only to connect another that is idle
+        before = len(rows)
+        rows = _without_some_idle(task, rows)
+    return rows
+
+
+def _without_some_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
     cover = task.cover
     covered = cover.covered_by(rows)
     reached = cover.reached(covered)
