@@ -16,12 +16,12 @@ from stopgo.planner.selection.cover import Cover
 
 SIZE = 60
 """Most stops of a district."""
-Search = Callable[[Cover, IntArray, int], IntArray]
+DistrictSearch = Callable[[Cover, IntArray, int], IntArray]
 """`(problem, start, at least) -> rows`: as few rows as it finds."""
 
 
 def improved_by_districts(
-    cover: Cover, chosen: IntArray, search: Search, *, at_least: int, settled: set[int]
+    cover: Cover, chosen: IntArray, search: DistrictSearch, *, at_least: int, settled: set[int]
 ) -> IntArray:
     """A smaller selection, never below the lower bound `at_least`: districts are searched in turn.
 
@@ -51,7 +51,9 @@ def _around_first(cover: Cover, rows: IntArray, settled: set[int]) -> IntArray:
     return np.sort(rows[found[:SIZE]])
 
 
-def _searched(cover: Cover, rows: IntArray, district: IntArray, search: Search, at_least: int) -> IntArray:
+def _searched(
+    cover: Cover, rows: IntArray, district: IntArray, search: DistrictSearch, at_least: int
+) -> IntArray:
     """The rows, with fewer in one district if the search finds them."""
     others = np.setdiff1d(rows, district)
     problem, offered = _problem_of(cover, others, district)
@@ -61,7 +63,7 @@ def _searched(cover: Cover, rows: IntArray, district: IntArray, search: Search, 
 
 
 def _problem_of(cover: Cover, others: IntArray, district: IntArray) -> tuple[Cover, IntArray]:
-    """What the other rows leave to see in a district, and the rows offered there (ascending)."""
+    """The problem that the other rows leave in a district, and the rows offered there (ascending)."""
     covered = cover.covered_by(others)
     lost = np.flatnonzero((covered < cover.asks) & (cover.covered_by(district) > 0))
     offered = np.union1d(cover.seen_by[lost].indices, district).astype(np.int64)
