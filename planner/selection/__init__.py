@@ -23,7 +23,7 @@ from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.exact_cover import exact
 from stopgo.planner.selection.greedy import greedy, in_greedy_order
-from stopgo.planner.selection.improve import improved
+from stopgo.planner.selection.improve import LARGE, improved
 from stopgo.planner.selection.separators import Conditions
 
 Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
@@ -138,14 +138,19 @@ class Searches:
     def default(settings: Settings) -> Search:
         """Drop-and-repair; it ignores the conditions, and its caller connects the components.
 
-        It is for one task: the first bound holds for later problems too, which only have more demands.
+        It is for one task: the first bound holds for later problems too, which only have more demands. A
+        large search never comes near a bound, so that a simple one serves.
         """
         bound = 0
+        settled: set[int] = set()
 
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
             nonlocal bound
-            bound = bound or lower_bound(cover, found=len(start))
-            return improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN), bound
+            if not bound:
+                is_large = len(start) > LARGE
+                bound = counting_bound(cover) if is_large else lower_bound(cover, found=len(start))
+            better = improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN, settled=settled)
+            return better, bound
 
         return search
 

@@ -23,7 +23,6 @@ from stopgo.planner.selection.separators import (
     Conditions,
     components_of,
     conditions_between,
-    meets,
     regions_of,
     separators,
 )
@@ -74,6 +73,14 @@ class ConnectedCover:
         inside = (np.intersect1d(rows, region) for region in self.regions)
         return sum(max(0, len(components_of(self.links, own)) - 1) for own in inside)
 
+    def connectors(self, rows: IntArray) -> set[int]:
+        """Those of these rows without which a component of them falls apart."""
+        import networkx as nx
+
+        inside = np.intersect1d(rows, np.concatenate(self.regions))
+        found = nx.articulation_points(nx.from_scipy_sparse_array(self.links[inside][:, inside]))
+        return {int(inside[k]) for k in found}
+
 
 def connected(task: ConnectedCover, search: Search, *, rounds: int) -> tuple[IntArray, int]:
     """Rows that meet every demand and are connected as far as links allow, and a lower bound."""
@@ -116,11 +123,27 @@ def connected_rows(task: ConnectedCover, rows: IntArray) -> IntArray:
 
 def _without_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
     """The rows without those needed neither for coverage nor for connection."""
-    covered = task.cover.covered_by(rows)
-    columns = [task.cover.columns_of(int(row)) for row in rows]
-    alone = [int(task.cover.weight[seen][covered[seen] <= task.cover.asks[seen]].sum()) for seen in columns]
-    for row in rows[np.argsort(alone, kind="stable")]:
-        rest = rows[rows != row]
-        if meets(task.cover, rest) and not task.parts(rest):
-            rows = rest
+    before = len(rows) + 1
+    while len(rows) < before:  # a row may be needed only to connect another that is idle
+        before = len(rows)
+        rows = _without_some_idle(task, rows)
+    return rows
+
+
+def _without_some_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
+    cover = task.cover
+    covered = cover.covered_by(rows)
+    reached = cover.reached(covered)
+    columns = {row: cover.columns_of(row) for row in rows.tolist()}
+    alone = [int(cover.weight[seen][covered[seen] <= cover.asks[seen]].sum()) for seen in columns.values()]
+    connects = task.connectors(rows)
+    for row in rows[np.argsort(alone, kind="stable")].tolist():
+        seen = columns[row]
+        lost = cover.worths.of(seen[covered[seen] == cover.asks[seen]])
+        if row in connects or (reached - lost < cover.needed).any():
+            continue
+        covered[seen] -= 1
+        reached -= lost
+        rows = rows[rows != row]
+        connects = task.connectors(rows)
     return rows

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
@@ -13,15 +13,21 @@ from stopgo.planner.selection.cover import Cover
 
 def greedy(cover: Cover) -> IntArray:
     """Rows in the order of choice, until every demand is met or no row adds anything."""
-    return _by_gain(cover, range(cover.rows), until_met=True)
+    return _by_gain(cover, _first_gains(cover), until_met=True)
 
 
 def in_greedy_order(cover: Cover, rows: IntArray) -> IntArray:
     """The same rows, ordered so that each next row has the largest gain."""
-    return _by_gain(cover, rows.tolist(), until_met=False)
+    covered, short = np.zeros(cover.columns, dtype=np.int64), cover.views_needed
+    gains = [(*_gain(cover, row, covered, short, cover.needed), row) for row in rows.tolist()]
+    return _by_gain(cover, gains, until_met=False)
 
 
-def _by_gain(cover: Cover, rows: Iterable[int], *, until_met: bool) -> IntArray:
+Gain = tuple[int, int, int, int]
+"""Negative gain of a row in three ways, so that the least is the best, and the row."""
+
+
+def _by_gain(cover: Cover, queue: list[Gain], *, until_met: bool) -> IntArray:
     """Rows by their gain for unmet demands, then by their total gain, then by the lower row number.
 
     Gains only fall while rows are chosen. So an outdated gain is computed again only when its row
@@ -29,7 +35,6 @@ def _by_gain(cover: Cover, rows: Iterable[int], *, until_met: bool) -> IntArray:
     """
     covered = np.zeros(cover.columns, dtype=np.int64)
     short, missing = cover.views_needed.copy(), cover.needed
-    queue = [(*_gain(cover, row, covered, short, missing), row) for row in rows]
     heapq.heapify(queue)
     chosen: list[int] = []
     while queue and (missing.any() or not until_met):
@@ -45,6 +50,18 @@ def _by_gain(cover: Cover, rows: Iterable[int], *, until_met: bool) -> IntArray:
         covered[cover.columns_of(row)] += 1
         missing = short if cover.once else cover.missing(covered)
     return np.array(chosen, dtype=np.int64)
+
+
+def _first_gains(cover: Cover) -> list[Gain]:
+    """`_gain` of every row before any is chosen."""
+    adds = csr_array(cover.sees @ cover.adds_to)
+    gain, unmet = adds.copy(), adds.copy()
+    gain.data = np.minimum(adds.data, cover.views_needed[adds.indices])
+    unmet.data = np.where(cover.needed[adds.indices] > 0, adds.data, 0)
+    first = np.asarray(gain.sum(axis=1)).ravel()
+    second = np.where(first > 0, 0, np.asarray(unmet.sum(axis=1)).ravel())
+    whole = adds[:, [0]].toarray().ravel()
+    return list(zip((-first).tolist(), (-second).tolist(), (-whole).tolist(), range(cover.rows), strict=True))
 
 
 def _gain(

@@ -8,6 +8,7 @@ import numpy as np
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.districts import improved_by_districts
 from stopgo.planner.selection.swaps import SwapBoard
 
 SWAPS = 400
@@ -16,16 +17,37 @@ TRIALS = 24_000
 """Stops evaluated in all those swaps together, so that large floors get fewer swaps."""
 ENTRIES = 50_000_000
 """Views of columns evaluated in all swaps, so that open floors and long ranges also get fewer swaps."""
+LARGE = 100
+"""Stops of a selection from which on it is searched by districts."""
+DISTRICT_SWAPS = 60
+"""Swaps in a district before its search ends."""
 TENURE = 7
 """Swaps for which a removed row may not return."""
 
 
-def improved(cover: Cover, chosen: IntArray, *, at_least: int, swaps: int = SWAPS) -> IntArray:
-    """The smallest selection that drop-and-repair finds, never below the lower bound `at_least`."""
-    best = chosen
+def improved(
+    cover: Cover,
+    chosen: IntArray,
+    *,
+    at_least: int,
+    swaps: int = SWAPS,
+    settled: set[int] | None = None,
+) -> IntArray:
+    """The smallest selection that drop-and-repair finds, never below the lower bound `at_least`.
+
+    A large one is searched by districts; `settled` keeps the rows searched in vain between two searches.
+    """
+    if len(chosen) > LARGE:
+        return improved_by_districts(
+            cover, chosen, lambda part, rows, least: _improved(part, rows, least, DISTRICT_SWAPS),
+            at_least=at_least, settled=set() if settled is None else settled,
+        )  # fmt: skip
     at_once = len(chosen) * cover.sees.nnz**2 // max(1, cover.rows * cover.columns)
     least = min(TRIALS // max(1, len(chosen)), ENTRIES // max(1, at_once))
-    swaps = min(swaps, max(TENURE, least))
+    return _improved(cover, chosen, at_least, min(swaps, max(TENURE, least)))
+
+
+def _improved(cover: Cover, best: IntArray, at_least: int, swaps: int) -> IntArray:
     while len(best) > at_least:
         smaller = _repaired(cover, _without_least(cover, best), swaps)
         if smaller is None:
@@ -48,7 +70,7 @@ def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
     for _ in range(swaps):
         if not board.missing.any():
             return np.array(sorted(rows), dtype=np.int64)
-        if len(rows) == cover.rows:
+        if len(rows) in (0, cover.rows):
             return None
         if len(set(rows) | set(tabu)) == cover.rows:
             tabu.clear()  # no other row is left to add

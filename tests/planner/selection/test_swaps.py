@@ -12,7 +12,7 @@ from stopgo.planner.selection.swaps import SwapBoard
 from tests.faults.sizes import size
 
 
-def _cover(seed: int, *, rows: int = 24, columns: int = 70, rooms: int = 5, views: int = 1) -> Cover:
+def cover_of_rooms(seed: int, *, rows: int = 24, columns: int = 70, rooms: int = 5, views: int = 1) -> Cover:
     """A problem whose rows see little beyond their own room; demands of the whole, of rooms, of two kinds."""
     random = np.random.Generator(np.random.PCG64(seed))
     room_of_row, room = random.integers(0, rooms, rows), random.integers(0, rooms, columns)
@@ -46,7 +46,7 @@ def test_after_every_swap_the_next_best_one_is_found(
 ) -> None:
     monkeypatch.setattr(swaps, "FIRST_OF_FAR", 2)
     monkeypatch.setattr(swaps, "MOST_AT_ONCE", 30)
-    cover = _cover(seed, views=views)
+    cover = cover_of_rooms(seed, views=views)
     rows = np.random.Generator(np.random.PCG64(seed)).permutation(cover.rows)[:7].tolist()
     board, tabu = SwapBoard(cover, rows), []
     for _ in range(20):
