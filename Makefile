@@ -29,12 +29,12 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check .
 
 types: $(STAMP)
-	$(BIN)/mypy
+	$(BIN)/pyrefly check
 
 # Most tests of links wait for something, so six files at a time are run even on two processors (tests/workers.py), in
-# the order that tests/conftest.py deals them out. mypy, which uses one processor, runs beside them and speaks last.
+# the order that tests/conftest.py deals them out. pyrefly checks types beside them and speaks last.
 test: lint
-	@$(BIN)/mypy >$(VENV)/types.txt 2>&1 & types=$$!; \
+	@$(BIN)/pyrefly check >$(VENV)/types.txt 2>&1 & types=$$!; \
 	$(BIN)/python -m pytest -p tests.workers --workers 6; tests=$$?; \
 	wait $$types; typed=$$?; cat $(VENV)/types.txt; \
 	[ $$tests -eq 0 ] && [ $$typed -eq 0 ]
@@ -61,4 +61,4 @@ docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info recordings/demo .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) build dist *.egg-info recordings/demo .pytest_cache .ruff_cache

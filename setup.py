@@ -1,8 +1,8 @@
 """Where the folders of the tree go when stopgo is installed, and the kernels that are compiled then.
 
 The folders go below `stopgo`, the one name that it takes. The links `stopgo/mission -> ../mission` and so
-on say the same to mypy and editors. The build does not follow them, so that it also works where a checkout
-has no links, as on Windows.
+on say the same to type checkers and editors. The build does not follow them, so that it also works where
+a checkout has no links, as on Windows.
 
 Each kernel is one Python file. Cython and a C compiler make a second module of it, `<name>_compiled`, with
 the types of `<name>_compiled.pxd`. Without either the kernels stay interpreted, with the same results. The

@@ -78,7 +78,9 @@ def watch_with(
     state: StateReport | None = None
     shown: tuple[str | None, int | None] = (None, None)
     missions: dict[tuple[str, int], Mission] = {}
-    past = None if run_id is None else past_reports(station, run_id, lambda *name: missions.get(name))
+    past = None
+    if run_id is not None:
+        past = past_reports(station, run_id, lambda name, revision: missions.get((name, revision)))
     for report in station.reports() if past is None else past:
         revision = _revision_of(report)
         if revision is not None and revision != shown:

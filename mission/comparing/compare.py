@@ -36,7 +36,12 @@ from stopgo.mission.stages.sight import Sight
 
 VISITS = (Arrived, Settled, Scanned, Unconfirmed, Skipped, Failed)
 """Events at a stop."""
-OUTCOMES = {Scanned: "scanned", Unconfirmed: "unconfirmed", Skipped: "skipped", Failed: "failed"}
+OUTCOMES: dict[type[object], str] = {
+    Scanned: "scanned",
+    Unconfirmed: "unconfirmed",
+    Skipped: "skipped",
+    Failed: "failed",
+}
 
 
 def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = ()) -> Comparison:

@@ -182,7 +182,7 @@ class _Counts:
         units = [np.bincount(elements[mask], minlength=size) for mask in masks]
         metres = [np.bincount(elements[mask], length[mask], minlength=size) for mask in masks]
         by_units = space.settings.coverage_rule == "paper"
-        return cls(np.stack(units, axis=1), np.stack(metres, axis=1), by_units)
+        return cls(np.stack(units, axis=1), np.stack(metres, axis=1, dtype=np.float64), by_units)
 
     def summary(self, rows: list[int], *, with_elements: bool = True) -> dict[str, Any]:
         """Return the sums of some elements."""

@@ -355,7 +355,8 @@ def _chunk(rows: list[Row], chunk: Chunk) -> str:
     shown = rows[chunk.first : chunk.first + chunk.count]
     lines = [_frame(box)]
     first = shown[1] if len(shown) > 1 and shown[1].edges == STOP_EDGES else shown[0]
-    head = {STOP_EDGES: STOP_HEAD, COVERAGE_EDGES: COVERAGE_HEAD}.get(first.edges)
+    heads: dict[tuple[float, ...], Row] = {STOP_EDGES: STOP_HEAD, COVERAGE_EDGES: COVERAGE_HEAD}
+    head = heads.get(first.edges)
     if head is not None and not first.bold:
         lines.append(_row(head, box.x, box.y + HEADER - 1.5))
     for index, row in enumerate(shown):

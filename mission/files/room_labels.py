@@ -174,7 +174,7 @@ def _best_place(
     busy = avoid.near(low - half, high + half).and_also(LABEL, close)
     outside = OUTSIDE * _outside(x, y, half, rings)
     cost = _covered(x, y, half + AROUND, busy) + outside
-    far = np.hypot(*((tried - (low + high) / 2) / (high - low + 1e-9)).T)
+    far: FloatArray = np.hypot(*((tried - (low + high) / 2) / (high - low + 1e-9)).T)
     order = np.lexsort((np.arange(len(tried)), np.round(far, 6), cost))
     best = order[0]
     way = busy.xy[busy.weight == WAY]

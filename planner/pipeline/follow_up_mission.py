@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.as_driven import AsDriven
@@ -200,14 +200,15 @@ def _must_be_whole(missions: Sequence[Mission]) -> None:
     for mission in missions[1:]:
         if UNSET in (first.share, mission.share) or mission.origin != first.origin:
             raise InputError(f"{mission.name}: is not of the same divided plan as {first.name}")
-    if first.share is UNSET:
+    shares = [share for one in missions if not isinstance(share := one.share, UnsetType)]
+    if not shares:
         return
-    given = {mission.share.number for mission in missions if mission.share is not UNSET}
-    missing = [str(number) for number in range(1, first.share.of + 1) if number not in given]
+    given, of = {share.number for share in shares}, shares[0].of
+    missing = [str(number) for number in range(1, of + 1) if number not in given]
     if missing:
         raise InputError(
-            f"{first.name}: divides its floor with {first.share.of - 1} more; give also mission "
-            f"{', '.join(missing)} of {first.share.of}, each with --mission"
+            f"{first.name}: divides its floor with {of - 1} more; give also mission "
+            f"{', '.join(missing)} of {of}, each with --mission"
         )
 
 

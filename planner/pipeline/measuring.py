@@ -26,6 +26,7 @@ BINS = 60
 ABOVE = ("beams",)
 """Kinds of elements above the heights at which clouds are compared."""
 CELL_M = 0.1
+CELL_CORNERS = np.array([(0, 0), (1, 1), (0, 1), (1, 0)])
 LEAST_SWEEPS = 3
 """An object hit in fewer sweeps at one position may be a person who walks by."""
 LEAST_CELLS = 2
@@ -141,7 +142,7 @@ def _unplanned(counts: _SweepCounts, space: NavigableSpace, least: int) -> list[
         if len(own) >= LEAST_CELLS:
             corners = (
                 counts.corner
-                + np.concatenate([own, own + 1, own + np.array([0, 1]), own + np.array([1, 0])]) * CELL_M
+                + np.concatenate([own + beside for beside in CELL_CORNERS], dtype=np.float64) * CELL_M
             )
             hits = int(counts.cells[tuple(own.T)].max())
             found.append(Unplanned(hull_of(corners, margin=MARGIN_M), hits, counts.sweeps))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import Element, FloorPlan
-from stopgo.mission.geometry import FloatArray, frozen, polyline_length
+from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from stopgo.mission.stages import Targets
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import (
@@ -106,7 +106,7 @@ def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Ta
     )
 
 
-def units_on(lengths: FloatArray, *, d_dis: float) -> FloatArray:
+def units_on(lengths: FloatArray, *, d_dis: float) -> IntArray:
     """Least number of equal units of at most `d_dis` that make up each length (paper, 3.1).
 
     A length may exceed this by the amount that snapping its ends to the grid adds. So rotating the drawing

@@ -35,7 +35,7 @@ def sight_outline(eye: FloatArray, lines: FloatArray) -> FloatArray:
         return np.stack([eye, eye])
     farthest = np.where(inside, _distance(middle[:, None], a, b), -1.0).argmax(axis=1)
     ends = [_along(angle, a[farthest], b[farthest]) for angle in (edges, after)]
-    return eye + _closed_line(np.stack(ends, axis=1), inside.any(axis=1))
+    return eye + _closed_line(np.stack(ends, axis=1), np.any(inside, axis=1))
 
 
 def _distinct_angles(angles: FloatArray) -> FloatArray:

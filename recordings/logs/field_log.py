@@ -190,7 +190,7 @@ def poses_of(
     `more` are further fields of `Poses`.
     """
     times, positions = np.asarray(ns, np.int64), np.asarray(xy, float).reshape(-1, 2)
-    finite = np.isfinite(positions).all(axis=1) & (np.abs(positions) < FARTHEST).all(axis=1)
+    finite = np.all(np.isfinite(positions) & (np.abs(positions) < FARTHEST), axis=1)
     mended = mended_times(times[finite], positions[finite], forward=not own_clock)
     times = times.copy()
     times[finite] = mended.ns
@@ -210,8 +210,7 @@ def poses_of(
     heights = None if height is None else frozen(np.asarray(height, float)[order])
     return Poses(
         source, frame, frozen(times[order], np.int64), frozen(positions[order]), headings,
-        **{"oddities": oddities, "height": heights, "steps_ns": mended.steps_ns,
-           "own_clock": own_clock, **more},
+        oddities=oddities, height=heights, steps_ns=mended.steps_ns, own_clock=own_clock, **more,
     )  # fmt: skip
 
 

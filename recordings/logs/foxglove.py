@@ -7,7 +7,6 @@ with several poses) has a single time, and is left out.
 from __future__ import annotations
 
 import base64
-import binascii
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -94,7 +93,7 @@ def _decoded(topic: Topic, raw: bytes) -> Any:
     """
     try:
         return KINDS[topic.msgtype](json.loads(raw))
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError, binascii.Error):
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         raise UnknownType(f"text that is not a {topic.msgtype}") from None
 
 

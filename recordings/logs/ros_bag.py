@@ -188,7 +188,7 @@ def decoded(store: Any, msgtype: str, raw: bytes, *, ros2: bool) -> Any:
 
     try:
         return store.deserialize_cdr(raw, msgtype) if ros2 else store.deserialize_ros1(raw, msgtype)
-    except (KeyError, SerdeError, struct.error, ValueError, IndexError, UnicodeDecodeError) as error:
+    except (KeyError, SerdeError, struct.error, ValueError, IndexError) as error:
         raise UnknownType(f"{msgtype}: {_reason(error)}") from None
 
 

@@ -53,7 +53,7 @@ SOLID_S = 0.5
 """Interval in seconds of the robot's poses in 3D."""
 WARNINGS = (Skipped, Failed, Unconfirmed, Held, LinkLost, Aborted)
 """Events that need attention."""
-MARKS = {
+MARKS: dict[type[object], tuple[str, palette.Meaning, float]] = {
     Arrived: (entities.ARRIVED, palette.ARRIVED, ORDER["arrival"]),
     Scanned: (entities.SCANNED, palette.SCANNED, ORDER["scan"]),
     Skipped: (entities.SKIPPED, palette.SKIPPED, ORDER["scan"]),

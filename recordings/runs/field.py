@@ -124,9 +124,9 @@ class FieldRecording:
         """Draw a pose of the robot."""
         self._accept(report)
 
-    def health(self, report: Health) -> None:
+    def health(self, health: Health) -> None:
         """Draw the health of the robot's base."""
-        self._accept(report)
+        self._accept(health)
 
     def missing(self, gap: PosesMissing) -> None:
         """Draw a gap in the poses: no path is drawn through it."""

@@ -90,8 +90,8 @@ class Viewed:
     def event(self, event: AnyEvent) -> None:
         self._record.event(event)
 
-    def health(self, report: Health) -> None:
-        self._record.health(report)
+    def health(self, health: Health) -> None:
+        self._record.health(health)
 
     def missing(self, gap: PosesMissing) -> None:
         self._record.missing(gap)

@@ -127,7 +127,7 @@ def page_handler(behind: str, site: str) -> type[BaseHTTPRequestHandler]:
             self.end_headers()
             self.wfile.write(body)
 
-        def log_message(self, *words: Any) -> None:
+        def log_message(self, format: str, *args: Any) -> None:
             """Print nothing."""
 
     return ViewerPages

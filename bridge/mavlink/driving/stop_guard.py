@@ -109,7 +109,7 @@ class StopGuard:
 
 def _started() -> tuple[socket.socket, subprocess.Popen[bytes]]:
     """Start the process, in a session of its own: no signal for this program's group ends it."""
-    source = files(__package__).joinpath(PROGRAM).read_text(encoding="utf-8")
+    source = files("stopgo.bridge.mavlink.driving").joinpath(PROGRAM).read_text(encoding="utf-8")
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", STUCK_S, 0))
     with its:

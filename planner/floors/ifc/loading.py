@@ -118,7 +118,7 @@ def _unzipped(file: FloorFile) -> bytes:
                 raise InputError(f"{file.path}: holds {len(members)} .ifc files; zip one model alone")
             _check_size(members[0].file_size, file)
             return archive.read(members[0])
-    except (zipfile.BadZipFile, OSError, EOFError, RuntimeError, NotImplementedError, ValueError) as error:
+    except (zipfile.BadZipFile, OSError, EOFError, RuntimeError, ValueError) as error:
         said = str(error) or type(error).__name__
         raise InputError(f"{file.path}: cannot be unzipped ({said}); copy or export it again") from None
 
