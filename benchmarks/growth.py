@@ -24,9 +24,10 @@ SIZES = (
     (100.0, 50.0),
     (120.0, 85.0),
     (200.0, 150.0),
-    (350.0, 290.0),
 )
 PLOT = ROOT / "docs" / "images" / "growth.svg"
+FROM = 2
+"""First of the sizes between which exponents are given: below, fixed costs hide them."""
 STAGES = ("navigable", "candidates", "visibility", "selection", "route")
 
 ONE = """
@@ -59,6 +60,18 @@ def measured(width: float, height: float) -> list[object]:
     laps = told["laps"]
     spent = [laps[n] for n in ("NavigableSpace", "Candidates", "Visibility", "Selection", "Route")]
     return [round(width * height), told["rooms"], told["stops"], *spent, sum(spent), round(told["mb"])]
+
+
+def exponents(rows: list[list[object]]) -> str:
+    """Exponents of the area in each stage's time, between two sizes, in one line."""
+    from math import log
+
+    small, large = rows[FROM], rows[-1]
+    grown = log(large[0] / small[0])
+    each = [
+        f"{name} {log(large[3 + k] / small[3 + k]) / grown:.2f}" for k, name in enumerate((*STAGES, "total"))
+    ]
+    return f"Exponents of the area from {small[0]} to {large[0]} m²: {', '.join(each)}."
 
 
 def whole_command(floor: Path, *, runs: int = 5) -> float:
@@ -110,6 +123,7 @@ def main() -> None:
         "Synthetic offices (seed 1), default settings, one process each, seconds. "
         + versions("numpy", "scipy", "shapely"),
         table(["m²", "rooms", "stops", *STAGES, "total", "peak MB"], rows),
+        exponents(rows),
         "![Seconds to plan a floor, by its area](../docs/images/growth.svg)",
     ]
     case = ROOT.parent / "shared" / "data" / "paper" / "synthetic_case1_structural.dxf"

@@ -72,9 +72,8 @@ def _gain(
     First the views that are short. If there are none: views of unmet demands, which may be of columns
     not counted as short. Last the views of the whole.
     """
-    adds = _adds(cover, row, covered)
-    gain = int(np.minimum(adds, short).sum())
-    return -gain, 0 if gain else -int(adds[missing > 0].sum()), -int(adds[0])
+    gain, unmet, whole = cover.worths.gain(cover.columns_of(row), covered, cover.asks, short, missing)
+    return -gain, 0 if gain else -unmet, -whole
 
 
 def _adds(cover: Cover, row: int, covered: IntArray) -> IntArray:

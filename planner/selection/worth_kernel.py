@@ -56,3 +56,41 @@ def add_worth_by_row(
             begin = place[demand[entry]] * rows
             for pair in range(seen_first[column], seen_first[column + 1]):
                 sums[begin + seer[pair]] += worth[entry]
+
+
+def take_gain(
+    columns: Any, covered: Any, asks: Any, adds_first: Any, demand: Any, worth: Any, short: Any,
+    missing: Any, sums: Any, gains: Any,
+) -> None:  # fmt: skip
+    """Sum up what columns add that still need views: of what is short, of unmet demands, of the whole.
+
+    Parameters
+    ----------
+    columns, adds_first, demand, worth
+        As for `add_worth`.
+    covered, asks
+        Views that each column has and needs (columns,).
+    short, missing
+        Views and weight that each demand still needs (demands,).
+    sums
+        Zeros (demands,), and zeros again afterwards.
+    gains
+        Receives the three sums (3,). A demand counts in the first for no more than it is short.
+    """
+    gains[0] = gains[1] = gains[2] = 0
+    for k in range(len(columns)):
+        column = columns[k]
+        if covered[column] < asks[column]:
+            for entry in range(adds_first[column], adds_first[column + 1]):
+                sums[demand[entry]] += worth[entry]
+    for k in range(len(columns)):
+        column = columns[k]
+        for entry in range(adds_first[column], adds_first[column + 1]):
+            total = sums[demand[entry]]
+            if total:
+                gains[0] += min(total, short[demand[entry]])
+                if missing[demand[entry]] > 0:
+                    gains[1] += total
+                if demand[entry] == 0:
+                    gains[2] = total
+                sums[demand[entry]] = 0

@@ -15,3 +15,10 @@ cpdef void add_worth_by_row(
     const whole[::1] columns, const whole[::1] seen_first, const whole[::1] seer, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, const whole[::1] place, whole rows, whole[::1] sums
 ) noexcept nogil
+
+@cython.locals(column=whole, entry=whole, k=whole, total=whole)
+cpdef void take_gain(
+    const whole[::1] columns, const whole[::1] covered, const whole[::1] asks, const whole[::1] adds_first,
+    const whole[::1] demand, const whole[::1] worth, const whole[::1] short, const whole[::1] missing,
+    whole[::1] sums, whole[::1] gains
+) noexcept nogil

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
-from stopgo.planner.selection.worth_kernel import add_worth, add_worth_by_row
+from stopgo.planner.selection.worth_kernel import add_worth, add_worth_by_row, take_gain
 from stopgo.planner.visibility.unit_ranges import ranges
 
 
@@ -30,6 +30,8 @@ class Worths:
         self._demands, self._rows = int(adds_to.shape[1]), int(seen_by.shape[1])
         self._adds, self._seen = _entries(adds_to), _entries(seen_by)
         self._worth = np.ascontiguousarray(adds_to.data, np.int64)
+        self._sums = np.zeros(self._demands, dtype=np.int64)
+        self._gains = np.zeros(3, dtype=np.int64)
 
     def of(self, columns: IntArray) -> IntArray:
         """Worth of columns to each demand (demands,)."""
@@ -40,6 +42,22 @@ class Worths:
         sums = np.zeros(self._demands, dtype=np.int64)
         kernel(columns, *self._adds, self._worth, sums)
         return sums
+
+    def gain(
+        self, columns: IntArray, covered: IntArray, asks: IntArray, short: IntArray, missing: IntArray
+    ) -> tuple[int, int, int]:
+        """Worth of the columns that still need views: to what is short, to unmet demands, to the whole.
+
+        `covered` and `asks` are views of each column (columns,), `short` and `missing` views and worth that
+        each demand still needs (demands,). A demand counts in the first for no more than it is short.
+        """
+        kernel = compiled(take_gain, large=False)
+        if kernel is None:
+            adds = self.of(columns[covered[columns] < asks[columns]])
+            return int(np.minimum(adds, short).sum()), int(adds[missing > 0].sum()), int(adds[0])
+        kernel(columns, covered, asks, *self._adds, self._worth, short, missing, self._sums, self._gains)
+        first, second, whole = self._gains.tolist()
+        return first, second, whole
 
     def by_row(self, columns: IntArray, demands: IntArray) -> IntArray:
         """Worth of those of the columns that each row sees (demands, rows)."""

@@ -18,6 +18,25 @@ def _sums(adds_to: csr_array, seen_by: csr_array, columns: IntArray, demands: In
 
 
 @pytest.mark.parametrize("count", [0, 1, 9])
+def test_gains_are_the_same_in_numpy_as_written_and_compiled(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for seed in range(5):
+        random = np.random.default_rng(seed)
+        worth = random.integers(0, 9, (30, 6)) * (random.random((30, 6)) < 0.4)
+        columns = np.sort(random.choice(30, count, replace=False))
+        covered, asks = random.integers(0, 3, 30), random.integers(1, 3, 30)
+        short, missing = random.integers(0, 20, 6), random.integers(0, 2, 6)
+        adds = worth[columns[covered[columns] < asks[columns]]].sum(axis=0)
+        counted = (int(np.minimum(adds, short).sum()), int(adds[missing > 0].sum()), int(adds[0]))
+        for kernels in (lambda kernel: None, lambda kernel: kernel, machine_code):
+            monkeypatch.setattr(worths, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
+            sums = Worths(csr_array(worth), csr_array(np.ones((30, 1), np.int64)))
+            for _ in range(2):
+                assert sums.gain(columns, covered, asks, short, missing) == counted
+
+
+@pytest.mark.parametrize("count", [0, 1, 9])
 def test_sums_are_the_same_in_numpy_as_written_and_compiled(
     count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
