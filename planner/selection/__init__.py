@@ -17,13 +17,13 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.overlap import links_of
-from stopgo.planner.selection.bound import counting_bound, lower_bound
+from stopgo.planner.selection.bound import counting_bound, first_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.exact_cover import exact
 from stopgo.planner.selection.greedy import greedy, in_greedy_order
-from stopgo.planner.selection.improve import LARGE, improved
+from stopgo.planner.selection.improve import improved
 from stopgo.planner.selection.separators import Conditions
 
 Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
@@ -35,7 +35,14 @@ def _greedy(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
 
 
 def _default(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
-    start, bound = _greedy(cover, settings)
+    rows, bound = _draft(cover, settings)
+    return rows, bound if len(rows) <= bound else max(bound, lower_bound(cover, found=len(rows)))
+
+
+def _draft(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
+    """The rows of the default method, with a first bound."""
+    start = greedy(cover)
+    bound = first_bound(cover, found=len(start))
     return improved(cover, start, at_least=bound), bound
 
 
@@ -68,7 +75,8 @@ def select(visibility: Visibility, *, joined: bool = True) -> Selection:
     """Choose stops by the method of the settings, with a lower bound on their number.
 
     Required stops, and doorways added for registration, are chosen first and count. Where scans must
-    register with one another, doorways are offered too. Not `joined`, the scans need not register.
+    register with one another, doorways are offered too. Not `joined`, the scans need not register, and the
+    default method's bound is a first one.
     """
     settings = visibility.settings
     method = variant("selector", settings.selector, METHODS)
@@ -76,7 +84,10 @@ def select(visibility: Visibility, *, joined: bool = True) -> Selection:
     if settings.registers and joined:
         rows, bound = _connected(visibility, whole, fixed, np.arange(whole.rows), method)
         return _selection(visibility, whole, rows, bound, method)
-    rows, bound = _solved(method, problem, settings)
+    if method.name == "default" and not joined:
+        rows, bound = _draft(problem, settings)
+    else:
+        rows, bound = _solved(method, problem, settings)
     chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)
     return _selection(visibility, whole, chosen, len(fixed) + bound, method)
 
@@ -138,17 +149,14 @@ class Searches:
     def default(settings: Settings) -> Search:
         """Drop-and-repair; it ignores the conditions, and its caller connects the components.
 
-        It is for one task: the first bound holds for later problems too, which only have more demands. A
-        large search never comes near a bound, so that a simple one serves.
+        It is for one task: the first bound holds for later problems too, which only have more demands.
         """
         bound = 0
         settled: set[int] = set()
 
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
             nonlocal bound
-            if not bound:
-                is_large = len(start) > LARGE
-                bound = counting_bound(cover) if is_large else lower_bound(cover, found=len(start))
+            bound = bound or first_bound(cover, found=len(start))
             better = improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN, settled=settled)
             return better, bound
 

@@ -12,6 +12,12 @@ from stopgo.planner.selection.linear_programme import minimised
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes 1 s at this size."""
+QUICK = 100_000
+"""Entries above which the relaxation takes up to seconds, and a first bound comes from the multipliers."""
+FIRST_STEPS = 100
+"""Steps of such a first bound."""
+FIRST_WORK = 40_000_000
+"""Entries evaluated in all of them together."""
 STEPS = 1000
 """Most steps of the multiplier bound; a count, so that no bound depends on speed."""
 WORK = 200_000_000
@@ -46,7 +52,18 @@ def lower_bound(cover: Cover, *, found: int) -> int:
     return max(simple, better)
 
 
-def multiplier_bound(cover: Cover, *, found: int) -> int:
+def first_bound(cover: Cover, *, found: int) -> int:
+    """A lower bound in little time: of a small problem the best one, else a few steps of the multipliers."""
+    if cover.sees.nnz <= QUICK:
+        return lower_bound(cover, found=found)
+    simple = counting_bound(cover)
+    if simple >= found or not cover.needed.any():
+        return simple
+    steps = min(FIRST_STEPS, FIRST_WORK // cover.sees.nnz)
+    return max(simple, multiplier_bound(cover, found=found, steps=steps))
+
+
+def multiplier_bound(cover: Cover, *, found: int, steps: int = STEPS) -> int:
     """Lagrangian bound: prices u_j on v_j y_j <= Σ x_i, raised where a column is used and not seen.
 
     For any prices u >= 0 of columns and p >= 0 of all demands but the whole, Σ_i min(0, 1 - Σ_j in i u_j)
@@ -57,7 +74,7 @@ def multiplier_bound(cover: Cover, *, found: int) -> int:
     problem = _Priced(cover, scale)
     prices = np.concatenate([cover.weight / scale, np.zeros(len(cover.needed) - 1)])
     best, step, waited, direction = 0.0, FIRST_STEP, 0, np.zeros(len(prices))
-    for _ in range(min(STEPS, max(50, WORK // max(1, cover.sees.nnz)))):
+    for _ in range(min(steps, max(50, WORK // max(1, cover.sees.nnz)))):
         value, slope = problem.value(prices)
         waited = 0 if value > best + 1e-4 else waited + 1
         best = max(best, value)

@@ -73,13 +73,10 @@ class ConnectedCover:
         inside = (np.intersect1d(rows, region) for region in self.regions)
         return sum(max(0, len(components_of(self.links, own)) - 1) for own in inside)
 
-    def connectors(self, rows: IntArray) -> set[int]:
-        """Those of these rows without which a component of them falls apart."""
-        import networkx as nx
-
-        inside = np.intersect1d(rows, np.concatenate(self.regions))
-        found = nx.articulation_points(nx.from_scipy_sparse_array(self.links[inside][:, inside]))
-        return {int(inside[k]) for k in found}
+    def pieces(self, rows: IntArray) -> int:
+        """Components of these rows, of those in a region."""
+        inside = np.intersect1d(rows, np.concatenate([np.empty(0, np.int64), *self.regions]))
+        return len(components_of(self.links, inside))
 
 
 def connected(task: ConnectedCover, search: Search, *, rounds: int) -> tuple[IntArray, int]:
@@ -136,14 +133,14 @@ def _without_some_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
     reached = cover.reached(covered)
     columns = {row: cover.columns_of(row) for row in rows.tolist()}
     alone = [int(cover.weight[seen][covered[seen] <= cover.asks[seen]].sum()) for seen in columns.values()]
-    connects = task.connectors(rows)
+    pieces = task.pieces(rows)
     for row in rows[np.argsort(alone, kind="stable")].tolist():
         seen = columns[row]
         lost = cover.worths.of(seen[covered[seen] == cover.asks[seen]])
-        if row in connects or (reached - lost < cover.needed).any():
+        rest = rows[rows != row]
+        if (reached - lost < cover.needed).any() or (left := task.pieces(rest)) > pieces:
             continue
         covered[seen] -= 1
         reached -= lost
-        rows = rows[rows != row]
-        connects = task.connectors(rows)
+        rows, pieces = rest, left
     return rows
