@@ -57,6 +57,7 @@ print(json.dumps(told))
 
 PLAN = """
 import copyreg, pickle, sys
+from types import MappingProxyType
 from benchmarks.floors import office
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.settings import Settings

@@ -66,7 +66,7 @@ def _problem_of(cover: Cover, others: IntArray, district: IntArray) -> tuple[Cov
     """The problem that the other rows leave in a district, and the rows offered there (ascending)."""
     covered = cover.covered_by(others)
     lost = np.flatnonzero((covered < cover.asks) & (cover.covered_by(district) > 0))
-    offered = np.union1d(cover.seen_by[lost].indices, district).astype(np.int64)
+    offered = np.setdiff1d(np.union1d(cover.seen_by[lost].indices, district), others).astype(np.int64)
     sees = cover.sees[offered]
     columns = np.flatnonzero((covered < cover.asks) & (np.asarray(sees.sum(axis=0)).ravel() > 0))
     missing = cover.missing(covered)

@@ -17,7 +17,7 @@ from tests.faults.sizes import size
 from tests.planner.selection.test_connected_selection import task_of
 from tests.planner.selection.test_swaps import cover_of_rooms
 
-SEEDS = range(size(short=3, full=40))
+SEEDS = range(size(short=6, full=40))
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def small_districts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("small_districts")
-@pytest.mark.parametrize("views", [1, 2])
+@pytest.mark.parametrize("views", [1, 2, 3])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_selection_improved_by_districts_meets_what_greedy_meets_with_no_more_rows(
     seed: int, views: int
