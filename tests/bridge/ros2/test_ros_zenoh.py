@@ -167,7 +167,7 @@ def test_each_change_of_a_run_is_shown_until_it_is_over(sessions: tuple[Any, Any
 
         def robot_goes_on(_: float) -> None:
             """The next state, once the last one was heard."""
-            if listener.state == sent[-1]:
+            if listener.state == sent[-1] and len(sent) <= len(states):
                 sent.append({"stop": None, "stop_state": None, **states[len(sent) - 1]})
                 publisher.put(state_message(**sent[-1]))
 
