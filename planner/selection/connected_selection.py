@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -68,15 +69,18 @@ class ConnectedCover:
             self.cuts.setdefault(cut.tobytes(), cut)
         return len(self.cuts) > before
 
+    @cached_property
+    def _region_of(self) -> IntArray:
+        """Region of each row, -1 for none (all rows,)."""
+        region_of = np.full(self.links.shape[0], -1, dtype=np.int64)
+        for number, region in enumerate(self.regions):
+            region_of[region] = number
+        return region_of
+
     def parts(self, rows: IntArray) -> int:
         """Surplus components of these rows: those that rows on offer could connect."""
-        inside = (np.intersect1d(rows, region) for region in self.regions)
-        return sum(max(0, len(components_of(self.links, own)) - 1) for own in inside)
-
-    def pieces(self, rows: IntArray) -> int:
-        """Components of these rows, of those in a region."""
-        inside = np.intersect1d(rows, np.concatenate([np.empty(0, np.int64), *self.regions]))
-        return len(components_of(self.links, inside))
+        inside = rows[self._region_of[rows] >= 0]  # no link leads out of a region
+        return len(components_of(self.links, inside)) - len(np.unique(self._region_of[inside]))
 
 
 def connected(task: ConnectedCover, search: Search, *, rounds: int) -> tuple[IntArray, int]:
@@ -133,14 +137,13 @@ def _without_some_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
     reached = cover.reached(covered)
     columns = {row: cover.columns_of(row) for row in rows.tolist()}
     alone = [int(cover.weight[seen][covered[seen] <= cover.asks[seen]].sum()) for seen in columns.values()]
-    pieces = task.pieces(rows)
     for row in rows[np.argsort(alone, kind="stable")].tolist():
         seen = columns[row]
         lost = cover.worths.of(seen[covered[seen] == cover.asks[seen]])
         rest = rows[rows != row]
-        if (reached - lost < cover.needed).any() or (left := task.pieces(rest)) > pieces:
+        if (reached - lost < cover.needed).any() or task.parts(rest):
             continue
         covered[seen] -= 1
         reached -= lost
-        rows, pieces = rest, left
+        rows = rest
     return rows
