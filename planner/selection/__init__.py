@@ -17,7 +17,7 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.overlap import links_of
-from stopgo.planner.selection.bound import counting_bound, first_bound, lower_bound
+from stopgo.planner.selection.bound import counting_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
@@ -42,7 +42,7 @@ def _default(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
 def _draft(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
     """The rows of the default method, with a first bound."""
     start = greedy(cover)
-    bound = first_bound(cover, found=len(start))
+    bound = lower_bound(cover, found=len(start), quickly=True)
     return improved(cover, start, at_least=bound), bound
 
 
@@ -156,7 +156,7 @@ class Searches:
 
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
             nonlocal bound
-            bound = bound or first_bound(cover, found=len(start))
+            bound = bound or lower_bound(cover, found=len(start), quickly=True)
             better = improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN, settled=settled)
             return better, bound
 

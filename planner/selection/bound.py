@@ -11,7 +11,7 @@ from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.linear_programme import minimised
 
 LARGEST = 400_000
-"""Entries of the covering matrix above which the relaxation is not solved: it takes 1 s at this size."""
+"""Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
 QUICK = 100_000
 """Entries above which the relaxation takes up to seconds, and a first bound comes from the multipliers."""
 FIRST_STEPS = 100
@@ -40,27 +40,21 @@ def _fewest(gains: IntArray, needed: int) -> int:
     return int(np.searchsorted(np.cumsum(np.sort(gains)[::-1]), needed)) + 1 if needed > 0 else 0
 
 
-def lower_bound(cover: Cover, *, found: int) -> int:
+def lower_bound(cover: Cover, *, found: int, quickly: bool = False) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
-    Small problems use the linear relaxation, large ones the multiplier bound.
+    Small problems use the linear relaxation, large ones the multiplier bound; `quickly`, problems of more
+    than `QUICK` entries a few of its steps.
     """
-    simple = counting_bound(cover)
+    simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
         return simple
-    better = relaxation_bound(cover) if cover.sees.nnz <= LARGEST else multiplier_bound(cover, found=found)
-    return max(simple, better)
-
-
-def first_bound(cover: Cover, *, found: int) -> int:
-    """A lower bound in little time: of a small problem the best one, else a few steps of the multipliers."""
-    if cover.sees.nnz <= QUICK:
-        return lower_bound(cover, found=found)
-    simple = counting_bound(cover)
-    if simple >= found or not cover.needed.any():
-        return simple
-    steps = min(FIRST_STEPS, FIRST_WORK // cover.sees.nnz)
-    return max(simple, multiplier_bound(cover, found=found, steps=steps))
+    if quickly and entries > QUICK:
+        steps = min(FIRST_STEPS, FIRST_WORK // entries)
+        return max(simple, multiplier_bound(cover, found=found, steps=steps))
+    return max(
+        simple, relaxation_bound(cover) if entries <= LARGEST else multiplier_bound(cover, found=found)
+    )
 
 
 def multiplier_bound(cover: Cover, *, found: int, steps: int = STEPS) -> int:
