@@ -18,7 +18,7 @@ TRIALS = 24_000
 ENTRIES = 50_000_000
 """Views of columns evaluated in all swaps, so that open floors and long ranges also get fewer swaps."""
 LARGE = 100
-"""Stops of a selection from which on it is searched by districts."""
+"""Stops of a selection above which it is searched by districts."""
 DISTRICT_SWAPS = 60
 """Swaps in a district before its search ends."""
 TENURE = 7
@@ -35,7 +35,8 @@ def improved(
 ) -> IntArray:
     """The smallest selection that drop-and-repair finds, never below the lower bound `at_least`.
 
-    A large one is searched by districts; `settled` keeps the rows searched in vain between two searches.
+    A large one is searched by districts, each with `DISTRICT_SWAPS`; `settled` keeps the rows searched in
+    vain between two searches.
     """
     if len(chosen) > LARGE:
         return improved_by_districts(

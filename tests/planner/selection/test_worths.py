@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
@@ -10,6 +12,13 @@ from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection import worths
 from stopgo.planner.selection.worths import Worths
 from tests.planner.kernels import machine_code
+
+
+def by_each_kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """In numpy, by the kernels as written, and by the compiled ones."""
+    for kernels in (lambda kernel: None, lambda kernel: kernel, machine_code):
+        monkeypatch.setattr(worths, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
+        yield
 
 
 def _sums(adds_to: csr_array, seen_by: csr_array, columns: IntArray, demands: IntArray) -> list[list]:
@@ -29,8 +38,7 @@ def test_gains_are_the_same_in_numpy_as_written_and_compiled(
         short, missing = random.integers(0, 20, 6), random.integers(0, 2, 6)
         adds = worth[columns[covered[columns] < asks[columns]]].sum(axis=0)
         counted = (int(np.minimum(adds, short).sum()), int(adds[missing > 0].sum()), int(adds[0]))
-        for kernels in (lambda kernel: None, lambda kernel: kernel, machine_code):
-            monkeypatch.setattr(worths, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
+        for _ in by_each_kernel(monkeypatch):
             sums = Worths(csr_array(worth), csr_array(np.ones((30, 1), np.int64)))
             for _ in range(2):
                 assert sums.gain(columns, covered, asks, short, missing) == counted
@@ -47,6 +55,5 @@ def test_sums_are_the_same_in_numpy_as_written_and_compiled(
         columns = np.sort(random.choice(30, count, replace=False))
         demands = np.flatnonzero(random.random(6) < 0.5)
         counted = [worth[columns].sum(axis=0).tolist(), (worth[columns].T @ sees[columns])[demands].tolist()]
-        for kernels in (lambda kernel: None, lambda kernel: kernel, machine_code):
-            monkeypatch.setattr(worths, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
+        for _ in by_each_kernel(monkeypatch):
             assert _sums(csr_array(worth), csr_array(sees), columns, demands) == counted
