@@ -12,7 +12,6 @@ environment variable STOPGO_PURE leaves them out, for a wheel that fits every ma
 import os
 import sys
 from pathlib import Path
-from typing import Any
 
 from setuptools import Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
