@@ -28,9 +28,7 @@ def reach(
     first, and their distances; `before` leads back from each to the source. Return the number of points.
     """
     many, ways = 0, 1
-    away[source] = 0.0
-    before[source] = -1
-    touched[0] = source
+    away[source], before[source], touched[0] = 0.0, -1, source
     size = push(0, 0.0, source, key, item)
     while size > 0:
         size = pop(size, key, item)
@@ -47,18 +45,23 @@ def reach(
         for edge in range(first[here], first[here + 1]):
             there = to[edge]
             total = away[here] + length[edge]
-            if away[there] >= 0.0 and away[there] <= total:
-                continue
             if away[there] < 0.0:
                 touched[ways] = there
                 ways += 1
+            elif away[there] <= total:
+                continue
             away[there] = total
             before[there] = here
             size = push(size, total, there, key, item)
+    forget(ways, touched, away, closed)
+    return many
+
+
+def forget(ways: int, touched: Any, away: Any, closed: Any) -> None:
+    """Take back what a search noted of its nodes."""
     for k in range(ways):
         away[touched[k]] = -1.0
         closed[touched[k]] = 0
-    return many
 
 
 def push(size: int, value: float, node: int, key: Any, item: Any) -> int:
