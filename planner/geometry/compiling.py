@@ -17,7 +17,7 @@ def compiled(kernel: Callable[..., Any], *, large: bool) -> Callable[..., Any] |
     """Return the kernel as machine code, with the same results; None where none was built.
 
     Without it a line is printed before `large` work, once. Compiled kernels take contiguous arrays of
-    64-bit integers where interpreted ones also take lists. A kernel's integers must fit 64 bits, beyond
+    64-bit numbers where interpreted ones also take lists. A kernel's integers must fit 64 bits, beyond
     which machine code and Python differ; each kernel's file states why they do.
     """
     module = compiled_module(kernel.__module__)

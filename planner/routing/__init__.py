@@ -21,10 +21,11 @@ from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing.colony import ant_colony
 from stopgo.planner.routing.grid_graph import grid_paths
 from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths
 from stopgo.planner.routing.proof import tour_proof
-from stopgo.planner.routing.roadmap import paths_between
-from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
+from stopgo.planner.routing.roadmap import nearby_paths_between, paths_between
+from stopgo.planner.routing.tour import NANOMETRES, canonical, nanometres, shortest_tour
 from stopgo.planner.space.reach import reach_of
 
 Router = Callable[..., IntArray]
@@ -32,6 +33,10 @@ ROUTERS: dict[str, Router] = {"default": shortest_tour, "aco": ant_colony}
 METHODS = {"default": "2-opt, Or-opt, iterated", "aco": "ant colony"}
 Graph = Callable[[NavigableSpace, FloatArray], Paths]
 GRAPHS: dict[str, Graph] = {"exact": paths_between, "grid": grid_paths}
+
+
+ALL_PAIRS_UP_TO = 500
+"""Points up to which the paths between all pairs are found first."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +59,42 @@ def route(selection: Selection) -> Route:
     settings = space.settings
     router = variant("router", settings.router, ROUTERS)
     points, ends = points_and_ends(selection)
+    if len(points) > ALL_PAIRS_UP_TO and (settings.router, settings.graph) == ("default", "exact"):
+        return _route_over_nearby(selection, points, ends, router)
     legs = legs_between(space, points)
     if not np.isfinite(legs.lengths).all():
-        raise NegativeResult(f"{space.floor.name}: the route's end is not connected with its stops")
+        raise _not_connected(selection)
     sequence, bound, method = _ordered(legs.lengths, ends, router, seed=settings.seed)
     method += "" if settings.graph == "exact" else f", over the paths of --graph {settings.graph}"
     return assembled(selection, points, legs, sequence, ends, bound, method)
+
+
+def _route_over_nearby(
+    selection: Selection, points: FloatArray, ends: Ends, router: Variant[Router]
+) -> Route:
+    """The route over many points, of which only near pairs have exact lengths.
+
+    The tour is searched over upper bounds on all other lengths, so that it is no longer than it seems. Its
+    own lengths are then exact, and lower bounds on all others give its bound.
+    """
+    paths = nearby_paths_between(selection.space, points)
+    if not paths.connected:
+        raise _not_connected(selection)
+    matrix = tour_matrix(paths.at_most(), ends)
+    by_place = np.concatenate(
+        [[0], 1 + np.argsort(selection.chosen[1:]), np.arange(len(selection.chosen), len(matrix))]
+    )
+    matrix = matrix[np.ix_(by_place, by_place)]  # neighbours in memory too, which is quicker
+    order = canonical(by_place[router.called(matrix, seed=selection.settings.seed)])
+    del matrix
+    sequence = _sequence(order, ends, len(points))
+    paths.learn(np.stack([sequence, np.roll(sequence, -1)], axis=1))
+    bound = tour_bound(paths.at_least(), sequence, ends)
+    return assembled(selection, points, paths, sequence, ends, bound, METHODS["default"])
+
+
+def _not_connected(selection: Selection) -> NegativeResult:
+    return NegativeResult(f"{selection.space.floor.name}: the route's end is not connected with its stops")
 
 
 def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
@@ -144,10 +179,11 @@ def _ordered(
 
 def tour_bound(lengths: FloatArray, sequence: list[int], ends: Ends) -> float:
     """Lower bound in metres on a route between these ends over all points; `sequence` is one such route."""
-    matrix = tour_matrix(lengths, ends)
-    tour = [*sequence, *([] if len(matrix) == len(lengths) else [len(lengths)])]
-    proof = tour_proof(nanometres(matrix), np.array(tour, dtype=np.int64), improve=False)
-    return max(0.0, proof.bound / NANOMETRES - far_edge(lengths, ends))
+    points, extra, cost = len(lengths), far_edge(lengths, ends), nanometres(tour_matrix(lengths, ends))
+    del lengths  # of thousands of points this is a large part of the memory
+    tour = [*sequence, *([] if len(cost) == points else [points])]
+    proof = tour_proof(cost, np.array(tour, dtype=np.int64), improve=False)
+    return max(0.0, proof.bound / NANOMETRES - extra)
 
 
 def tour_matrix(lengths: FloatArray, ends: Ends) -> FloatArray:
@@ -192,7 +228,7 @@ def _sequence(order: IntArray, ends: Ends, points: int) -> list[int]:
 def assembled(
     selection: Selection,
     points: FloatArray,
-    legs: Legs,
+    legs: Legs | NearbyPaths,
     sequence: list[int],
     ends: Ends,
     bound: float,

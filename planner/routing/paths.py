@@ -36,25 +36,33 @@ class Paths:
             if before[nodes[-1]] < 0:
                 raise ValueError(f"no path from point {start} to point {end}")
             nodes.append(int(before[nodes[-1]]))
-        line = self.xy[nodes[::-1]]
-        if len(line) < 2 or np.all(line == line[0]):
-            return frozen(line[:1])
-        # a point on a straight piece would make the robot stop there
-        straightened = shapely.simplify(shapely.LineString(line - line[0]), SLACK, preserve_topology=False)
-        inner = shapely.get_coordinates(straightened)[1:-1] + line[0]
-        return frozen(np.concatenate([line[:1], inner, line[-1:]]))
+        return straightened(self.xy[nodes[::-1]])
 
     way = path  # its name in 0.1; ends with 0.3
 
 
+def straightened(line: FloatArray) -> FloatArray:
+    """A polyline (n, 2) without points on its straight pieces, at which the robot would stop."""
+    if len(line) < 2 or np.all(line == line[0]):
+        return frozen(line[:1])
+    simple = shapely.simplify(shapely.LineString(line - line[0]), SLACK, preserve_topology=False)
+    inner = shapely.get_coordinates(simple)[1:-1] + line[0]
+    return frozen(np.concatenate([line[:1], inner, line[-1:]]))
+
+
 def shortest_paths(xy: FloatArray, edges: IntArray, points: int) -> Paths:
     """Shortest paths between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
+    graph = edge_lengths(xy, edges)
+    chunks = [np.arange(points)[k : k + CHUNK] for k in range(0, points, CHUNK)]
+    lengths = [dijkstra(graph, directed=False, indices=chunk)[:, :points] for chunk in chunks]
+    return Paths(xy=frozen(xy), lengths=frozen(np.concatenate(lengths)), graph=graph)
+
+
+def edge_lengths(xy: FloatArray, edges: IntArray) -> csr_array:
+    """Lengths of straight edges (m, 2) between nodes (n, 2), each once, from the lower node to the higher."""
     low, high = edges.min(axis=1), edges.max(axis=1)
     key = np.unique(low[low < high] * len(xy) + high[low < high])
     pair = np.stack([key // len(xy), key % len(xy)], axis=1)
     length = np.hypot(*(xy[pair[:, 0]] - xy[pair[:, 1]]).T)
     # a length of exactly 0 would mean "no edge" to the sparse solver
-    graph = csr_array((np.maximum(length, 1e-12), (pair[:, 0], pair[:, 1])), shape=(len(xy),) * 2)
-    chunks = [np.arange(points)[k : k + CHUNK] for k in range(0, points, CHUNK)]
-    lengths = [dijkstra(graph, directed=False, indices=chunk)[:, :points] for chunk in chunks]
-    return Paths(xy=frozen(xy), lengths=frozen(np.concatenate(lengths)), graph=graph)
+    return csr_array((np.maximum(length, 1e-12), (pair[:, 0], pair[:, 1])), shape=(len(xy),) * 2)

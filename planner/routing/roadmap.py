@@ -24,6 +24,7 @@ from stopgo.planner.geometry.shapes import (
     to_shape,
     whole_steps,
 )
+from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths, shortest_paths
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.sight.mesh import mesh_of
@@ -31,12 +32,24 @@ from stopgo.planner.visibility.sight.sight import scene_of, sight
 
 PAIRS = 1_000_000
 """Pairs of nodes in memory at a time, about 200 bytes each."""
+SPARE = 8
+"""Times as many pairs from each node as from those before have room: the next may be in a wider place."""
 TOUCH = 1e-9
 """Products of areas (m⁴) below this are floating-point noise."""
 
 
 def paths_between(space: NavigableSpace, points: FloatArray) -> Paths:
     """Shortest paths between all pairs of points (n, 2) of the drive area."""
+    return shortest_paths(*_graph_of(space, points), len(points))
+
+
+def nearby_paths_between(space: NavigableSpace, points: FloatArray) -> NearbyPaths:
+    """Shortest paths from each point (n, 2) of the drive area to the points near it."""
+    return NearbyPaths(*_graph_of(space, points), len(points))
+
+
+def _graph_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The nodes (n, 2), points first, and the straight pieces (m, 2) of shortest paths between points."""
     origin = local_origin(space.floor)
     corners = outward_corners(space)
     ends, crossing = np.unique(space.gaps.reshape(-1, 2) - origin, axis=0, return_inverse=True)
@@ -50,7 +63,7 @@ def paths_between(space: NavigableSpace, points: FloatArray) -> Paths:
         on_crossings(points - origin, nodes, links),
         to_anchors,
     ]
-    return shortest_paths(nodes + origin, np.concatenate(edges), len(points))
+    return nodes + origin, np.concatenate(edges)
 
 
 def anchors_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -102,9 +115,10 @@ def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntA
     """Links (k, 2) from points that lie on a gap crossing, such as stops in doorways, to its ends."""
     if not len(links):
         return np.empty((0, 2), dtype=np.int64)
-    crossings = shapely.linestrings(nodes[links])
-    near = shapely.dwithin(shapely.points(points)[:, None], crossings[None, :], GRID)
-    point, crossing = np.nonzero(near)
+    crossings = shapely.STRtree(shapely.linestrings(nodes[links]))
+    point, crossing = crossings.query(shapely.points(points), predicate="dwithin", distance=GRID)
+    order = np.lexsort((crossing, point))
+    point, crossing = point[order], crossing[order]
     return np.stack([np.repeat(point, 2), links[crossing].ravel()], axis=1).astype(np.int64)
 
 
@@ -120,13 +134,15 @@ def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first
     mesh = mesh_of(whole_steps(_drive_area(space)))
     scene = scene_of(mesh, nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
     node, between = views_of(to_grid(nodes), to_grid(sides))
-    rows = 1 + PAIRS // len(nodes)
-    found = []
-    for k in range(0, len(node), rows):
-        chosen = node[k : k + rows]
-        runs = sight(scene, to_grid(nodes[chosen]), reach=None, between=between[k : k + rows])
+    fewest, done, found = 1 + PAIRS // len(nodes), 0, []
+    rows = fewest
+    while done < len(node):
+        chosen = node[done : done + rows]
+        runs = sight(scene, to_grid(nodes[chosen]), reach=None, between=between[done : done + rows])
         pairs = np.stack([np.repeat(chosen, np.diff(runs.pointer)), runs.segment], axis=1)
         found.append(_tangent(pairs, nodes, sides))
+        done += len(chosen)
+        rows = max(fewest, PAIRS * len(chosen) // (SPARE * max(1, len(pairs))))
     return np.concatenate(found)
 
 

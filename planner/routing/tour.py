@@ -30,6 +30,8 @@ NEAREST = 10
 """Nearest points to which new edges are tried from each point."""
 LONGEST_STRETCH = 50
 """Points in each of the two stretches that a perturbation exchanges, at most."""
+BLOCK = 256
+"""Points whose neighbours are sorted at a time."""
 JOURNAL = 1000
 """Most reversals in a trial, so that it can be undone."""
 
@@ -52,7 +54,8 @@ def nanometres(lengths: FloatArray) -> IntArray:
     if float(np.max(lengths, initial=0.0)) * NANOMETRES * len(lengths) > LARGEST:
         longest, most = float(lengths.max()), LARGEST / NANOMETRES / len(lengths)
         raise InputError(f"route: a path of {longest:g} m between {len(lengths)} stops; at most {most:g} m")
-    return np.floor(lengths * NANOMETRES).astype(np.int64)
+    whole = lengths * NANOMETRES
+    return np.floor(whole, out=whole).astype(np.int64)
 
 
 def length_of(cost: IntArray, order: IntArray) -> int:
@@ -84,9 +87,17 @@ def trials(cost: IntArray, count: int, *, seed: int) -> IntArray:
 
 def nearest(cost: IntArray, many: int) -> tuple[IntArray, IntArray]:
     """The nearest other points of each point (n, many), and their distances."""
-    away = cost + np.diag(np.full(len(cost), cost.max() + 1))
-    near = np.argsort(away, axis=1, kind="stable")[:, :many]
-    return near, np.take_along_axis(away, near, axis=1)
+    n, beyond = len(cost), int(cost.max()) + 1
+    near = np.empty((n, many), dtype=np.int64)
+    for k in range(0, n, BLOCK):
+        away = cost[k : k + BLOCK].copy()
+        away[np.arange(len(away)), np.arange(k, k + len(away))] = beyond
+        most = np.partition(away, many - 1, axis=1)[:, many - 1 : many]
+        point, other = np.nonzero(away <= most)
+        order = np.lexsort((other, away[point, other], point))
+        first = np.searchsorted(point, np.arange(len(away)))
+        near[k : k + BLOCK] = other[order][first[:, None] + np.arange(many)]
+    return near, np.take_along_axis(cost, near, axis=1)
 
 
 def search(cost: IntArray, perturbations: IntArray, *, interpreted: bool = False) -> IntArray:
@@ -112,9 +123,8 @@ BEST = 5
 
 def _nearest_neighbours(cost: IntArray) -> IntArray:
     """The tour that always continues to the nearest unvisited point."""
-    away = cost.copy()
-    order = [0]
+    order, visited = [0], np.zeros(len(cost), dtype=bool)
     for _ in range(len(cost) - 1):
-        away[:, order[-1]] = np.iinfo(np.int64).max
-        order.append(int(np.argmin(away[order[-1]])))
+        visited[order[-1]] = True
+        order.append(int(np.argmin(np.where(visited, np.iinfo(np.int64).max, cost[order[-1]]))))
     return np.array(order, dtype=np.int64)

@@ -96,7 +96,8 @@ def _told(tree: OneTree) -> tuple[int, IntArray]:
 
 def one_tree(cost: IntArray, weight: IntArray) -> OneTree:
     """The smallest one-tree where every edge costs its ends' weights more (Prim's algorithm)."""
-    costs = cost + weight[:, None] + weight[None, :]
+    costs = cost + weight[:, None]
+    costs += weight[None, :]
     n = len(cost)
     away, parent = costs[0, :-1].copy(), np.zeros(n - 1, dtype=np.int64)
     reached = np.zeros(n - 1, dtype=np.int64)

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.geometry.ring_index import areas_within
 from stopgo.planner.geometry.shapes import GRID, polygon_parts
 
 
@@ -56,8 +57,9 @@ class Parts:
 
     def area_by_part(self, shape: BaseGeometry) -> dict[int, float]:
         """Drive area within `shape`, by part."""
-        inside = np.sort(self.tree.query(shape, predicate="intersects"))
-        sizes = shapely.area(shapely.intersection(self.cells[inside], shape))
+        inside = np.sort(self.tree.query(shape))
+        sizes = areas_within(self.cells[inside], shape)
+        inside, sizes = inside[sizes > 0], sizes[sizes > 0]
         totals = np.bincount(self.cell_part[inside], weights=sizes, minlength=0)
         return {part: float(totals[part]) for part in np.unique(self.cell_part[inside]).tolist()}
 

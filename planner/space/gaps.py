@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -37,9 +38,13 @@ class Walls:
     def shapes(self) -> NDArray[np.object_]:
         return shapely.linestrings(self.segments) if len(self.segments) else np.empty(0, dtype=object)
 
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        return shapely.STRtree(self.shapes())
+
     def near(self, shape: BaseGeometry) -> Walls:
         """The walls that touch a shape."""
-        index = np.sort(shapely.STRtree(self.shapes()).query(shape, predicate="intersects"))
+        index = np.sort(self._tree.query(shape, predicate="intersects"))
         return Walls(self.segments[index], self.clearance[index])
 
 

@@ -12,6 +12,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
+from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import (
     GRID,
     GROWTH,
@@ -40,6 +41,7 @@ class Ground:
     outline: BaseGeometry
     """The floor layer and the floor under inner openings."""
     obstacles: BaseGeometry
+    obstacle_rings: RingIndex
     crossings: tuple[Crossing, ...]
     barriers: FloatArray
     """Openings not driven through (k, 2, 2)."""
@@ -49,15 +51,17 @@ class Ground:
         origin = local_origin(floor)
         solids = [solid_of(item, origin, HAIRLINE) for item in floor.elements if item.obstacle]
         obstacles = union(solids)  # not snapped: clearances are decided on it
-        crossings = crossings_of(floor, obstacles, settings)
+        rings = RingIndex(obstacles)
+        crossings = crossings_of(floor, rings, settings)
         inner = [threshold(item) for item in crossings if not item.closed_because]
         slab = to_shape(floor.outline, origin)
         holes = [shapely.Polygon(ring) for part in polygon_parts(slab) for ring in part.interiors]
         outline = union([slab, *inner]).difference(shapely.union_all(holes))
         if outline.area <= 0:
             raise InputError(f"{floor.name}: the floor has no area; check layer FLOOR")
-        lines = [barrier(item, origin, obstacles) for item in crossings if item.closed_because]
-        return cls(floor, origin, outline, obstacles, crossings, np.array(lines).reshape(-1, 2, 2))
+        lines = [barrier(item, origin, rings) for item in crossings if item.closed_because]
+        barriers = np.array(lines).reshape(-1, 2, 2)
+        return cls(floor, origin, outline, obstacles, rings, crossings, barriers)
 
     def walls(self, settings: Settings) -> Walls:
         """Everything that a robot's centre keeps clear of: obstacles, barriers, and floor edges."""

@@ -69,4 +69,4 @@ def _closed_door(crossing: Crossing, settings: Settings, ground: Ground) -> Floa
     """The line of a door that blocks the laser, with `doors = closed`; else None."""
     if settings.doors == "open" or crossing.opening.kind != "door":
         return None
-    return barrier(crossing, ground.origin, ground.obstacles)
+    return barrier(crossing, ground.origin, ground.obstacle_rings)

@@ -11,14 +11,8 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.floor import FloorPlan, Opening
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
-from stopgo.planner.geometry.shapes import (
-    SLACK,
-    boundary_lines,
-    local_origin,
-    polygon_parts,
-    to_shape,
-    widened,
-)
+from stopgo.planner.geometry.ring_index import RingIndex
+from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape, widened
 
 PROBES = (0.15, 0.25, 0.4, 0.6)
 """Distances in metres from an opening's line at which its rooms are searched."""
@@ -46,18 +40,19 @@ class Crossing:
         return float(self.clear.length)
 
 
-def crossings_of(floor: FloorPlan, obstacles: BaseGeometry, settings: Settings) -> tuple[Crossing, ...]:
+def crossings_of(floor: FloorPlan, obstacles: RingIndex, settings: Settings) -> tuple[Crossing, ...]:
     """Every opening with its clear width and the rooms on its sides."""
     origin = local_origin(floor)
     rooms = shapely.STRtree([to_shape(room.polygons, origin) for room in floor.rooms])
     outline = to_shape(floor.outline, origin)
+    shapely.prepare(outline)
     return tuple(_crossing(item, origin, obstacles, rooms, outline, settings) for item in floor.openings)
 
 
 def _crossing(
     opening: Opening,
     origin: FloatArray,
-    obstacles: BaseGeometry,
+    obstacles: RingIndex,
     rooms: shapely.STRtree,
     outline: BaseGeometry,
     settings: Settings,
@@ -70,7 +65,7 @@ def _crossing(
     return Crossing(opening, clear, sides, _closed(clear, sides, outline, opening, settings))
 
 
-def widest_clear(line: BaseGeometry, obstacles: BaseGeometry) -> BaseGeometry:
+def widest_clear(line: BaseGeometry, obstacles: RingIndex) -> BaseGeometry:
     """The longest piece of an opening's line between obstacles; empty if there is none.
 
     A line drawn along a wall's face, or within ALONG of it, counts as inside the wall there.
@@ -105,12 +100,10 @@ def _clamped(point: FloatArray, ends: FloatArray) -> FloatArray:
     return ends[0] if t < 0 else ends[1] if t > 1 else point
 
 
-def part_near(shape: BaseGeometry, line: BaseGeometry) -> BaseGeometry:
+def part_near(shape: RingIndex, line: BaseGeometry) -> BaseGeometry:
     """The part of a large shape within 1 m of a line's bounds, which is faster to compute with."""
     x0, y0, x1, y1 = line.bounds
-    # Not clip_by_rect: it fails where it leaves less than a triangle of a shape.
-    near = shape.intersection(shapely.box(x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0))
-    return shapely.MultiPolygon(polygon_parts(near))
+    return shape.within((x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0))
 
 
 def _sides(clear: BaseGeometry, rooms: shapely.STRtree) -> tuple[int | None, int | None]:
@@ -170,7 +163,7 @@ def threshold(crossing: Crossing) -> BaseGeometry:
     return crossing.clear.buffer(THRESHOLD, cap_style="flat")
 
 
-def barrier(crossing: Crossing, origin: FloatArray, obstacles: BaseGeometry) -> FloatArray:
+def barrier(crossing: Crossing, origin: FloatArray, obstacles: RingIndex) -> FloatArray:
     """The opening's line (2, 2), extended to the jambs when it ends just short of them."""
     a, b = crossing.opening.line - origin
     along = (b - a) / max(float(np.hypot(*(b - a))), SLACK)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import shapely
@@ -16,9 +16,10 @@ from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
+from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
 from stopgo.planner.space.connected_parts import Parts, parts_of
-from stopgo.planner.space.gaps import Gap, gaps_between
+from stopgo.planner.space.gaps import Gap, Walls, gaps_between
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import Crossing, middle_and_normal
 from stopgo.planner.space.targets import LINE_WALL, solid_of
@@ -41,10 +42,11 @@ def opening_states(
     def side_of(room: int | None) -> OpeningSide:
         return _opening_side(room, parts, ground)
 
+    around = Surroundings(ground, settings)
     states, findings = [], []
     for crossing in ground.crossings:
         sides = [] if crossing.closed_because else [side_of(room) for room in crossing.rooms]
-        why = crossing.closed_because or _not_reached(crossing, parts, sides, ground, settings)
+        why = crossing.closed_because or _not_reached(crossing, parts, sides, around)
         states.append(OpeningState(crossing.opening, crossing.rooms, crossing.width, not why, why))
         if why and not why.startswith("exterior"):
             findings.append(_opening_finding(crossing, why, ground))
@@ -80,34 +82,66 @@ def _opening_side(room: int | None, parts: Parts, ground: Ground) -> OpeningSide
     return OpeningSide(shape, frozenset(part for part, area in free.items() if area >= enough and area > 0))
 
 
-def _not_reached(
-    crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], ground: Ground, settings: Settings
-) -> str:
+class Surroundings:
+    """Ground with spatial indexes, made when an opening is blocked: what lies near it is found by them."""
+
+    def __init__(self, ground: Ground, settings: Settings) -> None:
+        self.ground, self.settings = ground, settings
+
+    @cached_property
+    def walls(self) -> Walls:
+        """Everything that a robot's centre keeps clear of."""
+        return self.ground.walls(self.settings)
+
+    @cached_property
+    def outline_rings(self) -> RingIndex:
+        return RingIndex(self.ground.outline)
+
+    @cached_property
+    def _obstacles(self) -> tuple[list[str], shapely.STRtree]:
+        """Names and solids of the obstacles, in the floor's order."""
+        items = [item for item in self.ground.floor.elements if item.obstacle]
+        solids = [solid_of(item, self.ground.origin, HAIRLINE) for item in items]
+        return [item.id for item in items], shapely.STRtree(solids)
+
+    def owner(self, segment: FloatArray) -> str:
+        """The first obstacle that a wall segment (2, 2) belongs to, in words."""
+        middle = shapely.Point(segment.mean(axis=0))
+        names, solids = self._obstacles
+        near = solids.query(middle, predicate="dwithin", distance=LINE_WALL)
+        if len(near):
+            return names[int(near.min())]
+        lines = shapely.linestrings(self.ground.barriers)
+        is_closed = len(lines) and np.any(shapely.distance(lines, middle) <= LINE_WALL)
+        return "a closed opening" if is_closed else "the floor's edge"
+
+
+def _not_reached(crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], around: Surroundings) -> str:
     """Reason why the robot cannot drive from the opening to both sides; empty if it can."""
     here = parts.touching(crossing.clear)
     if here and all(here & side.main or not side.main for side in sides):
         return ""
-    return _limiting_gap(crossing, parts, sides, ground, settings)
+    return _limiting_gap(crossing, parts, sides, around)
 
 
 def _limiting_gap(
-    crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], ground: Ground, settings: Settings
+    crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], around: Surroundings
 ) -> str:
     """Describe the gap near an opening that limits the robot's size most."""
     window = shapely.Point(middle_and_normal(crossing.clear)[0]).buffer(NEAR_OPENING)
-    walls = ground.walls(settings).near(window)
+    walls = around.walls.near(window)
     gaps = gaps_between(walls, short=-2 * float(walls.clearance.max(initial=0.0)) + 0.05, long=-SLACK)
     cells = [_cells_of(parts, side, window) for side in sides]
     gaps = sorted(gaps, key=lambda item: -item.width)
 
     def opens(gap: Gap) -> bool:
-        return _opens(crossing, cells, ground, window, gap.width / 2 - SLACK)
+        return _opens(crossing, cells, around, window, gap.width / 2 - SLACK)
 
     widest = bisect_left(gaps, True, key=opens)  # a robot can reach every point that a wider robot reaches
     if widest == len(gaps):
-        return f"no room for a robot of radius {settings.radius:.3f} m next to it"
+        return f"no room for a robot of radius {around.settings.radius:.3f} m next to it"
     gap = gaps[widest]
-    names = " and ".join(dict.fromkeys(_owner(walls.segments[k], ground) for k in gap.walls))
+    names = " and ".join(dict.fromkeys(around.owner(walls.segments[k]) for k in gap.walls))
     need = float(walls.clearance[list(gap.walls)].sum())
     return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
 
@@ -121,25 +155,14 @@ def _cells_of(parts: Parts, side: OpeningSide, window: BaseGeometry) -> NDArray[
 def _opens(
     crossing: Crossing,
     cells: list[NDArray[np.object_]],
-    ground: Ground,
+    around: Surroundings,
     window: BaseGeometry,
     radius: float,
 ) -> bool:
     """True if a robot of this radius can drive from the opening to the cells on both sides."""
-    near = boundary_lines(ground.obstacles.intersection(window))
-    free = window.intersection(ground.outline).difference(ground.obstacles)
+    obstacles = around.ground.obstacle_rings.around(window.bounds)
+    near = boundary_lines(obstacles.intersection(window))
+    free = window.intersection(around.outline_rings.around(window.bounds)).difference(obstacles)
     free = free.difference(widened(near, radius, quad_segs=16))
     here = [piece for piece in polygon_parts(free) if piece.intersects(crossing.clear)]
     return all(any(np.any(shapely.intersects(some, piece)) for piece in here) for some in cells if len(some))
-
-
-def _owner(segment: FloatArray, ground: Ground) -> str:
-    middle = shapely.Point(segment.mean(axis=0))
-    for item in ground.floor.elements:
-        if item.obstacle and solid_of(item, ground.origin, HAIRLINE).distance(middle) <= LINE_WALL:
-            return item.id
-    return "a closed opening" if len(ground.barriers) and _on_barrier(middle, ground) else "the floor's edge"
-
-
-def _on_barrier(point: BaseGeometry, ground: Ground) -> bool:
-    return bool(np.any(shapely.distance(shapely.linestrings(ground.barriers), point) <= LINE_WALL))

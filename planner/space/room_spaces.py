@@ -9,6 +9,7 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import RoomSpace
+from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import part_near, threshold
@@ -27,7 +28,7 @@ def room_spaces(
         (k, floor.rooms[k].label, _without_inner(shape, shapes, k, inside)) for k, shape in enumerate(shapes)
     ]
     planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, shapes))
-    allowed = _stop_area(ground, settings)
+    allowed = RingIndex(_stop_area(ground, settings))
     return tuple(
         RoomSpace(
             room=index,
@@ -66,6 +67,14 @@ def _unnamed(
         return list(zip(names, parts, strict=True))
     doors = [threshold(item) for item in ground.crossings if not item.clear.is_empty]
     outside = ground.outline.difference(union([*rooms, *doors])).difference(ground.obstacles)
-    parts = [p for p in polygon_parts(outside) if p.intersection(drive_area).area > LEAST_UNNAMED]
+    drive_rings = RingIndex(drive_area)
+    parts = [p for p in polygon_parts(outside) if _is_room(p, drive_rings)]
     ordered = sorted(parts, key=lambda part: part.bounds)
     return [(f"unnamed {k + 1}", part) for k, part in enumerate(ordered)]
+
+
+def _is_room(part: BaseGeometry, drive_rings: RingIndex) -> bool:
+    """True if the robot can drive on enough of a part of the floor."""
+    if part.area < LEAST_UNNAMED:
+        return False
+    return bool(part.intersection(drive_rings.around(part.bounds)).area > LEAST_UNNAMED)

@@ -1,0 +1,25 @@
+# Types of dijkstra_kernel.py where it is compiled (setup.py).
+
+cimport cython
+
+ctypedef long long whole
+
+@cython.locals(
+    edge=whole, here=whole, many=whole, size=whole, there=whole, total=double, ways=whole
+)
+cpdef whole reach(
+    whole source, whole target, whole points, whole wanted, const whole[::1] first, const whole[::1] to,
+    const double[::1] length, double[::1] away, whole[::1] before, whole[::1] closed, whole[::1] touched,
+    double[::1] key, whole[::1] item, whole[::1] found, double[::1] found_away
+) noexcept nogil
+
+@cython.locals(k=whole)
+cdef void forget(
+    whole ways, const whole[::1] touched, double[::1] away, whole[::1] closed
+) noexcept nogil
+
+@cython.locals(at=whole)
+cdef whole push(whole size, double value, whole node, double[::1] key, whole[::1] item) noexcept nogil
+
+@cython.locals(at=whole, below=whole, node=whole, value=double)
+cdef whole pop(whole size, double[::1] key, whole[::1] item) noexcept nogil

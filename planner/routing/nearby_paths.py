@@ -1,0 +1,164 @@
+"""Shortest paths from each point to its nearest points, and bounds on the lengths of all others.
+
+Shortest paths between all pairs of points take time with the square of their number. A short tour hardly
+uses a pair of points that are far apart. So the search from a point ends at its `NEAREST` points. Other
+lengths are bounded by way of landmarks, points from which paths to all others are known: a path is no
+longer than that over a landmark, and no shorter than the difference of the paths from it (Goldberg and
+Harrelson, "Computing the shortest path: A* search meets graph theory", SODA 2005).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.routing.dijkstra_kernel import reach
+from stopgo.planner.routing.paths import edge_lengths, straightened
+
+NEAREST = 100
+"""Points to which paths are found from each point; a count, so that a plan depends on no speed."""
+LANDMARKS = 32
+ROUNDING = 1e-9
+"""Fraction and metres by which bounds are widened, so that they hold in spite of rounding."""
+BLOCK = 16
+"""Points whose bounds are computed at a time, so that they stay in the processor's cache."""
+
+
+class NearbyPaths:
+    """Shortest paths between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
+
+    def __init__(
+        self,
+        xy: FloatArray,
+        edges: IntArray,
+        points: int,
+        *,
+        nearest: int = NEAREST,
+        landmarks: int = LANDMARKS,
+    ) -> None:
+        self._xy, self._points = xy, points
+        self._search = _PointSearch(edge_lengths(xy, edges), points)
+        self._away = self._from_landmarks(landmarks)
+        """Metres from each landmark to each point (landmarks, points)."""
+        self._pairs = np.empty((0, 2), dtype=np.int64)
+        self._lengths = np.empty(0)
+        if self.connected:
+            self._find_near(min(nearest, points - 1))
+
+    @property
+    def connected(self) -> bool:
+        """True if a path leads from each point to every other."""
+        return bool(np.isfinite(self._away).all())
+
+    def _from_landmarks(self, landmarks: int) -> FloatArray:
+        """Distances of all points from the first one, and from each point farthest from all those before."""
+        found = [self._search.distances(0)]
+        nearest = found[0].copy()
+        for _ in range(min(landmarks, self._points) - 1):
+            found.append(self._search.distances(int(np.argmax(nearest))))
+            np.minimum(nearest, found[-1], out=nearest)
+        return np.array(found)
+
+    def _find_near(self, nearest: int) -> None:
+        found = [self._search.nearest(point, nearest) for point in range(self._points)]
+        begin = np.repeat(np.arange(self._points), [len(ends) for ends, _ in found])
+        end = np.concatenate([ends for ends, _ in found])
+        self._take(np.stack([begin, end], axis=1), np.concatenate([away for _, away in found]))
+
+    def learn(self, pairs: IntArray) -> None:
+        """Find the exact lengths of pairs of points (n, 2)."""
+        self._take(pairs, np.array([self._search.length(a, b) for a, b in pairs.tolist()]))
+
+    def _take(self, pairs: IntArray, lengths: FloatArray) -> None:
+        """Note lengths, those from the lower point of a pair to the higher last, so that these count."""
+        self._pairs = np.concatenate([self._pairs, pairs])
+        self._lengths = np.concatenate([self._lengths, lengths])
+        order = np.argsort(self._pairs[:, 0] < self._pairs[:, 1], kind="stable")
+        self._pairs, self._lengths = self._pairs[order], self._lengths[order]
+
+    def at_most(self) -> FloatArray:
+        """Metres between all points (points, points): exact for known pairs, an upper bound for others."""
+        most = np.full((self._points, self._points), np.inf)
+        for k in range(0, self._points, BLOCK):
+            some = most[k : k + BLOCK]
+            for away in self._away:
+                np.minimum(some, away[k : k + BLOCK, None] + away, out=some)
+        return self._with_known(most, 1 + ROUNDING, ROUNDING)
+
+    def at_least(self) -> FloatArray:
+        """Metres between all points (points, points): exact for known pairs, a lower bound for others."""
+        least = np.zeros((self._points, self._points))
+        for k in range(0, self._points, BLOCK):
+            some = least[k : k + BLOCK]
+            for away in self._away:
+                np.maximum(some, np.abs(away[k : k + BLOCK, None] - away), out=some)
+        return self._with_known(least, 1 - ROUNDING, -ROUNDING)
+
+    def _with_known(self, lengths: FloatArray, times: float, plus: float) -> FloatArray:
+        """Bounds widened by rounding, with the exact lengths in their places."""
+        lengths *= times
+        lengths += plus
+        np.maximum(lengths, 0.0, out=lengths)
+        np.fill_diagonal(lengths, 0.0)
+        low, high = np.sort(self._pairs, axis=1).T
+        lengths[low, high] = self._lengths
+        lengths[high, low] = lengths[low, high]
+        return lengths
+
+    def path(self, start: int, end: int) -> FloatArray:
+        """The polyline (n, 2) from one point to another, both included."""
+        return straightened(self._xy[self._search.nodes(start, end)])
+
+
+class _PointSearch:
+    """Dijkstra's search over a graph from one of its points, prepared for many searches."""
+
+    def __init__(self, upper: csr_array, points: int) -> None:
+        graph = (upper + upper.T).tocsr()
+        n, edges = graph.shape[0], graph.nnz
+        self._kernel: Any = compiled(reach, large=True)
+        whole, real = np.int64, np.float64
+        given = [graph.indptr.astype(whole), graph.indices.astype(whole), graph.data.astype(real)]
+        scratch = [np.full(n, -1.0), np.zeros(n, whole), np.zeros(n, whole), np.zeros(n, whole)]
+        scratch += [np.zeros(edges + 1), np.zeros(edges + 1, whole), np.zeros(points, whole)]
+        arrays: list[Any] = [*given, *scratch, np.zeros(points)]
+        if self._kernel is None:
+            self._kernel, arrays = reach, [array.tolist() for array in arrays]
+        self._points, self._arrays = points, arrays
+        self._before, self._found, self._away = arrays[4], arrays[9], arrays[10]
+
+    def nearest(self, source: int, wanted: int) -> tuple[IntArray, FloatArray]:
+        """The nearest other points of one, fewer where no path leads to so many, and their distances."""
+        many = self._kernel(source, -1, self._points, wanted, *self._arrays) if wanted else 0
+        return np.array(self._found[:many], dtype=np.int64), np.array(self._away[:many], dtype=np.float64)
+
+    def distances(self, source: int) -> FloatArray:
+        """Distance of every point (points,); infinite where no path leads."""
+        found, lengths = self.nearest(source, self._points)
+        away = np.full(self._points, np.inf)
+        away[source] = 0.0
+        away[found] = lengths
+        return away
+
+    def length(self, source: int, target: int) -> float:
+        """Length of the shortest path from one point to another."""
+        return float(self._away[self._found_at(source, target)])
+
+    def nodes(self, source: int, target: int) -> list[int]:
+        """The nodes on the shortest path from one point to another, both included."""
+        self._found_at(source, target)
+        nodes = [target]
+        while nodes[-1] != source:
+            nodes.append(int(self._before[nodes[-1]]))
+        return nodes[::-1]
+
+    def _found_at(self, source: int, target: int) -> int:
+        """Search up to a point; its place among the points found."""
+        many = self._kernel(source, target, self._points, self._points, *self._arrays)
+        if not many or self._found[many - 1] != target:
+            raise ValueError(f"no path from point {source} to point {target}")
+        return int(many) - 1

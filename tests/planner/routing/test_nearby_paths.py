@@ -1,0 +1,141 @@
+"""Paths to near points only, compared with the paths between all pairs: lengths, bounds, and routes."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from scipy.spatial import Delaunay
+
+from stopgo.mission.errors import NegativeResult
+from stopgo.mission.geometry import polyline_length
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner import routing
+from stopgo.planner.routing import roadmap, route
+from stopgo.planner.routing.dijkstra_kernel import reach
+from stopgo.planner.routing.nearby_paths import NearbyPaths
+from stopgo.planner.routing.paths import Paths, shortest_paths
+from stopgo.planner.routing.tour import nearest
+from stopgo.planner.space.navigable import navigable
+from tests.faults.sizes import some
+from tests.planner.kernels import interpret, machine_code
+from tests.planner.routing.test_routing import selection_at
+from tests.planner.worlds import box, hall, wall
+
+WORST = 1.02
+"""Times as long as the tour over the lengths of all pairs, at most."""
+
+
+def network(seed: int, *, nodes: int = 400) -> tuple[np.ndarray, np.ndarray]:
+    """Random nodes in a square of 100 m, joined like a map of many detours."""
+    random = np.random.default_rng(seed)
+    xy = random.uniform(0, 100, (nodes, 2))
+    pairs = np.concatenate([list(pairwise([*corners, corners[0]])) for corners in Delaunay(xy).simplices])
+    tree = np.stack([np.arange(1, nodes), nearest_before(xy)], axis=1)
+    return xy, np.concatenate([pairs[random.random(len(pairs)) < 0.3], tree])
+
+
+def nearest_before(xy: np.ndarray) -> np.ndarray:
+    """The nearest of the nodes before each, from the second on: a tree over all of them."""
+    return np.array([np.argmin(np.hypot(*(xy[:k] - xy[k]).T)) for k in range(1, len(xy))])
+
+
+def both(seed: int, points: int = 60) -> tuple[NearbyPaths, Paths]:
+    xy, edges = network(seed)
+    return NearbyPaths(xy, edges, points, nearest=7, landmarks=4), shortest_paths(xy, edges, points)
+
+
+@pytest.mark.parametrize("seed", some(range(12), every=4))
+def test_bounds_enclose_the_lengths_of_all_pairs(seed: int) -> None:
+    near, paths = both(seed)
+    least, most = near.at_least(), near.at_most()
+    assert (least <= paths.lengths + 1e-9).all()
+    assert (paths.lengths <= most + 1e-9).all()
+    assert np.array_equal(least, least.T) and np.array_equal(most, most.T)
+    exact = least == most
+    assert (exact.sum(axis=1) > 7).all()
+    assert not exact.all()
+    assert np.allclose(least[exact], paths.lengths[exact], rtol=0.0, atol=1e-9)
+    assert np.median((most / np.maximum(least, 1e-9))[~exact]) < 2.5
+
+
+@pytest.mark.parametrize("seed", some(range(12), every=4))
+def test_lengths_and_paths_asked_for_are_the_shortest(seed: int) -> None:
+    near, paths = both(seed)
+    pairs = np.random.default_rng(seed).integers(0, 60, (20, 2))
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    near.learn(pairs)
+    for a, b in pairs.tolist():
+        assert near.at_least()[a, b] == near.at_most()[a, b] == pytest.approx(paths.lengths[a, b], abs=1e-9)
+        assert polyline_length(near.path(a, b)) == pytest.approx(paths.lengths[a, b], abs=1e-6)
+        assert shapely.equals_exact(*map(shapely.LineString, (near.path(a, b), paths.path(a, b))), 1e-6)
+
+
+def test_the_nearest_points_are_found_by_both_forms_of_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert machine_code(reach) is not reach
+    fast, paths = both(1)
+    interpret(monkeypatch)
+    slow, _ = both(1)
+    assert np.array_equal(fast.at_least(), slow.at_least())
+    assert np.array_equal(fast.at_most(), slow.at_most())
+    found, away = slow._search.nearest(3, 7)
+    assert found.tolist() == np.argsort(paths.lengths[3], kind="stable")[1:8].tolist()
+    assert np.array_equal(away, np.sort(paths.lengths[3])[1:8])
+
+
+def test_points_apart_are_not_connected() -> None:
+    xy = np.array([(0.0, 0.0), (1.0, 0.0), (5.0, 0.0), (6.0, 0.0)])
+    near = NearbyPaths(xy, np.array([(0, 1), (2, 3)]), 4)
+    assert not near.connected
+    assert NearbyPaths(xy, np.array([(0, 1), (1, 2), (2, 3)]), 4).connected
+    with pytest.raises(ValueError, match="no path from point 0 to point 3"):
+        near.path(0, 3)
+
+
+def few_pairs(space: NavigableSpace, points: np.ndarray) -> NearbyPaths:
+    """Only the paths to twelve points from each, and from six landmarks."""
+    return NearbyPaths(*roadmap._graph_of(space, points), len(points), nearest=12, landmarks=6)
+
+
+@pytest.mark.parametrize("tour", ["open", "closed"])
+@pytest.mark.parametrize("seed", some(range(6), every=3))
+def test_a_route_over_near_pairs_is_about_as_short(
+    seed: int, tour: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Many stops between walls: the lengths of most pairs are bounds only."""
+    random = np.random.default_rng(seed)
+    walls = [wall(f"w{k}", box(x, 0.9 * (k % 2), x + 0.2, 8 + k % 2)) for k, x in enumerate((4, 9, 14, 19))]
+    space = navigable(hall(24, 10, *walls), Settings(tour=tour))
+    xy = random.uniform((0.6, 1.0), (23.4, 7.5), (90, 2))
+    blocked = np.min([np.abs(xy[:, 0] - x - 0.1) for x in (4, 9, 14, 19)], axis=0) < 0.6
+    selection = selection_at(space, xy[~blocked])
+    dense = route(selection)
+    monkeypatch.setattr(routing, "ALL_PAIRS_UP_TO", 10)
+    monkeypatch.setattr(routing, "nearby_paths_between", few_pairs)
+    sparse = route(selection)
+    assert sorted(sparse.order.tolist()) == sorted(dense.order.tolist())
+    assert sparse.length <= WORST * dense.length
+    assert sparse.bound <= min(dense.length, sparse.length) + 1e-6
+    assert sparse.bound >= 0.9 * dense.length
+    assert sparse.start_reason == dense.start_reason
+
+
+def test_an_end_that_no_path_reaches_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    space = navigable(hall(8, 4), Settings())
+    selection = selection_at(space, np.array([(1.0, 1.0), (6.0, 3.0), (30.0, 30.0)]))
+    monkeypatch.setattr(routing, "ALL_PAIRS_UP_TO", 1)
+    with pytest.raises(NegativeResult, match="not connected"):
+        route(selection)
+
+
+@pytest.mark.parametrize("many", [1, 4, 39])
+def test_the_nearest_are_those_of_a_stable_order(many: int) -> None:
+    cost = np.random.default_rng(2).integers(1, 9, (40, 40))
+    cost = np.triu(cost, 1) + np.triu(cost, 1).T
+    away = cost + np.diag(np.full(40, 99))
+    near, apart = nearest(cost, many)
+    assert np.array_equal(near, np.argsort(away, axis=1, kind="stable")[:, :many])
+    assert np.array_equal(apart, np.take_along_axis(away, near, axis=1))
