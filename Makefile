@@ -15,9 +15,11 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo docs test lint types faults ros2 benchmarks wheels clean
 
-# pip would compile all packages one after another; what is imported is compiled then, by as many as import it.
+# The pip of Python 3.11 takes 40 s longer to choose versions than the one that constraints.txt names. pip would compile
+# all packages one after another; what is imported is compiled then, by as many as import it.
 $(STAMP): pyproject.toml setup.py constraints.txt $(TYPES) $(TYPES:_compiled.pxd=.py)
 	$(PYTHON) -m venv $(VENV)
+	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
 	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[test]'
 	touch $(STAMP)
 
@@ -45,7 +47,7 @@ faults: $(STAMP)
 
 # A real ROS 2 of wheels in .venv-ros2 (330 MB), and the tests that drive a mission with it.
 ros2: $(STAMP)
-	$(BIN)/python -m tests.ros2.environment
+	$(PYTHON) -m tests.ros2.environment
 	$(BIN)/python -m pytest tests/ros2
 
 benchmarks: $(STAMP)

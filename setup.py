@@ -12,7 +12,6 @@ environment variable STOPGO_PURE leaves them out, for a wheel that fits every ma
 import os
 import sys
 from pathlib import Path
-from typing import Any
 
 from setuptools import Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
@@ -36,30 +35,20 @@ def say(message: str) -> None:
     sys.stderr.write(f"stopgo: {message}\n")
 
 
-def kernels() -> list[Any]:
-    """The extension modules; none, and a line, without Cython or where a pure wheel is wanted."""
+def kernels() -> list[Extension]:
+    """The extension modules; none where a pure wheel is wanted."""
     if os.environ.get("STOPGO_PURE"):
         return []
-    try:
-        from Cython.Build import cythonize
-    except ImportError:
-        say("Cython is not installed, so the planner's kernels are not compiled")
-        return []
-    found = [
+    return [
         Extension(
-            ".".join(types.with_suffix("").parts),
+            ".".join(("stopgo", *types.with_suffix("").parts)),
             [types.with_name(types.name.replace("_compiled.pxd", ".py")).as_posix()],
             depends=[types.as_posix()],
             extra_compile_args=FLAGS,
+            optional=True,
         )
         for types in TYPES
     ]
-    made: list[Any] = cythonize(
-        found, compiler_directives=RULES, build_dir="build/kernels", force=True, quiet=True
-    )
-    for one in made:
-        one.name, one.optional = f"stopgo.{one.name}", True
-    return made
 
 
 class BuildKernels(build_ext):
@@ -71,8 +60,22 @@ class BuildKernels(build_ext):
 
     def run(self) -> None:
         if self.extensions:
-            say(f"compiling {len(self.extensions)} kernels, once; this takes some ten seconds")
+            self._to_c()
         super().run()
+
+    def _to_c(self) -> None:
+        """Translate the kernels here only: pip loads this file three times, and builds once."""
+        try:
+            from Cython.Build import cythonize
+        except ImportError:
+            say("Cython is not installed, so the planner's kernels are not compiled")
+            self.extensions = []
+            return
+        say(f"compiling {len(self.extensions)} kernels, once; this takes some ten seconds")
+        named = [Extension(one.name.removeprefix("stopgo."), one.sources) for one in self.extensions]
+        made = cythonize(named, compiler_directives=RULES, build_dir="build/kernels", force=True, quiet=True)
+        for one, of_c in zip(self.extensions, made, strict=True):
+            one.sources = of_c.sources
 
 
 linked = [f"stopgo.{folder}{below}" for folder in FOLDERS for below in ("", ".*")]

@@ -76,7 +76,7 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-WAITING = {TESTS / name for name in ("bridge", "faults", "journeys")}
+WAITING = {TESTS / name for name in ("bridge", "faults", "journeys", "ros2")}
 """Folders whose tests mostly wait for other processes; those of the other folders mostly compute."""
 
 

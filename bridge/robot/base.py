@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from threading import Event
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import msgspec
 
@@ -74,6 +74,19 @@ class Base(Protocol):
 
     def blocked_by(self) -> str:
         """Return the cause of the last blocked drive; empty if unknown."""
+
+
+@runtime_checkable
+class WayFinder(Protocol):
+    """A base that may find its own way to a path's end."""
+
+    def finds_way(self) -> bool:
+        """Return True if the present mission allows that."""
+
+
+def finds_way(base: object) -> bool:
+    """Return True if a base finds its own way; most drive along the path that they are given."""
+    return isinstance(base, WayFinder) and base.finds_way()
 
 
 class Scanner(Protocol):

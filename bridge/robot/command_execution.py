@@ -16,7 +16,7 @@ import msgspec
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.answers import answer_to, answered, not_stopped, remember_answer, situation_of
-from stopgo.bridge.robot.base import Base
+from stopgo.bridge.robot.base import Base, finds_way
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.run_store import RunStore
 from stopgo.bridge.robot.work_control import WorkControl
@@ -144,7 +144,8 @@ class CommandExecutor:
         return situation_of(
             journal, mission, run=run, pose=base.pose(), now_ns=self._clock.now_ns(),
             command_ns=self._command_clock.now_ns(), battery=base.battery(),
-            endurance_s=base.endurance_s(), not_ready=base.not_ready(), boot_id=self._store.boot_id,
+            endurance_s=base.endurance_s(), not_ready=base.not_ready(),
+            finds_way=finds_way(base), boot_id=self._store.boot_id,
         )  # fmt: skip
 
     def _carry_out(self, order: RunCommand, decision: Decision | Refused) -> Answer:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from threading import Event
 
-from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest
+from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest, finds_way
 from stopgo.mission.document import Mission, Point, RobotSpec
 from stopgo.mission.frames.transform import SAME, Transform
 from stopgo.mission.run.events import Pose
@@ -61,6 +61,9 @@ class OnMap:
 
     def not_ready(self) -> str:
         return self._base.not_ready()
+
+    def finds_way(self) -> bool:
+        return finds_way(self._base)
 
     def blocked_by(self) -> str:
         return self._base.blocked_by()

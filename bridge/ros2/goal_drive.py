@@ -1,5 +1,7 @@
 """Driving one straight of a leg by one goal of Nav2's FollowPath, judged by the robot's own pose.
 
+Where the mission's policy allows it, Nav2 finds its own way to a stop (NavigateToPose).
+
 A result says little: a server that was preempted may report success, and one that restarts reports nothing.
 So a drive has arrived only if the robot stands at its end. While it drives, the robot must stay near the
 line, its pose must arrive, and nobody else may drive it; else it is stopped first.
@@ -9,6 +11,7 @@ from __future__ import annotations
 
 import math
 from threading import Event
+from typing import Literal
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Outcome
@@ -33,6 +36,10 @@ PROGRESS_M = 0.05
 PROGRESS_RAD = math.radians(3.0)
 TRIES = 4
 """Number of goals for one straight: each further one begins where the robot stands."""
+
+
+Line = tuple[Point, Point] | None
+"""The straight that the robot must stay near; `None` where it finds its own way."""
 
 
 class RosDriveEnded(Exception):
@@ -79,6 +86,17 @@ class GoalDrive:
             why = why or f"Nav2 reports success {away:.2f} m from the goal"
         raise RosDriveEnded("blocked", why)
 
+    def navigate(self, end: Pose, near_m: float, interrupt: Event) -> None:
+        """Let Nav2 find its own way to `end`; raises `RosDriveEnded` if the robot does not come near."""
+        why = ""
+        for _ in range(TRIES):
+            if math.dist(self._here(), (end.x, end.y)) <= near_m:
+                return
+            why = self._outcome(self._port.navigate(end), None, interrupt)
+        away = math.dist(self._here(), (end.x, end.y))
+        if away > near_m:
+            raise RosDriveEnded("blocked", why or f"Nav2 reports success {away:.2f} m from the goal")
+
     def turn(self, heading: float, within_rad: float, interrupt: Event) -> None:
         """Turn on the spot, as often as it takes."""
         for _ in range(TRIES):
@@ -92,9 +110,9 @@ class GoalDrive:
         pose = self._telemetry.pose()
         return (pose.x, pose.y)
 
-    def _outcome(self, goal: RosGoal, line: tuple[Point, Point], interrupt: Event) -> str:
+    def _outcome(self, goal: RosGoal, line: Line, interrupt: Event) -> str:
         """Wait for the goal's end; return why it must be tried again, empty if it succeeded."""
-        watch = _Watch(self._clock.now_ns(), self._telemetry.pose())
+        watch = _Watch(self._clock.now_ns(), self._telemetry.pose(), "drive" if line else "navigate")
         while True:
             if self._clock.wait(LOOK_S, interrupt):
                 self.halt(goal)
@@ -109,14 +127,14 @@ class GoalDrive:
             if goal.status in ("aborted", "canceled", "rejected"):
                 return self._ended_early(goal)
 
-    def _wrong(self, line: tuple[Point, Point]) -> str:
+    def _wrong(self, line: Line) -> str:
         """Return why the robot must stop; empty if it may go on."""
         jump = self._telemetry.jump
         if jump is not None and jump.metres >= self._settings.limits.jump_m:
             self._telemetry.jump = None
             return f"{jump.words}; see where the robot is, then let it go on"
         here = self._here()
-        off_m = math.dist(foot(*line, here), here)
+        off_m = math.dist(foot(*line, here), here) if line else 0.0
         if off_m > self._settings.limits.off_path_m:
             return f"the robot is {off_m:.2f} m off the path"
         return self._telemetry.unusable() or self._taken()
@@ -127,7 +145,7 @@ class GoalDrive:
 
     def _end_of_patience(self, goal: RosGoal, watch: _Watch) -> str:
         now_ns, limits = self._clock.now_ns(), self._settings.limits
-        watch.look(now_ns, self._telemetry.pose(), server=not self._port.missing("drive"))
+        watch.look(now_ns, self._telemetry.pose(), server=not self._port.missing(watch.server))
         if goal.status == "sent" and watch.since_begin_s(now_ns) > ANSWER_S:
             return (
                 f"Nav2 does not answer a goal within {ANSWER_S:g} s; it may drive,"
@@ -162,7 +180,7 @@ class GoalDrive:
             if self._clock.now_ns() > end_ns:
                 self._end_if(goal, "the robot moves on after the end of its goal")
 
-    def _bridge_gap(self, goal: RosGoal, silent: str, line: tuple[Point, Point], interrupt: Event) -> str:
+    def _bridge_gap(self, goal: RosGoal, silent: str, line: Line, interrupt: Event) -> str:
         """Stop, and wait until tf and odometry arrive again; return why the drive is to be tried again."""
         self.halt(goal)
         end_ns = self._clock.now_ns() + round(self._settings.limits.gap_s * 1e9)
@@ -195,7 +213,8 @@ class GoalDrive:
 class _Watch:
     """Watches one goal: its begin, its server, and the robot's progress."""
 
-    def __init__(self, now_ns: int, pose: Pose) -> None:
+    def __init__(self, now_ns: int, pose: Pose, server: Literal["drive", "navigate"]) -> None:
+        self.server: Literal["drive", "navigate"] = server
         self._began_ns = self._server_ns = self._progress_ns = now_ns
         self._pose = pose
 

@@ -22,6 +22,9 @@ from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import Pose
 
 FOLLOW_PATH, SPIN = "nav2_msgs/action/FollowPath", "nav2_msgs/action/Spin"
+NAVIGATE = "nav2_msgs/action/NavigateToPose"
+NAVIGATORS = ("navigate_to_pose", "navigate_through_poses")
+"""Actions of Nav2 whose goals no other action of it sends."""
 ODOMETRY, TF = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 ZERO_S, ZERO_HZ = 2.0, 20.0
 """Time and rate of zero velocity after a stop: a controller's last commands may come later than the first."""
@@ -40,13 +43,18 @@ class Nav2Port:
         self.before_goal: Callable[[], None] = lambda: None
         """Called before a goal is sent."""
         self._ours: dict[bytes, SentGoal] = {}
+        self._of_nav2: set[bytes] = set()
+        """Goals that Nav2 has sent to its own servers while it found its own way for us."""
+        self._finds_way = False
         self._sent: SentGoal | None = None
         self._active: dict[str, tuple[bytes, ...]] = {}
         self._zero_until_ns = 0
         names = settings.drive
         self._follow = node.action_client(FOLLOW_PATH, names.follow_path)
+        self._navigate = node.action_client(NAVIGATE, names.navigate)
         self._spin = node.action_client(SPIN, names.spin) if names.spin else None
-        self._driving = (names.follow_path, *([names.spin] if names.spin else []), *names.cancel)
+        spin = [names.spin] if names.spin else []
+        self._driving = tuple(dict.fromkeys((names.follow_path, *spin, names.navigate, *names.cancel)))
         self._cancel = {name: self._cancelling(name) for name in self._driving}
         self._listen()
         self._open_velocity()
@@ -98,16 +106,21 @@ class Nav2Port:
     def _take_status(self, name: str, message: Any) -> None:
         goals = {bytes(one.goal_info.goal_id.uuid): int(one.status) for one in message.status_list}
         self._active[name] = tuple(goal for goal, status in goals.items() if status in ACTIVE)
+        if self._finds_way and self.drives and not self._is_navigator(name):
+            self._of_nav2.update(self._active[name])
         for goal, status in goals.items():
             if goal in self._ours:
                 self._ours[goal].told(status)
 
+    def _is_navigator(self, action: str) -> bool:
+        return action == self.settings.drive.navigate or action.rpartition("/")[2] in NAVIGATORS
+
     # What drives it
 
-    def missing(self, what: Literal["drive", "spin", "scan"]) -> str:
+    def missing(self, what: Literal["drive", "navigate", "spin", "scan"]) -> str:
         if what == "scan":
             return (self._scan_action or self._scan).missing()
-        client = self._follow if what == "drive" else self._spin
+        client = {"drive": self._follow, "navigate": self._navigate, "spin": self._spin}[what]
         return "no action that turns is named" if client is None else client.missing()
 
     def follow(self, path: Sequence[Pose]) -> SentGoal:
@@ -122,6 +135,11 @@ class Nav2Port:
         fields = {field: value for field, value in goal.items() if field in known}
         return self._send(self._follow, drive.follow_path, fields)
 
+    def navigate(self, end: Pose) -> SentGoal:
+        drive, header = self.settings.drive, header_fields(self.settings.frames.map, self.node.now_ns())
+        fields = {"pose": {"header": header, "pose": pose_fields(end)}, "behavior_tree": drive.behavior_tree}
+        return self._send(self._navigate, drive.navigate, fields)
+
     def spin(self, angle: float) -> SentGoal:
         assert self._spin is not None
         fields = {"target_yaw": float(angle), "time_allowance": {"sec": TURN_S}}
@@ -130,7 +148,7 @@ class Nav2Port:
     def _send(self, client: Any, action: str, fields: RosFields) -> SentGoal:
         own_id = os.urandom(16)
         sent = SentGoal(partial(self._cancel_one, self._cancel[action], own_id))
-        self._sent = sent
+        self._sent, self._finds_way = sent, action == self.settings.drive.navigate
         self.before_goal()
         self._ours[own_id] = sent
         self._zero_until_ns = 0
@@ -159,11 +177,12 @@ class Nav2Port:
         }
 
     def foreign_goals(self) -> tuple[str, ...]:
+        known = {*self._ours, *self._of_nav2}
         return tuple(
             f"goal {goal.hex()[:8]} of {name}"
             for name, goals in list(self._active.items())
             for goal in goals
-            if goal not in self._ours and self.node.is_published(f"{name}/_action/status")
+            if goal not in known and self.node.is_published(f"{name}/_action/status")
         )
 
     def stand(self) -> None:

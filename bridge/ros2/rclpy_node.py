@@ -214,7 +214,8 @@ def with_parameters(node: Any, settings: RosSettings) -> RosSettings:
     """Declare the settings as parameters of the node, such as `limits.jump_m`, and return them."""
     wrong = load("rclpy.exceptions").InvalidParameterTypeException
     read_only = load("rcl_interfaces.msg").ParameterDescriptor(read_only=True)
-    changes: dict[str, dict[str, Any]] = {}
+    changes: dict[str, Any] = {}
+    auto = "autostart_node"
     for table in ("frames", "topics", "drive", "limits"):
         values = msgspec.to_builtins(getattr(settings, table))
         for key, value in values.items():
@@ -223,7 +224,62 @@ def with_parameters(node: Any, settings: RosSettings) -> RosSettings:
             except wrong as error:
                 raise InputError(f"parameter {table}.{key}: {error}") from None
             changes.setdefault(table, {})[key] = list(taken) if isinstance(value, list | tuple) else taken
+    try:
+        changes[auto] = node.declare_parameter(auto, settings.autostart_node, read_only).value
+    except wrong as error:
+        raise InputError(f"parameter {auto}: {error}") from None
     return changed_settings(settings, changes)
+
+
+UNCONFIGURED = "the lifecycle node is unconfigured; configure and activate it"
+INACTIVE = "the lifecycle node is inactive; activate it"
+FINALIZED = "the lifecycle node is shut down; start the program again"
+
+
+def _managed_node(name: str, context: Any) -> Any:
+    """Make a lifecycle node, which says at each transition why the robot must not drive."""
+    lifecycle = load("rclpy.lifecycle")
+
+    class ManagedNode(lifecycle.LifecycleNode):
+        """A lifecycle node; `said` takes why it may drive nothing, empty once it is active."""
+
+        said: Callable[[str], None] = staticmethod(lambda why: None)
+
+        def _says(self, why: str) -> Any:
+            self.said(why)
+            return lifecycle.TransitionCallbackReturn.SUCCESS
+
+        def on_configure(self, state: Any) -> Any:
+            return self._says(INACTIVE)
+
+        def on_activate(self, state: Any) -> Any:
+            return self._says("")
+
+        def on_deactivate(self, state: Any) -> Any:
+            return self._says(INACTIVE)
+
+        def on_cleanup(self, state: Any) -> Any:
+            return self._says(UNCONFIGURED)
+
+        def on_shutdown(self, state: Any) -> Any:
+            return self._says(FINALIZED)
+
+    return ManagedNode(name, context=context)
+
+
+def _begin_life_cycle(node: Any, port: Nav2Port) -> None:
+    """Let the robot drive only while its node is active; a node that leaves that state stops it at once."""
+
+    def said(why: str) -> None:
+        port.telemetry.say_inactive(why)
+        if why:
+            port.stand()
+
+    node.said = said
+    port.telemetry.say_inactive(UNCONFIGURED)
+    if port.settings.autostart_node:
+        node.trigger_configure()
+        node.trigger_activate()
 
 
 def _spin(executor: Any, telemetry: RosTelemetry) -> None:
@@ -242,7 +298,7 @@ def open_rclpy(settings: RosSettings, clock: Clock, *, ros_args: Sequence[str] =
     none = load("rclpy.signals").SignalHandlerOptions.NO
     try:
         rclpy.init(args=["stopgo", *ros_args], context=context, signal_handler_options=none)
-        node = rclpy.create_node(settings.node, context=context)
+        node = _managed_node(settings.node, context)
         settings = with_parameters(node, settings)
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{' '.join(ros_args)}: ROS 2 does not take it ({error})") from None
@@ -254,6 +310,7 @@ def open_rclpy(settings: RosSettings, clock: Clock, *, ros_args: Sequence[str] =
         port = Nav2Port(RclpyNode(node), settings, telemetry, clock)
         process = GoalGuard(port.guarded, lambda: port.drives, telemetry.say_unguarded, __name__)
         port.before_goal = process.will_drive
+        _begin_life_cycle(node, port)
         threading.Thread(target=_spin, args=(executor, telemetry), name="ros2", daemon=True).start()
         yield port
     finally:

@@ -1,4 +1,7 @@
-"""A robot with Nav2 as a controller's base: exactly the mission's legs, one goal per straight."""
+"""A robot with Nav2 as a controller's base: exactly the mission's legs, one goal per straight.
+
+A mission whose policy allows `own_way` lets Nav2 find its own way to each stop.
+"""
 
 from __future__ import annotations
 
@@ -43,9 +46,11 @@ class RosBase:
         self._scanner = scanner
         self._blocked_by = ""
         self._route: tuple[tuple[Point, Point], ...] = ()
+        self._own_way = False
 
     def take(self, mission: Mission, to_map: Transform) -> None:
-        """Drive only near the legs of this mission from now on."""
+        """Drive only near the legs of this mission from now on, unless its policy allows its own way."""
+        self._own_way = mission.policy.own_way is True
         legs = [[to_map.point(point) for point in leg] for leg in legs_of(mission)]
         self._route = tuple(straight for leg in legs for straight in pairwise(leg))
 
@@ -79,10 +84,14 @@ class RosBase:
         return self._telemetry.silence() or self._telemetry.unusable() or self._cannot_drive()
 
     def _cannot_drive(self) -> str:
-        if missing := self._port.missing("drive"):
+        own_way = self._port.missing("navigate") if self._own_way else ""
+        if missing := self._port.missing("drive") or own_way:
             return missing
         foreign = self._port.foreign_goals()
         return f"another client drives the robot ({foreign[0]})" if foreign else ""
+
+    def finds_way(self) -> bool:
+        return self._own_way
 
     def blocked_by(self) -> str:
         return self._blocked_by
@@ -93,6 +102,9 @@ class RosBase:
         self._blocked_by = ""
         try:
             self._begin(interrupt)
+            if self._own_way:
+                self._drive.navigate(_end_of(path, heading, self.pose()), limits.radius, interrupt)
+                path = path[-1:]
             for number, end in enumerate(path, 1):
                 last = heading if number == len(path) else None
                 self._drive.straight((float(end[0]), float(end[1])), last, limits.radius, interrupt)
@@ -135,9 +147,18 @@ class RosBase:
         return f"{jump.words}; see where the robot is, then let it go on"
 
     def _off_route(self) -> str:
+        if self._own_way:
+            return ""
         pose = self._telemetry.pose()
         here = (pose.x, pose.y)
         off_m = min((math.dist(foot(*straight, here), here) for straight in self._route), default=0.0)
         if off_m <= self._settings.limits.off_path_m:
             return ""
         return f"the robot is {off_m:.2f} m off its route; bring it back there, or localise it again"
+
+
+def _end_of(path: Sequence[Point], heading: float | None, here: Pose) -> Pose:
+    """Return the pose at a path's end; without a heading it is that of the path there."""
+    before, end = [(here.x, here.y), *path][-2:]
+    along = math.atan2(end[1] - before[1], end[0] - before[0])
+    return Pose(x=float(end[0]), y=float(end[1]), heading=along if heading is None else heading)

@@ -64,6 +64,18 @@ SERVICES: dict[str, tuple[str, str]] = {
 """Request and response of services."""
 _RESULT = f"{PATH_ERRORS}std_msgs/Empty result\n{ERROR}"
 _SPUN = f"{SPIN_ERRORS}builtin_interfaces/Duration total_elapsed_time\n{ERROR}"
+NAVIGATE_GOAL = "geometry_msgs/PoseStamped pose\nstring behavior_tree"
+NAVIGATE_ERRORS = """uint16 UNKNOWN=9000
+uint16 FAILED_TO_LOAD_BEHAVIOR_TREE=9001
+uint16 TF_ERROR=9002
+uint16 TIMEOUT=9003
+"""
+_NAVIGATED = f"{NAVIGATE_ERRORS}{ERROR}"
+_NAVIGATING = (
+    "geometry_msgs/PoseStamped current_pose\nbuiltin_interfaces/Duration navigation_time\n"
+    "builtin_interfaces/Duration estimated_time_remaining\nint16 number_of_recoveries\n"
+    "float32 distance_remaining"
+)
 _TURNED = "float32 angular_distance_traveled"
 ACTIONS: dict[str, dict[tuple[str, ...], tuple[str, str, str]]] = {
     "nav2_msgs/action/FollowPath": {
@@ -72,6 +84,14 @@ ACTIONS: dict[str, dict[tuple[str, ...], tuple[str, str, str]]] = {
             f"{FOLLOW_PATH_GOAL}\nstring path_handler_id",
             _RESULT,
             "nav2_msgs/TrackingFeedback tracking_feedback",
+        ),
+    },
+    "nav2_msgs/action/NavigateToPose": {
+        (JAZZY, KILTED): (NAVIGATE_GOAL, _NAVIGATED, _NAVIGATING),
+        (LYRICAL,): (
+            NAVIGATE_GOAL,
+            _NAVIGATED,
+            f"{_NAVIGATING}\nfloat32 position_tracking_error\nfloat32 heading_tracking_error",
         ),
     },
     "nav2_msgs/action/Spin": {

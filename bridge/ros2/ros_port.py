@@ -42,11 +42,14 @@ class RosPort(Protocol):
     settings: RosSettings
     telemetry: RosTelemetry
 
-    def missing(self, what: Literal["drive", "spin", "scan"]) -> str:
+    def missing(self, what: Literal["drive", "navigate", "spin", "scan"]) -> str:
         """Return why the action or service cannot be used, such as a missing server; empty if it can."""
 
     def follow(self, path: Sequence[Pose]) -> RosGoal:
         """Send a path in the map's frame to the action that drives."""
+
+    def navigate(self, end: Pose) -> RosGoal:
+        """Send a pose in the map's frame to the action that finds its own way there."""
 
     def spin(self, angle: float) -> RosGoal:
         """Send a turn on the spot, radians counter-clockwise."""

@@ -52,6 +52,10 @@ class DriveActions(RosSection, frozen=True):
     follow_path: NeededName = "follow_path"
     spin: Name = ""
     """nav2_msgs/action/Spin: turns to a stop's heading where the path's end did not."""
+    navigate: NeededName = "navigate_to_pose"
+    """nav2_msgs/action/NavigateToPose: drives where a mission's policy lets the robot find its own way."""
+    behavior_tree: str = ""
+    """Behaviour tree that goals of `navigate` name; empty for Nav2's own."""
     cancel: tuple[NeededName, ...] = ("navigate_to_pose", "navigate_through_poses")
     """Other actions that may drive the robot; a stop cancels their goals, too."""
     controller_id: str = ""
@@ -124,6 +128,8 @@ class RosSettings(RosSection, frozen=True):
     node: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] = "stopgo"
     commands: bool = False
     """True if services of the node may start, resume, skip, retry and send home; nobody signs them."""
+    autostart_node: bool = True
+    """True if the node activates itself; else a manager of lifecycle nodes does."""
     frames: FrameNames = FrameNames()
     topics: TopicNames = TopicNames()
     drive: DriveActions = DriveActions()
@@ -152,8 +158,8 @@ def read_ros_settings(path: Path | None) -> RosSettings:
         raise InputError(f"{path}: {keys or 'the file'}{found}: {what}") from None
 
 
-def changed_settings(settings: RosSettings, changes: dict[str, dict[str, Any]]) -> RosSettings:
-    """Return the settings with other values, by table and key.
+def changed_settings(settings: RosSettings, changes: dict[str, Any]) -> RosSettings:
+    """Return the settings with other values, by table and key, or by a key of no table.
 
     Raises
     ------
@@ -161,8 +167,8 @@ def changed_settings(settings: RosSettings, changes: dict[str, dict[str, Any]]) 
         Naming the key and the value.
     """
     document = msgspec.to_builtins(settings)
-    for table, values in changes.items():
-        document[table] |= values
+    for name, value in changes.items():
+        document[name] = document[name] | value if isinstance(value, dict) else value
     try:
         return msgspec.convert(document, RosSettings)
     except msgspec.ValidationError as error:

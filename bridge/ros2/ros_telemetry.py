@@ -75,6 +75,8 @@ class RosTelemetry:
         """Error that has ended the thread which brings the samples."""
         self.unguarded = ""
         """Reason why no process stops the robot if this program ends; empty if one does."""
+        self.inactive = ""
+        """Reason why the life cycle of the node lets it drive nothing; empty while the node is active."""
         self.clock_offset_s: float | None = None
         """Seconds by which the odometry's stamps are behind this computer's time."""
         self.charge: float | None = None
@@ -85,6 +87,10 @@ class RosTelemetry:
     def say_unguarded(self, why: str) -> None:
         """Take the reason why no process stops the robot; empty if one does."""
         self.unguarded = why
+
+    def say_inactive(self, why: str) -> None:
+        """Take the reason why the node's life cycle lets it drive nothing; empty if it may."""
+        self.inactive = why
 
     def say_fault(self, why: str) -> None:
         """Take the error that has ended the node's thread."""
@@ -195,8 +201,8 @@ class RosTelemetry:
 
     def unusable(self) -> str:
         """Return why the robot must not move though everything arrives; empty if it may."""
-        if self.unguarded:
-            return self.unguarded
+        if self.inactive or self.unguarded:
+            return self.inactive or self.unguarded
         offset_s, limits = self.clock_offset_s, self._limits
         if self.emergency_stop:
             return "the emergency stop is pressed"

@@ -145,6 +145,8 @@ class Policy(Document, frozen=True):
     link_loss: Literal["continue", "finish_stop", "hold", "home"]
     link_loss_after_s: float
     battery_min: float
+    own_way: bool | UnsetType = UNSET
+    """True if the robot may leave the legs and find its own way to each stop; absent if it may not."""
 
 
 class Origin(Document, frozen=True):

@@ -63,6 +63,7 @@ def policy_of(settings: Settings) -> Policy:
         link_loss=settings.link_loss,
         link_loss_after_s=settings.link_loss_after,
         battery_min=settings.battery_min,
+        own_way=True if settings.own_way else UNSET,
     )
 
 

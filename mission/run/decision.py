@@ -48,6 +48,8 @@ class Situation:
     endurance_s: float | None
     not_ready: str = ""
     """Reason why the robot's base cannot drive at present."""
+    finds_way: bool = False
+    """True if the base finds its own way to a stop, as the mission allows."""
     boot_id: str = ""
     """Id of the robot program's present start; `command_ns` may go back from one start to the next."""
 
@@ -185,12 +187,18 @@ def _pause(order: RunCommand, mission: Mission, situation: Situation) -> Change:
 
 
 def _resume(order: RunCommand, mission: Mission, situation: Situation) -> Change | Refused:
-    off = off_route(situation.run, mission, situation.pose)
+    off = off_route(situation, mission)
     return off or resumed(situation.run, order.commander)
 
 
-def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
-    """Return a refusal if the robot is farther from its leg than its radius, and the stop's tolerance."""
+def off_route(situation: Situation, mission: Mission) -> Refused | None:
+    """Return a refusal if the robot is farther from its leg than its radius, and the stop's tolerance.
+
+    It would drive straight back to the leg. A robot that finds its own way may be anywhere.
+    """
+    if situation.finds_way:
+        return None
+    run, pose = situation.run, situation.pose
     legs = route_position.legs_of(mission)
     leg = min(run.leg, len(legs) - 1)
     limit = _limit(mission, leg)
@@ -228,7 +236,7 @@ def _abort(order: RunCommand, mission: Mission, situation: Situation) -> Change:
 
 
 def _home(order: RunCommand, mission: Mission, situation: Situation) -> Change | Refused:
-    off = off_route(situation.run, mission, situation.pose)
+    off = off_route(situation, mission)
     if off:
         return off
     reason = f"sent home by {order.commander}"

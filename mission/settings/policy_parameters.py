@@ -26,6 +26,10 @@ class PolicyParameters:
         Literal["continue", "finish_stop", "hold", "home"], _policy("Reaction to link loss")
     ] = "continue"
     link_loss_after: Annotated[float, _policy("Duration of a link loss until then", "s", least=0)] = 30.0
+    own_way: Annotated[
+        bool,
+        _policy("The robot may leave the legs and find its own way to each stop, if it can", quiet=True),
+    ] = False
     battery_min: Annotated[
         float, _policy("Minimum charge with which the run goes on", least=0, below=1, why="0.15 is 15 %")
     ] = 0.15

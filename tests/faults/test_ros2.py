@@ -1,6 +1,7 @@
 """Faults of a robot that speaks ROS 2, in simulated time: no stop lost or doubled, no scan while moving.
 
-An operator lets the robot go on after each fault, and corrects a localisation that was wrong.
+An operator lets the robot go on after each fault, and corrects a localisation that was wrong. Every other
+mission allows the robot's own way.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import msgspec
 import pytest
 
 from stopgo.bridge.ros2.ros_settings import RosLimits, RosSettings, ScanCall
+from stopgo.mission.document import with_digest
 from stopgo.mission.frames.transform import SAME
 from stopgo.mission.run.events import Event, Finished, Scanned, Started
 from tests.bridge.ros2.world import Killed, RosField, World
@@ -121,7 +123,9 @@ class Trial:
         self.field = RosField(settings=SETTINGS)
         self.kills = 0
         self.scan = msgspec.structs.replace(MISSION.stops[0].scan, duration_s=3.0, timeout_s=8.0)
-        self.mission = corridor(stops=3, scan=self.scan, settle_s=1.0)
+        made = corridor(stops=3, scan=self.scan, settle_s=1.0)
+        policy = msgspec.structs.replace(made.policy, own_way=True) if seed % 2 else made.policy
+        self.mission = with_digest(msgspec.structs.replace(made, policy=policy))
         self.push()
         for kind in kinds:
             at_s = chance.uniform(0.0, LONGEST_S)

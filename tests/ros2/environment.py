@@ -1,7 +1,8 @@
 """A ROS 2 of wheels for tests, in a folder of its own: `python -m tests.ros2.environment`.
 
 The package index has rclpy with Fast DDS, and the generators of message types. The types of Nav2's actions
-and of tf are built from their definitions in ../shared/data/ros2, with gcc and cmake.
+and of tf are built from `definitions` here, with gcc and cmake. Any Python 3.11 makes it; it needs no other
+package.
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ import sysconfig
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-DEFINITIONS = ROOT.parent / "shared" / "data" / "ros2"
+DEFINITIONS = Path(__file__).parent / "definitions"
+VERSIONS = Path(__file__).parent / "constraints.txt"
+PYTHON = (3, 11)
+"""The version of Python that the wheels are for."""
 FOLDER = Path(os.environ.get("STOPGO_ROS2", ROOT / ".venv-ros2"))
 WHEELS = (
     "ros-rclpy", "ros-rmw-fastrtps-cpp", "ros-nav-msgs", "ros-sensor-msgs", "ros-std-srvs",
@@ -24,6 +28,11 @@ WHEELS = (
 )  # fmt: skip
 PACKAGES = ("tf2_msgs", "nav2_msgs")
 DEPENDENCIES = ("builtin_interfaces", "std_msgs", "geometry_msgs", "nav_msgs")
+CXX_PARTS = (
+    "typesupport_c", "typesupport_cpp", "typesupport_fastrtps_c", "typesupport_fastrtps_cpp",
+    "typesupport_introspection_cpp",
+)  # fmt: skip
+"""Libraries of C++ for each package: the sources of each are compiled as one, messages before actions."""
 BUILT_WITH = "/opt/python/cp311-cp311"
 """Python's folder on the computer that built the wheels; their CMake files name it."""
 
@@ -51,10 +60,14 @@ def make() -> None:
     """Make the environment where it is not complete."""
     if is_made():
         return
+    if sys.version_info[:2] != PYTHON:
+        raise SystemExit(f"the wheels of ROS 2 need Python 3.11; this is {sys.version.split()[0]}")
     venv = FOLDER / "venv"
     subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
     python = str(venv / "bin" / "python")
-    subprocess.run([python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *WHEELS], check=True)
+    pip = [python, "-m", "pip", "install", "-q", "--no-compile", "--disable-pip-version-check"]
+    subprocess.run([*pip, "--upgrade", "pip"], check=True)
+    subprocess.run([*pip, "-c", str(VERSIONS), *WHEELS], check=True)
     _mend_paths(python, venv)
     for package in PACKAGES:
         _build(package, python)
@@ -82,9 +95,11 @@ def _build(package: str, python: str) -> None:
     shutil.rmtree(source, ignore_errors=True)
     shutil.copytree(DEFINITIONS / package, source, copy_function=shutil.copyfile)
     build.mkdir(parents=True, exist_ok=True)
-    files = sorted(
-        str(file.relative_to(source)) for file in source.rglob("*") if file.suffix in (".msg", ".action")
-    )
+    files = [
+        str(file.relative_to(source))
+        for kind in ("msg", "action")
+        for file in sorted(source.rglob(f"*.{kind}"))
+    ]
     depends = "".join(f"<depend>{name}</depend>" for name in (*DEPENDENCIES, "action_msgs"))
     (source / "package.xml").write_text(
         f'<?xml version="1.0"?><package format="3"><name>{package}</name><version>1.0.0</version>'
@@ -100,6 +115,9 @@ def _build(package: str, python: str) -> None:
     (source / "CMakeLists.txt").write_text(
         f"cmake_minimum_required(VERSION 3.8)\nproject({package})\n{found}\n"
         f"rosidl_generate_interfaces({package} {' '.join(files)} DEPENDENCIES {' '.join(DEPENDENCIES)})\n"
+        f"foreach(part {' '.join(CXX_PARTS)})\n"
+        f"set_target_properties({package}__rosidl_${{part}} PROPERTIES"
+        " UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)\nendforeach()\n"
         "ament_export_dependencies(rosidl_default_runtime)\nament_package()\n"
     )
     prefix = f"{types}:{FOLDER / 'venv'}"
@@ -108,7 +126,8 @@ def _build(package: str, python: str) -> None:
         "AMENT_PREFIX_PATH": prefix, "CMAKE_PREFIX_PATH": prefix,
         "LD_LIBRARY_PATH": f"{FOLDER / 'venv' / 'lib'}:{types / 'lib'}",
     }  # fmt: skip
-    options = (f"-DCMAKE_INSTALL_PREFIX={types}", f"-DPython3_EXECUTABLE={python}")
+    fast = [f"-DCMAKE_{language}_FLAGS=-O0 -g0" for language in ("C", "CXX")]
+    options = (f"-DCMAKE_INSTALL_PREFIX={types}", f"-DPython3_EXECUTABLE={python}", *fast)
     steps = (["cmake", str(source), *options], ["make", "-j2"], ["make", "install"])
     for step in steps:
         ended = subprocess.run(step, cwd=build, env=environment, capture_output=True, text=True, check=False)

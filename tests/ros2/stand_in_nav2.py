@@ -2,7 +2,9 @@
 
 They behave as Nav2's controller server does: one goal at a time; a new one ends the old one as aborted; a
 cancelled one ends with zero velocity; a goal succeeds within the checker's tolerance, not exactly at its end;
-without progress it is aborted. The base drives what `cmd_vel` says, and stands 0.5 s after the last command.
+without progress it is aborted. NavigateToPose sends goals of its own to FollowPath, as bt_navigator does, on
+a way that leaves the straight one. The base drives what `cmd_vel` says, and stands 0.5 s after the last
+command.
 
 Run it with ROS's Python: `stand_in_nav2.py FOLDER SPEED` writes its scans to FOLDER, and prints `ready`.
 """
@@ -19,10 +21,11 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from geometry_msgs.msg import TransformStamped, Twist
-from nav2_msgs.action import FollowPath, Spin
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped, TransformStamped, Twist
+from nav2_msgs.action import FollowPath, NavigateToPose, Spin
 from nav_msgs.msg import Odometry
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
@@ -38,6 +41,8 @@ VELOCITY_TIMEOUT_S = 0.5
 ALLOWANCE_S = 10.0
 """Time without progress after which a goal is aborted."""
 SCAN_S = 0.3
+DETOUR_M = 0.8
+"""Distance from the straight way that a way of its own has."""
 
 
 class Robot(Node):
@@ -97,7 +102,9 @@ class Servers(Node):
         self._lock = threading.Lock()
         self._velocity = self.create_publisher(Twist, "cmd_vel", 10)
         group = ReentrantCallbackGroup()
-        for kind, name in ((FollowPath, "follow_path"), (Spin, "spin")):
+        self._controller = ActionClient(self, FollowPath, "follow_path", callback_group=group)
+        kinds = ((FollowPath, "follow_path"), (Spin, "spin"), (NavigateToPose, "navigate_to_pose"))
+        for kind, name in kinds:
             ActionServer(
                 self, kind, name, getattr(self, f"_{name}"), callback_group=group,
                 cancel_callback=lambda goal: CancelResponse.ACCEPT,
@@ -112,6 +119,35 @@ class Servers(Node):
     def _spin(self, handle: Any) -> Any:
         robot = self._robot
         return self._drive(handle, Spin.Result, (robot.x, robot.y), robot.heading + handle.request.target_yaw)
+
+    def _navigate_to_pose(self, handle: Any) -> Any:
+        end, robot = handle.request.pose, self._robot
+        middle = PoseStamped(header=end.header)
+        middle.pose.position.x = 0.5 * (robot.x + end.pose.position.x)
+        middle.pose.position.y = 0.5 * (robot.y + end.pose.position.y) + DETOUR_M
+        middle.pose.orientation = end.pose.orientation
+        for pose in (middle, end):
+            status = self._followed(handle, pose)
+            if status != GoalStatus.STATUS_SUCCEEDED:
+                (handle.canceled if handle.is_cancel_requested else handle.abort)()
+                return NavigateToPose.Result(error_code=9000, error_msg="no way")
+        handle.succeed()
+        return NavigateToPose.Result()
+
+    def _followed(self, handle: Any, end: Any) -> int:
+        """Drive by a goal of our own; the status in which it has ended."""
+        goal = FollowPath.Goal()
+        goal.path.header, goal.path.poses = end.header, [end]
+        sent = self._controller.send_goal_async(goal)
+        while not sent.done():
+            time.sleep(1.0 / HZ)
+        ended, cancelled = sent.result().get_result_async(), False
+        while not ended.done():
+            if handle.is_cancel_requested and not cancelled:
+                sent.result().cancel_goal_async()
+                cancelled = True
+            time.sleep(1.0 / HZ)
+        return int(ended.result().status)
 
     def _drive(self, handle: Any, result: Any, end: tuple[float, float], heading: float) -> Any:
         with self._lock:
@@ -176,7 +212,7 @@ def main(folder: Path, speed: float) -> None:
     rclpy.init()
     robot = Robot()
     servers = Servers(robot, folder, speed)
-    executor = MultiThreadedExecutor(num_threads=4)
+    executor = MultiThreadedExecutor(num_threads=6)
     executor.add_node(robot)
     executor.add_node(servers)
     print("ready", flush=True)

@@ -35,6 +35,7 @@ pytestmark = [
 HERE = Path(__file__).parent
 DEADLINE_S = 60.0
 FAST = RobotSpec(radius=0.35, speed=1.5, turn_rate=2.0, acceleration=2.0)
+LIFE_CYCLE = "tests.ros2.life_cycle"
 SETTINGS = """
 [topics]
 cmd_vel = "cmd_vel"
@@ -55,12 +56,12 @@ def quick_corridor(*, stops: int, closed: bool) -> Mission:
 class Site:
     """The stand-in robot, and stopgo's agent on it, each a process with ROS's Python."""
 
-    def __init__(self, folder: Path, mission: Mission, speed: float) -> None:
+    def __init__(self, folder: Path, mission: Mission, speed: float, settings: str) -> None:
         self.folder = folder
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.environment = activated({"ROS_DOMAIN_ID": str(random.Random(str(folder)).randint(1, 100))})
         (folder / "scans").mkdir()
-        (folder / "ros2.toml").write_text(SETTINGS)
+        (folder / "ros2.toml").write_text(settings)
         (folder / "mission.json").write_bytes(encode(mission))
         self.processes: list[subprocess.Popen[str]] = []
         self.python("-m", "tests.ros2.stand_in_nav2", str(folder / "scans"), str(speed))
@@ -95,10 +96,10 @@ class Site:
             time.sleep(0.1)
         return state
 
-    def other_node(self, module: str) -> str:
+    def other_node(self, module: str, *arguments: str) -> str:
         """Run another ROS node to its end; what it prints."""
         ended = subprocess.run(
-            [str(self.environment["STOPGO_ROS2_PYTHON"]), "-m", module],
+            [str(self.environment["STOPGO_ROS2_PYTHON"]), "-m", module, *arguments],
             env=self.environment, cwd=HERE.parents[1], capture_output=True, text=True, check=False,
         )  # fmt: skip
         assert ended.returncode == 0, ended.stderr
@@ -129,8 +130,8 @@ def _wait_for_line(stream: IO[str] | None, begin: str) -> None:
 
 
 @contextmanager
-def site_in(folder: Path, mission: Mission, speed: float = 1.5) -> Iterator[Site]:
-    site = Site(folder, mission, speed)
+def site_in(folder: Path, mission: Mission, speed: float = 1.5, settings: str = SETTINGS) -> Iterator[Site]:
+    site = Site(folder, mission, speed, settings)
     try:
         yield site
     finally:
@@ -152,6 +153,44 @@ def test_a_mission_is_driven_to_its_end_and_reviewed(tmp_path: Path) -> None:
         scans = [file.read_text().split() for file in sorted((tmp_path / "scans").iterdir())]
         assert [round(float(scan[0])) for scan in scans] == [2, 4, 6]
         assert {scan[3] for scan in scans} == {"False"}, "the robot moved during a scan"
+
+
+def test_a_mission_that_allows_it_is_driven_on_nav2s_own_way(tmp_path: Path) -> None:
+    """Nav2's goals to its own servers are no other client's, and the driven way is compared with the legs."""
+    made = quick_corridor(stops=2, closed=False)
+    policy = msgspec.structs.replace(made.policy, own_way=True)
+    with site_in(tmp_path, with_digest(msgspec.structs.replace(made, policy=policy))) as site:
+        site.robot()
+        assert site.stopgo("push", str(tmp_path / "mission.json")).returncode == 0
+        assert site.stopgo("start").returncode == 0
+        (run,) = site.reviewed()["runs"]
+        assert site.state()["done"] == ["s1", "s2"]
+        assert [state["state"] for state in run["states"]].count("HELD") == 0
+        assert max(stop["deviation_m"] for stop in run["stops"]) <= 0.05
+        assert 0.5 < run["greatest_beside_route_m"] < 1.2
+
+
+def test_the_robot_drives_only_while_its_lifecycle_node_is_active(tmp_path: Path) -> None:
+    """Transitions are those that a lifecycle manager requests."""
+    by_hand = f"autostart_node = false\n{SETTINGS}"
+    with site_in(tmp_path, quick_corridor(stops=2, closed=False), 0.6, by_hand) as site:
+        site.robot()
+        assert site.stopgo("push", str(tmp_path / "mission.json")).returncode == 0
+        assert "unconfigured; configure and activate it" in site.stopgo("start").stderr
+        assert site.other_node(LIFE_CYCLE, "configure", "activate") == "ready\nunconfigured active\n"
+        manager = site.python("-m", LIFE_CYCLE, "drive", "deactivate")
+        assert site.stopgo("start").returncode == 0
+        assert manager.stdout is not None
+        assert manager.stdout.readline() == "active inactive\n"
+        site.until(lambda state: state.get("state") == "HELD")
+        assert "inactive" in site.stopgo("retry").stderr
+        assert site.other_node(LIFE_CYCLE, "activate") == "ready\ninactive active\n"
+        assert site.stopgo("retry").returncode == 0
+        assert site.until(lambda state: state.get("state") == "FINISHED")["done"] == ["s1", "s2"]
+        (run,) = site.reviewed()["runs"]
+        assert "the lifecycle node is inactive; activate it" in " ".join(
+            state["why"] for state in run["states"]
+        )
 
 
 def test_a_robot_on_rmw_zenoh_is_read_without_ros(tmp_path: Path) -> None:

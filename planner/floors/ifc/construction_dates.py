@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import ifcopenshell
 import ifcopenshell.util.element
+from ifcopenshell.util.element import get_property_definition
 
 from stopgo.planner.floors.ifc.model import Task
 
@@ -94,15 +96,31 @@ def _dated_2x3(task: Any) -> Task | None:
 
 def _of_properties(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
     """Products whose own properties hold a day of start or finish."""
-    for relation in model.by_type("IfcRelDefinesByProperties"):
+    dated = _sets_with(model, (START_NAMES.search, FINISH_NAMES.search))
+    for relation in model.by_type("IfcRelDefinesByProperties") if dated else ():
         properties = relation.RelatingPropertyDefinition
-        if not properties.is_a("IfcPropertySet"):
+        if properties.id() not in dated:
             continue
         start, finish, name = _days_in(properties)
         if start or finish:
             for item in relation.RelatedObjects:
                 if item.is_a("IfcProduct"):
                     yield item, Task(name, start, finish, source=f"property {name}")
+
+
+def _sets_with(model: ifcopenshell.file, patterns: tuple[Callable[[str], Any], ...]) -> dict[int, Any]:
+    """Property sets, by their numbers, with a property of which the name fits one of some patterns.
+
+    Few properties of a model do. So the names of all are looked at, and then only these sets are read.
+    """
+
+    @cache
+    def fits(name: str) -> bool:
+        return any(pattern(name) for pattern in patterns)
+
+    wanted = [item for item in model.by_type("IfcProperty") if fits(item[0])]
+    holders = (holder for item in wanted for holder in model.get_inverse(item))
+    return {holder.id(): holder for holder in holders if holder.is_a("IfcPropertySet")}
 
 
 def _days_in(properties: Any) -> tuple[str | None, str | None, str]:
@@ -124,10 +142,44 @@ def _days_in(properties: Any) -> tuple[str | None, str | None, str]:
     return start, finish, said_by
 
 
-def phases_of(entity: Any) -> tuple[str, str]:
-    """The phases that make and remove a product, as Revit's `Phase Created`; empty where it names none."""
+def phases_by_product(model: ifcopenshell.file) -> dict[int, tuple[str, str]]:
+    """The phases that make and remove each product, as Revit's `Phase Created`, by its number in the file.
+
+    A phase that is not named is empty; a product without any is not among them. Property sets of a product
+    come after those of its type, whose values they replace.
+    """
+    phased = _sets_with(model, (PHASE_NAMES.match, REMOVED_NAMES.match))
+    said = {key: get_property_definition(item) for key, item in phased.items()}
+    of_product: dict[int, dict[str, dict[str, Any]]] = defaultdict(dict)
+    for product, properties in (*_of_types(model, phased), *_of_objects(model, phased)):
+        of_product[product].setdefault(properties.Name, {}).update(said[properties.id()])
+    return {product: _phases_in(sets) for product, sets in of_product.items()}
+
+
+def _of_types(model: ifcopenshell.file, phased: dict[int, Any]) -> Iterator[tuple[int, Any]]:
+    """Products with the property sets of their types that are among some."""
+    typed = set()
+    for relation in model.by_type("IfcRelDefinesByType") if phased else ():
+        own = [item for item in relation.RelatingType.HasPropertySets or () if item.id() in phased]
+        for product in {item.id() for item in relation.RelatedObjects}.difference(typed):
+            typed.add(product)
+            yield from ((product, item) for item in own)
+
+
+def _of_objects(model: ifcopenshell.file, phased: dict[int, Any]) -> Iterator[tuple[int, Any]]:
+    """Products with their own property sets that are among some."""
+    for relation in model.by_type("IfcRelDefinesByProperties") if phased else ():
+        definition = relation.RelatingPropertyDefinition
+        several = definition.is_a("IfcPropertySetDefinitionSet")
+        for item in definition.wrappedValue if several else (definition,):
+            if item.id() in phased:
+                yield from ((product.id(), item) for product in relation.RelatedObjects)
+
+
+def _phases_in(sets: dict[str, dict[str, Any]]) -> tuple[str, str]:
+    """The phases that property sets name, by the names of the sets."""
     made = removed = ""
-    for said in ifcopenshell.util.element.get_psets(entity, psets_only=True).values():
+    for said in sets.values():
         for key, value in said.items():
             if not isinstance(value, str):
                 continue

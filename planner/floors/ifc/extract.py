@@ -17,9 +17,10 @@ import ifcopenshell.geom
 import ifcopenshell.util.element
 import ifcopenshell.util.placement
 import ifcopenshell.util.unit
+import msgspec
 import numpy as np
 
-from stopgo.planner.floors.ifc.construction_dates import phases_of, tasks_by_product
+from stopgo.planner.floors.ifc.construction_dates import phases_by_product, tasks_by_product
 from stopgo.planner.floors.ifc.earth_placement import place_of
 from stopgo.planner.floors.ifc.model import Described, Model, Product, Storey, packed
 from stopgo.planner.floors.ifc.product_shapes import (
@@ -123,9 +124,13 @@ def extracted(model: ifcopenshell.file, shapes: Iterable[Made], *, damage: tuple
         by_owner.setdefault(owners[item.number], []).append(item)
     own = _without_repeated_parts(chosen, by_owner)
     vertices, faces, where = _arrays(own)
-    tasks = tasks_by_product(model)
+    tasks, phases = tasks_by_product(model), phases_by_product(model)
     products = [
-        _product(entity, role, unit, where.get(entity.id()), own.get(entity.id(), ()), tasks)
+        msgspec.structs.replace(
+            _product(entity, role, unit, where.get(entity.id()), own.get(entity.id(), ())),
+            tasks=tasks.get(entity.id(), ()),
+            phases=phases.get(entity.id(), ("", "")),
+        )
         for entity, role in chosen
     ]
     entities = {number: model.by_id(number) for number in owners}
@@ -138,7 +143,7 @@ def extracted(model: ifcopenshell.file, shapes: Iterable[Made], *, damage: tuple
         storeys=tuple(_storeys(model, unit)),
         products=tuple(products),
         place=place_of(model, unit),
-        left_out=_left_out(model),
+        left_out=_left_out(model, owners),
         failed=tuple(map(_in_words, failed)),
         boxed=tuple(_in_words(entities[item.number]) for item in made if item.way == BOX),
         uncut=tuple(_in_words(entities[item.number]) for item in made if item.way in UNCUT),
@@ -195,8 +200,8 @@ def _chosen(model: ifcopenshell.file) -> list[tuple[Any, str]]:
     found: dict[int, tuple[Any, str]] = {}
     for name, role in ROLES.items():
         for entity in _by_type(model, name):
-            if _is_of_role(entity, name, role):
-                found.setdefault(entity.id(), (entity, role))
+            if entity.id() not in found and _is_of_role(entity, name, role):
+                found[entity.id()] = (entity, role)
     return [found[key] for key in sorted(found)]
 
 
@@ -252,9 +257,7 @@ def _arrays(made: dict[int, list[Made]]) -> tuple[np.ndarray, np.ndarray, dict[i
     return np.vstack(vertices), np.vstack(faces), where
 
 
-def _product(
-    entity: Any, role: str, unit: float, rows: Rows | None, shapes: Sequence[Made], tasks: dict
-) -> Product:
+def _product(entity: Any, role: str, unit: float, rows: Rows | None, shapes: Sequence[Made]) -> Product:
     first, last, low, high = rows or (0, 0, 0, 0)
     container = ifcopenshell.util.element.get_container(entity, ifc_class="IfcBuildingStorey")
     opening = next(iter(getattr(entity, "FillsVoids", ())), None)
@@ -275,8 +278,6 @@ def _product(
         parts=tuple(part.GlobalId for part in ifcopenshell.util.element.get_parts(entity)),
         overall_width=_metres(getattr(entity, "OverallWidth", None), unit) if role == "doors" else None,
         lining=_lining(entity, unit) if role == "doors" else None,
-        tasks=tasks.get(entity.id(), ()),
-        phases=phases_of(entity),
     )
 
 
@@ -330,8 +331,8 @@ def _application(model: ifcopenshell.file) -> str:
     return next((str(name) for name in names if name), "")
 
 
-def _left_out(model: ifcopenshell.file) -> dict[str, int]:
-    chosen = {*_owners(model, _chosen(model)), *(item.id() for item in _by_type(model, "IfcOpeningElement"))}
+def _left_out(model: ifcopenshell.file, owners: dict[int, int]) -> dict[str, int]:
+    chosen = {*owners, *(item.id() for item in _by_type(model, "IfcOpeningElement"))}
     counts = Counter(
         entity.is_a()
         for entity in _by_type(model, "IfcProduct")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import pyproj
 from pyproj.exceptions import CRSError, ProjError
@@ -100,7 +101,7 @@ def _in_use(place: OnEarth, crs: pyproj.CRS, at: tuple[float, float]) -> _Read:
 
 def _position(place: OnEarth, crs: pyproj.CRS, at: tuple[float, float]) -> Georeference | None:
     """The position of a point given in metres of the map; None where the reference system is not in use."""
-    to_earth = pyproj.Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
+    to_earth = _to_earth(crs)
     unit = crs.axis_info[0].unit_conversion_factor
     abscissa, ordinate = place.abscissa, place.ordinate
     turn = math.atan2(ordinate, abscissa) if abscissa is not None and ordinate is not None else 0.0
@@ -116,6 +117,12 @@ def _position(place: OnEarth, crs: pyproj.CRS, at: tuple[float, float]) -> Geore
         return None
     bearing = EARTH.inv(lon, lat, lon_ahead, lat_ahead)[0]
     return Georeference(lat, lon, place.height or 0.0, bearing % 360)
+
+
+@cache
+def _to_earth(crs: pyproj.CRS) -> pyproj.Transformer:
+    """The way from a reference system to latitude and longitude: slow to find, the same on every storey."""
+    return pyproj.Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
 
 
 def _by_site(place: OnEarth) -> _Read:

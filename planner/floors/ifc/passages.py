@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -36,14 +38,38 @@ def passages(
     )
     shut = shapely.union_all([standing, *(door.threshold.buffer(0.05) for door in doors)])
     free = floor.difference(shut)
+    shapely.prepare(free)
+    nearly_free = free.buffer(TOUCH)
     lines: list[FloatArray] = []
-    for one, other in _neighbours(rooms):
-        lines += _borders(one.region, other.region, free)
-        lines += _openings(one.region, other.region, free)
+    for one, other in _neighbours([_Grown(room.region) for room in rooms]):
+        lines += _borders(one, other, free, nearly_free)
+        lines += _openings(one, other, free)
     return lines
 
 
-def _neighbours(rooms: Sequence[Space]) -> Iterator[tuple[Space, Space]]:
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """A room's area, and the same with a margin; each margin is made once for all neighbours."""
+
+    region: Region
+
+    @cached_property
+    def squarely(self) -> Region:
+        """With the margin within which rooms touch, and square corners."""
+        return self.region.buffer(TOUCH, join_style="mitre")
+
+    @cached_property
+    def roundly(self) -> Region:
+        """With the margin within which rooms touch, and round corners."""
+        return self.region.buffer(TOUCH)
+
+    @cached_property
+    def deep(self) -> Region:
+        """With the thickest wall around it."""
+        return self.region.buffer(DEEPEST)
+
+
+def _neighbours(rooms: Sequence[_Grown]) -> Iterator[tuple[_Grown, _Grown]]:
     if len(rooms) < 2:
         return
     tree = shapely.STRtree([room.region for room in rooms])
@@ -51,12 +77,12 @@ def _neighbours(rooms: Sequence[Space]) -> Iterator[tuple[Space, Space]]:
     yield from ((rooms[a], rooms[b]) for a, b in sorted(zip(*pairs.tolist(), strict=True)) if a < b)
 
 
-def _borders(one: Region, other: Region, free: Region) -> Iterator[FloatArray]:
+def _borders(one: _Grown, other: _Grown, free: Region, nearly_free: Region) -> Iterator[FloatArray]:
     """Straight pieces of a border that two rooms share, where nothing stands on it."""
-    shared = one.boundary.intersection(other.buffer(TOUCH, join_style="mitre"))
+    shared = one.region.boundary.intersection(other.squarely)
     for line in shapely.get_parts(shapely.line_merge(_lines_of(shared))):
         for a, b in _straight(shapely.get_coordinates(line)):
-            crossing = shapely.LineString([a, b]).intersection(free.buffer(TOUCH))
+            crossing = shapely.LineString([a, b]).intersection(nearly_free)
             for piece in shapely.get_parts(_lines_of(crossing)):
                 yield from _leading_on(shapely.get_coordinates(piece)[[0, -1]], free)
 
@@ -90,21 +116,21 @@ def _straight(points: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     yield from pairwise(thin)
 
 
-def _openings(one: Region, other: Region, free: Region) -> Iterator[FloatArray]:
+def _openings(one: _Grown, other: _Grown, free: Region) -> Iterator[FloatArray]:
     """The middle lines of openings without a door in a wall between two rooms."""
-    if one.distance(other) <= TOUCH:
+    if one.region.distance(other.region) <= TOUCH:
         return
-    between = one.buffer(DEEPEST).intersection(other.buffer(DEEPEST)).intersection(free)
-    between = between.difference(one).difference(other)
+    between = one.deep.intersection(other.deep).intersection(free)
+    between = between.difference(one.region).difference(other.region)
     for part in shapely.get_parts(between):
         sides = [_side(part, room) for room in (one, other)]
         if all(side is not None for side in sides):
             yield from _middle(*sides)  # type: ignore[arg-type]
 
 
-def _side(part: Region, room: Region) -> FloatArray | None:
+def _side(part: Region, room: _Grown) -> FloatArray | None:
     """Side of an opening at a room: the ends (2, 2) of the longest line they share."""
-    shared = shapely.line_merge(_lines_of(part.boundary.intersection(room.buffer(TOUCH))))
+    shared = shapely.line_merge(_lines_of(part.boundary.intersection(room.roundly)))
     lines = [line for line in shapely.get_parts(shared) if line.length >= NARROWEST]
     if not lines:
         return None

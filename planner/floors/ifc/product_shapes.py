@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -61,34 +62,55 @@ class Made:
     """Empty if the kernel made it at once, else a key of WAYS or BOX."""
 
 
-def _settings(*, with_openings: bool = True, with_cuts: bool = True) -> Any:
+def _settings(*, with_openings: bool = True, with_cuts: bool = True, in_world: bool = True) -> Any:
     settings = ifcopenshell.geom.settings()
-    settings.set("use-world-coords", True)
+    settings.set("use-world-coords", in_world)
     settings.set("disable-opening-subtractions", not with_openings)
     settings.set("disable-boolean-result", not with_cuts)
     return settings
 
 
 def all_at_once(model: ifcopenshell.file, entities: list[Any]) -> Iterator[Made]:
-    """Every shape by the fast kernel; the few that it cannot make, one by one in other ways."""
+    """Every shape by the fast kernel; the few that it cannot make, one by one in other ways.
+
+    Products of one type have one shape. The kernel makes it once, where it need not place it in the world.
+    """
+    typed = _with_shared_shapes(entities)
+    shared = {entity.id() for entity in typed}
     done = set()
-    if entities:
-        iterator = ifcopenshell.geom.iterator(
-            _settings(), model, 1, include=entities, geometry_library=KERNEL
-        )
-        there = bool(iterator.initialize())
-        while there:
-            _show_progress(iterator.progress())
-            shape = iterator.get()
-            made = _made(shape.id, shape.geometry)
-            if is_sound(made):
-                done.add(made.number)
-                yield made
-            there = bool(iterator.next())
+    for in_world, chosen in ((True, [item for item in entities if item.id() not in shared]), (False, typed)):
+        for made in _iterated(model, chosen, _settings(in_world=in_world)):
+            done.add(made.number)
+            yield made
     for entity in entities:
         other = None if entity.id() in done else _in_another_way(model, entity)
         if other is not None:
             yield other
+
+
+def _with_shared_shapes(entities: list[Any]) -> list[Any]:
+    """Entities of which the shape, or a part of it, is that of others too."""
+    sources = {
+        entity.id(): {item.MappingSource.id() for item in _items(entity) if item.is_a("IfcMappedItem")}
+        for entity in entities
+    }
+    counts = Counter(source for own in sources.values() for source in own)
+    return [entity for entity in entities if any(counts[source] > 1 for source in sources[entity.id()])]
+
+
+def _iterated(model: ifcopenshell.file, entities: list[Any], settings: Any) -> Iterator[Made]:
+    """The sound shapes of entities by the fast kernel."""
+    if not entities:
+        return
+    iterator = ifcopenshell.geom.iterator(settings, model, 1, include=entities, geometry_library=KERNEL)
+    there = bool(iterator.initialize())
+    while there:
+        _show_progress(iterator.progress())
+        shape = iterator.get()
+        made = _made(shape.id, shape)
+        if is_sound(made):
+            yield made
+        there = bool(iterator.next())
 
 
 def one_by_one(
@@ -123,12 +145,15 @@ def _created(entity: Any, settings: Any, kernel: Kernel) -> Made | None:
         shape = ifcopenshell.geom.create_shape(settings, entity, geometry_library=kernel)
     except RuntimeError:
         return None
-    made = _made(entity.id(), cast(Any, shape).geometry)
+    made = _made(entity.id(), cast(Any, shape))
     return made if is_sound(made) else None
 
 
-def _made(number: int, geometry: Any) -> Made:
-    points = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3).copy()
+def _made(number: int, shape: Any) -> Made:
+    geometry = shape.geometry
+    local = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3)
+    placement = np.array(shape.transformation.matrix).reshape(4, 4).T  # the identity for shapes in the world
+    points = np.einsum("ij,nj->ni", placement[:3, :3], local) + placement[:3, 3]
     corners = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3).astype(np.int64)
     clear = bool(geometry.materials) and all(item.transparency > CLEAR for item in geometry.materials)
     return Made(number, points, corners, transparent=clear)

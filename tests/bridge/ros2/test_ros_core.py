@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import msgspec
 import pytest
 
 from stopgo.bridge.ros2.ros_settings import FrameNames, RosSettings
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.frames.transform import SAME, Transform
 from stopgo.mission.run.events import Arrived, Scanned
 from tests.bridge.ros2.world import TICK_S, Killed, RosField, World
@@ -90,6 +91,7 @@ def test_a_goal_that_a_killed_program_has_left_is_cancelled_at_the_next_start() 
             "jumped by 5.00 m",
         ),
         (lambda world: setattr(world.telemetry, "emergency_stop", True), "the emergency stop is pressed"),
+        (lambda world: world.telemetry.say_inactive("the node is inactive"), "the node is inactive"),
     ],
 )
 def test_what_goes_wrong_in_a_drive_stops_the_robot_and_is_reported(
@@ -176,5 +178,73 @@ def test_a_robot_whose_guard_has_ended_is_held_until_another_one_runs() -> None:
     assert field.order("retry").outcome != "ok"
     field.world.telemetry.unguarded = ""
     assert field.order("retry").outcome == "ok"
+    field.work()
+    assert scanned(field) == ["s1", "s2", "s3"]
+
+
+def with_own_way(mission: Mission = MISSION) -> Mission:
+    policy = msgspec.structs.replace(mission.policy, own_way=True)
+    return with_digest(msgspec.structs.replace(mission, policy=policy))
+
+
+OWN_WAYS = [(stop.x, stop.y) for stop in MISSION.stops] + [(MISSION.start.x, MISSION.start.y)]
+"""To every stop, and back."""
+
+
+def test_only_a_mission_that_allows_it_lets_nav2_find_its_own_way() -> None:
+    field = started(RosField())
+    field.work()
+    assert field.world.ways == []
+    field = started(RosField(), with_own_way())
+    farthest = 0.0
+
+    def look() -> None:
+        nonlocal farthest
+        farthest = max(farthest, abs(field.world.at.y))
+        field.world.later(0.5, look)
+
+    field.world.later(0.5, look)
+    field.work()
+    assert scanned(field) == ["s1", "s2", "s3"]
+    assert field.world.ways == OWN_WAYS
+    assert farthest > field.settings.limits.off_path_m, "farther than a robot on its legs may be"
+    arrived = [event.deviation_m for event in field.journal.events() if isinstance(event, Arrived)]
+    assert max(arrived) <= max(stop.tolerance_m for stop in MISSION.stops)
+
+
+def test_the_last_piece_of_its_own_way_is_driven_straight() -> None:
+    """Nav2's own tolerance, 0.25 m, is larger than a mission's."""
+    field = RosField()
+    field.world.near = 0.25
+    started(field, with_own_way())
+    field.work()
+    assert scanned(field) == ["s1", "s2", "s3"]
+    assert field.world.ways == OWN_WAYS
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (lambda world: world.foreign(3.0, 3.0), "another client drives the robot"),
+        (lambda world: world.silent.add("tf"), "tf has no"),
+        (lambda world: setattr(world, "navigates", False), "action server is not available"),
+        (lambda world: world.end("canceled"), "has cancelled the goal"),
+    ],
+)
+def test_what_goes_wrong_on_its_own_way_stops_the_robot(harm: Callable[[World], object], words: str) -> None:
+    field = started(RosField(), with_own_way())
+    field.world.later(2.0, lambda: harm(field.world))
+    field.work()
+    assert (field.controller.run.state, field.world.speed) == ("HELD", 0.0)
+    assert words in field.controller.run.reason
+
+
+def test_a_robot_that_finds_its_own_way_is_paused_and_resumed_beside_its_route() -> None:
+    field = started(RosField(), with_own_way())
+    field.world.later(3.0, lambda: field.order("pause"))
+    field.work()
+    assert (field.controller.run.state, field.world.speed) == ("PAUSED", 0.0)
+    assert abs(field.world.at.y) > MISSION.robot.radius
+    assert field.order("resume").outcome == "ok"
     field.work()
     assert scanned(field) == ["s1", "s2", "s3"]

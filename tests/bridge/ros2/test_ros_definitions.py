@@ -26,6 +26,11 @@ def test_hashes_are_those_that_ros_publishes() -> None:
     assert spun.send_goal.hash.startswith("RIHS01_a863727716f5620b")
     assert kilted.send_goal.hash.startswith("RIHS01_63ad359dc095261a")
     assert jazzy.get_result.hash == lyrical.get_result.hash
+    jazzy, lyrical = action_types("nav2_msgs/action/NavigateToPose")
+    assert jazzy.send_goal.hash == lyrical.send_goal.hash, "they differ by what is not read here"
+    assert lyrical.send_goal.hash.startswith("RIHS01_a4fcb3bee1bf32e2")
+    assert lyrical.get_result.hash.startswith("RIHS01_c407920357d56677")
+    assert lyrical.feedback.hash.startswith("RIHS01_2c1b4ec1a0e3a53c")
 
 
 def test_versions_differ_by_their_fields() -> None:

@@ -88,6 +88,8 @@ class World:
     def __post_init__(self) -> None:
         self.telemetry: RosTelemetry | None = None
         self.goals: list[FakeGoal] = []
+        self.ways: list[tuple[float, float]] = []
+        """Ends of the goals that let Nav2 find its own way."""
         self.scans: list[Scanning] = []
         self.files = 0
         self.servers = True
@@ -159,13 +161,25 @@ class World:
 
     # Nav2
 
-    def missing(self, what: Literal["drive", "spin", "scan"]) -> str:
+    def missing(self, what: Literal["drive", "navigate", "spin", "scan"]) -> str:
+        if what == "navigate" and not self.navigates:
+            return "no action server navigate_to_pose"
         return "" if self.servers or what == "scan" else "no action server follow_path"
 
     def follow(self, path: Sequence[Pose]) -> FakeGoal:
         ends = [(path[0].x, path[0].y), (path[-1].x, path[-1].y)]
         heading = path[-1].heading
         return self._send(lambda at: _motion(self._true(at), [self._odom(end) for end in ends[1:]], heading))
+
+    navigates = True
+    detour_m = 1.0
+
+    def navigate(self, end: Pose) -> FakeGoal:
+        """Nav2's own way leads past a place beside the straight one."""
+        middle = (0.5 * (self.at.x + end.x), 0.5 * (self.at.y + end.y) + self.detour_m)
+        path = [self._odom(middle), self._odom((end.x, end.y))]
+        self.ways.append((end.x, end.y))
+        return self._send(lambda at: _motion(at, path, end.heading))
 
     def spin(self, angle: float) -> FakeGoal:
         return self._send(lambda at: _motion(at, [], at.heading + angle))

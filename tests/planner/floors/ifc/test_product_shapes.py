@@ -6,8 +6,11 @@ from typing import Any
 
 import ifcopenshell.api.aggregate
 import ifcopenshell.api.geometry
+import ifcopenshell.api.type
 import ifcopenshell.geom
+import ifcopenshell.util.placement
 import pytest
+import shapely
 
 from stopgo.planner.floors.ifc import product_shapes as shapes
 from tests.planner.floors.ifc.conftest import Read
@@ -50,6 +53,31 @@ def test_what_is_assembled_in_a_body_counts_once(read: Read) -> None:
         house.model, relating_object=house.things["north"], products=[stud]
     )
     assert named(read(house), house, "stud") == []
+
+
+def test_columns_of_one_type_stand_where_each_is_placed_and_turned(read: Read) -> None:
+    """The kernel makes the shape of the type once, 0.4 x 0.1 m; it is placed afterwards."""
+    house = two_rooms()
+    kind = house.box("IfcColumnType", "kind", (0, 0, 0, 0.4, 0.1, 2.8))
+    ground = house.model.by_type("IfcBuildingStorey")[0]
+    for name, (x, y, degrees) in {
+        "one": (5.0, 1.0, 0),
+        "two": (6.0, 1.0, 90),
+        "three": (7.0, 3.0, 30),
+    }.items():
+        column = house.box("IfcColumn", name, (x, y, 0, x + 1, y + 1, 1), ground)
+        ifcopenshell.api.type.assign_type(house.model, related_objects=[column], relating_type=kind)
+        turned = ifcopenshell.util.placement.rotation(degrees, "Z")
+        turned[:3, 3] = (x, y, 0)
+        ifcopenshell.api.geometry.edit_object_placement(house.model, product=column, matrix=turned)
+    typed = [house.things[name] for name in ("one", "two", "three")]
+    assert shapes._with_shared_shapes([*typed, house.things["column"]]) == typed
+    floor = read(house)
+    for thing, corner in zip(typed, ((5.4, 1.1), (5.9, 1.4), (7.2964, 3.2866)), strict=True):
+        (element,) = [item for item in floor.elements if item.global_id == thing.GlobalId]
+        (solid,) = element.solids
+        assert abs(solid.exterior - corner).max(axis=1).min() < 2e-4
+        assert shapely.Polygon(solid.exterior).area == pytest.approx(0.04, abs=1e-4)
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, *ways: str) -> None:

@@ -7,10 +7,12 @@ from typing import Any
 
 import ifcopenshell.api.pset
 import ifcopenshell.api.sequence
+import ifcopenshell.api.type
 import pytest
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan, Rank
+from stopgo.planner.floors.ifc.construction_dates import phases_by_product
 from stopgo.planner.floors.ifc.model import Task
 from stopgo.planner.floors.ifc.status import status_on
 from tests.planner.floors.ifc.conftest import Read
@@ -177,6 +179,29 @@ def test_a_schedule_gives_days_to_phases_by_their_names(read: Read, tmp_path: Pa
         told.message
         == "phases without a day are not used: 'Later'; give each a row of --schedule by its name"
     )
+
+
+def with_phases(house: House, thing: Any, name: str, said: dict[str, Any]) -> None:
+    made = ifcopenshell.api.pset.add_pset(house.model, product=thing, name=name)
+    ifcopenshell.api.pset.edit_pset(house.model, pset=made, properties=said)
+
+
+def test_a_product_has_the_phases_of_its_type_where_its_own_sets_name_none() -> None:
+    house = two_rooms()
+    kind = house.box("IfcWallType", "kind", (0, 0, 0, 1, 1, 1))
+    walls = [house.things[name] for name in ("north", "west", "east")]
+    with_phases(house, kind, "Phasing", {"Phase Created": "Shell", "Phase Demolished": " Fit-out "})
+    ifcopenshell.api.type.assign_type(house.model, related_objects=walls, relating_type=kind)
+    with_phases(house, walls[1], "Phasing", {"Phase Created": "Later", "Mark": "7"})
+    with_phases(house, walls[2], "Other", {"Phase": "Later", "Phase Demolished": "None"})
+    with_phases(house, house.things["column"], "Other", {"Phases": "Later", "Level": 3.0})
+    found = phases_by_product(house.model)
+    assert [found[wall.id()] for wall in walls] == [
+        ("Shell", "Fit-out"),
+        ("Later", "Fit-out"),
+        ("Shell", "Fit-out"),
+    ]
+    assert house.things["column"].id() not in found
 
 
 def test_a_schedule_of_another_model_is_reported_as_a_warning(read: Read, tmp_path: Path) -> None:

@@ -1,0 +1,103 @@
+"""Goals that drive the robot are ours, those that Nav2 sends for ours, or other clients'."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.ros2.nav2_port import Nav2Port
+from stopgo.bridge.ros2.ros_settings import DriveActions, RosSettings
+from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
+from stopgo.mission.run.events import Pose
+
+EXECUTING, CANCELED = 2, 5
+END = Pose(x=2.0, y=0.0, heading=0.0)
+
+
+class FakeNode:
+    """A node whose topics are given by the test, and whose goals are kept."""
+
+    name, namespace = "stopgo", "/"
+
+    def __init__(self) -> None:
+        self.heard: dict[str, Callable[[Any], None]] = {}
+        self.sent: list[tuple[str, bytes, Any]] = []
+
+    def subscribe(self, kind: str, topic: str, take: Callable[[Any], None], *quality: object) -> None:
+        self.heard[topic] = take
+
+    def action_client(self, kind: str, action: str) -> Any:
+        def send(goal_id: bytes, fields: Any, events: Any) -> None:
+            self.sent.append((action, goal_id, fields))
+            events.accepted(True)
+
+        goal = SimpleNamespace(fields={"path": "", "pose": ""})
+        return SimpleNamespace(goal=goal, missing=str, send=send)
+
+    def client(self, kind: str, service: str) -> Any:
+        return SimpleNamespace(missing=str, call=lambda *given: None)
+
+    def service_kinds(self, kind: str) -> tuple[Any, Any]:
+        fields = {"success": "boolean", "message": "string"}
+        return SimpleNamespace(fields={}), SimpleNamespace(fields=fields, inner=None)
+
+    def is_published(self, topic: str) -> bool:
+        return True
+
+    def now_ns(self) -> int:
+        return 0
+
+    def status(self, action: str, **goals: int) -> None:
+        made = SimpleNamespace
+        listed = [
+            made(goal_info=made(goal_id=made(uuid=name.encode())), status=value)
+            for name, value in goals.items()
+        ]  # fmt: skip
+        self.heard[f"{action}/_action/status"](SimpleNamespace(status_list=listed))
+
+
+@pytest.fixture
+def node() -> FakeNode:
+    return FakeNode()
+
+
+@pytest.fixture
+def port(node: FakeNode) -> Nav2Port:
+    clock, settings = SimulatedClock(), RosSettings(drive=DriveActions(spin="spin"))
+    return Nav2Port(node, settings, RosTelemetry(clock, settings.frames, settings.limits), clock)  # type: ignore[arg-type]
+
+
+def test_goals_that_nav2_sends_to_its_own_servers_for_ours_are_nobody_elses(
+    node: FakeNode, port: Nav2Port
+) -> None:
+    sent = port.navigate(END)
+    assert node.sent[-1][0] == "navigate_to_pose"
+    node.status("follow_path", first=EXECUTING)
+    node.status("follow_path", second=EXECUTING)
+    node.status("spin", recovery=EXECUTING)
+    assert port.foreign_goals() == ()
+    sent.ended(4, None)
+    assert port.foreign_goals() == (), "its last goal may end a little later"
+    node.status("follow_path", third=EXECUTING)
+    assert port.foreign_goals() == ("goal 74686972 of follow_path",)
+
+
+def test_another_client_of_a_navigator_is_seen_while_nav2_finds_its_own_way(
+    node: FakeNode, port: Nav2Port
+) -> None:
+    port.navigate(END)
+    node.status("navigate_through_poses", other=EXECUTING)
+    assert port.foreign_goals() == ("goal 6f746865 of navigate_through_poses",)
+    node.status("navigate_through_poses", other=CANCELED)
+    node.status("navigate_to_pose", another=EXECUTING)
+    assert port.foreign_goals() == ("goal 616e6f74 of navigate_to_pose",)
+
+
+def test_on_the_legs_every_goal_that_is_not_ours_is_another_clients(node: FakeNode, port: Nav2Port) -> None:
+    port.follow((END, END))
+    node.status("follow_path", other=EXECUTING)
+    assert port.foreign_goals() == ("goal 6f746865 of follow_path",)
