@@ -137,16 +137,17 @@ class GoalGuard:
             raise TimeoutError
 
     def _replace(self) -> None:
-        """Start another process, at most one in `END_S`."""
+        """Start another process, at most one in `END_S`; one that cannot be started is tried again then."""
         self._report(ENDED)
         if self._is_missing and self._closing.wait(END_S):
             return
         self._is_missing = True
-        with self._lock:
+        with self._lock, suppress(OSError):
+            fresh = self._started()
             with suppress(OSError):
                 self._pipe.close()
             self._kill()
-            self._process, self._unanswered = self._started(), 0
+            self._process, self._unanswered = fresh, 0
 
 
 class Signs:

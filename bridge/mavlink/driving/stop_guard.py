@@ -80,15 +80,19 @@ class StopGuard:
             self._show_sign(drives=False)
 
     def _replace(self) -> None:
-        """Start another process, and show it a sign of life: at once, then at most one in `APART_SIGNS`."""
+        """Start another process, and show it a sign of life: at once, then at most one in `APART_SIGNS`.
+
+        One that cannot be started is tried again then.
+        """
         if self._signs < self._replaced_until:
             return
         self._replaced_until = self._signs + APART_SIGNS
         say(ENDED)
-        self._line.close()
-        self._kill()
-        self._line, self._process = _started()
         with suppress(OSError):
+            line, process = _started()
+            self._line.close()
+            self._kill()
+            self._line, self._process = line, process
             self._show_sign(drives=self._drives())
 
     def _show_sign(self, *, drives: bool) -> None:

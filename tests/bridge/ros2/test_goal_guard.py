@@ -65,6 +65,28 @@ def test_a_guard_that_was_killed_or_frozen_is_reported_and_replaced(how: signal.
         guard.close()
 
 
+def test_a_guard_that_cannot_be_started_again_at_once_is_started_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    reports: Queue[str] = Queue()
+    guard = GoalGuard({}, lambda: True, reports.put, module="tests.bridge.ros2.idle_guard")
+    first, started = guard.pid, GoalGuard._started
+
+    def scarce(self: GoalGuard) -> None:
+        monkeypatch.setattr(GoalGuard, "_started", started)
+        raise OSError(24, "Too many open files")
+
+    try:
+        monkeypatch.setattr(GoalGuard, "_started", scarce)
+        os.kill(first, signal.SIGKILL)
+        assert reports.get(timeout=LAST_RESORT_S) == ENDED
+        while reports.get(timeout=LAST_RESORT_S):
+            pass
+        assert guard.pid != first
+    finally:
+        guard.close()
+
+
 def test_a_guard_that_is_frozen_does_not_keep_the_program_from_its_end() -> None:
     guard = GoalGuard({}, lambda: False, lambda why: None, module="tests.bridge.ros2.idle_guard")
     os.kill(guard.pid, signal.SIGSTOP)

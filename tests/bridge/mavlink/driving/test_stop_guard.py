@@ -28,10 +28,16 @@ pytestmark = [
 DRIVER = """
 import sys, time
 from types import SimpleNamespace
+from stopgo.bridge.mavlink.driving import stop_guard
 from stopgo.bridge.mavlink.driving.stop_guard import StopGuard
 from stopgo.bridge.mavlink.vehicle_link.url import read_url
 from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
+def scarce(started):
+    # The first new process cannot be started.
+    stop_guard._started = started
+    raise OSError(24, "Too many open files")
+
 drives, key = sys.argv[2] == "drives", bytes.fromhex(sys.argv[3]) or None
 with wire(read_url(sys.argv[1]), me=Who(253, 191), signing_key=key) as opened:
     if sys.argv[1].startswith("udpin"):
@@ -42,6 +48,10 @@ with wire(read_url(sys.argv[1]), me=Who(253, 191), signing_key=key) as opened:
     time.sleep(0.3)
     print("ready", flush=True)
     for line in sys.stdin:
+        if line == "scarce\\n":
+            stop_guard._started, started = lambda: scarce(started), stop_guard._started
+            print("scarce", flush=True)
+            continue
         if line == "close\\n":
             guard.close()
             print("closed", flush=True)
@@ -123,6 +133,17 @@ def test_a_guard_that_was_killed_or_frozen_is_replaced(vehicle: socket.socket, h
         ready(process)
         first = guard_of(process)
         os.kill(first, how)
+        wait_until(lambda: guard_of(process) != first)
+        process.kill()
+        assert is_hold(holds(vehicle, dialect.MAVLink(None))[0])
+
+
+def test_a_guard_that_cannot_be_started_again_at_once_is_started_later(vehicle: socket.socket) -> None:
+    with driver(url_of(vehicle), "drives", "") as process:
+        ready(process)
+        first = guard_of(process)
+        assert answer(process, "scarce") == "scarce\n"
+        os.kill(first, signal.SIGKILL)
         wait_until(lambda: guard_of(process) != first)
         process.kill()
         assert is_hold(holds(vehicle, dialect.MAVLink(None))[0])
