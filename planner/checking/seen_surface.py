@@ -15,7 +15,10 @@ from stopgo.planner.visibility.solid_rays import MOST_PAIRS, solid_rays
 
 
 def seen_surface(route: Route) -> SeenSurface | None:
-    """Return the area of the targets that a route's stops see; None if the floor's solids are unknown."""
+    """Return the area of the targets that a route's stops see; None if the floor's solids are unknown.
+
+    Where the rays of several stops may miss a unit, it counts by the chance that those of one hit it.
+    """
     space, solids = route.space, route.space.floor.solids
     rays = solid_rays(space)
     if rays is None or solids is None:
@@ -27,7 +30,7 @@ def seen_surface(route: Route) -> SeenSurface | None:
         promised[units] = True
         for part in np.array_split(units, max(1, -(-units.size * cells.z.shape[1] // MOST_PAIRS))):
             hit = rays.reached(stop, part) * _between_rays(route, stop, part)[:, None]
-            seen[part] = np.maximum(seen[part], hit)
+            seen[part] += (1 - seen[part]) * hit
     kinds = np.array([item.kind for item in elements])[targets.element[targets.unit_segment]]
     area = targets.unit_length[:, None] * cells.tall * cells.upright[:, None]
     return SeenSurface(

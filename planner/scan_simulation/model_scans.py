@@ -12,7 +12,7 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation
 from stopgo.planner.scan_simulation.casting import RayFan
 from stopgo.planner.scan_simulation.scanning import CLOUD_DEG, ScanCount, ScannerPose
-from stopgo.planner.scan_simulation.strips import Strips
+from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 ON_SURFACE_M = 0.02
 """A hit this far before or behind a cell's plane, along its normal, is on the cell."""
@@ -105,7 +105,10 @@ def sloped(strips: Strips, scene: ModelScene, height: float) -> tuple[Strips, Bo
 
 
 def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:
-    """Simulate one scan: a ray to the centre of every cell in range, and a thinned cloud."""
+    """Simulate one scan: a ray to the centre of every cell in range, and a thinned cloud.
+
+    A cell so narrow, or seen so flat, that it falls between two columns of rays has no points.
+    """
     towards = strips.middle - pose.position
     far = np.linalg.norm(towards, axis=1)
     directions = towards / np.maximum(far, 1e-9)[:, None]
@@ -113,17 +116,46 @@ def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulati
     cell = np.flatnonzero(_within(towards, far, pose, simulation) & (cosine > 1e-3))
     away = scene.away(np.broadcast_to(pose.position, (len(cell), 3)), directions[cell])
     on = np.abs(away - far[cell]) * cosine[cell] <= ON_SURFACE_M
-    cell = cell[on]
+    width = _widths(strips, cell)
+    columns = _columns_on(towards[cell], strips.normal[cell], width, pose, simulation)
+    on &= columns > 0
+    cell, columns = cell[on], columns[on]
     spacing = far[cell] * math.radians(simulation.step_deg)
-    width = strips.area[cell] / np.minimum(strips.tall[strips.unit_of_cell[cell]], 0.1)
     return ScanCount(
         cell=frozen(cell, np.int64),
         points=frozen(np.maximum(1, strips.area[cell] * cosine[cell] / spacing**2), np.int64),
-        columns=frozen(np.maximum(1, width * cosine[cell] / spacing), np.int64),
+        columns=frozen(columns, np.int64),
         away=frozen(far[cell]),
         incidence=frozen(np.arccos(np.clip(cosine[cell], 0.0, 1.0))),
         cloud=frozen(_cloud(scene, pose, simulation)),
     )
+
+
+def _widths(strips: Strips, cell: IntArray) -> FloatArray:
+    """Widths of cells along the floor (n,): those of their units, whose first cells are as high as any."""
+    unit = strips.unit_of_cell[cell]
+    width: FloatArray = strips.area[strips.first_cell[unit]] / np.minimum(strips.tall[unit], CELL_M)
+    return width
+
+
+def _columns_on(
+    towards: FloatArray, normal: FloatArray, width: FloatArray, pose: ScannerPose, simulation: Simulation
+) -> IntArray:
+    """Number of the scan's columns of rays that meet each cell (n,); for undersides, 1."""
+    level = np.hypot(normal[:, 0], normal[:, 1])
+    along = np.column_stack([-normal[:, 1], normal[:, 0]]) / np.maximum(level, 1e-9)[:, None]
+    fan = RayFan.of(simulation, pose.heading)
+    step = math.radians(simulation.step_deg)
+    middle = np.arctan2(towards[:, 1], towards[:, 0])
+    passed = []
+    for side in (-0.5, 0.5):
+        end = towards[:, :2] + side * width[:, None] * along
+        turned = np.arctan2(end[:, 1], end[:, 0]) - middle
+        turned = np.remainder(turned + np.pi, 2 * np.pi) - np.pi
+        at = np.remainder(middle - fan.azimuth[0], 2 * np.pi) + turned
+        passed.append(np.floor(at / step))
+    count = np.abs(passed[1] - passed[0]).astype(np.int64)
+    return np.where(level > UPRIGHT, count, 1)
 
 
 def _within(towards: FloatArray, far: FloatArray, pose: ScannerPose, simulation: Simulation) -> BoolArray:

@@ -28,43 +28,51 @@ def improved_by_districts(
     Rows `settled` were searched before without success, and are again only around others. More are added.
     """
     rows = np.sort(chosen)
+    covered = cover.covered_by(rows)
     while len(rows) > at_least and len(district := _around_first(cover, rows, settled)):
-        found = _searched(cover, rows, district, search, at_least)
-        if len(found) == len(rows):
+        covered -= cover.covered_by(district)
+        least = max(0, len(district) - (len(rows) - at_least))
+        found = _searched(cover, rows, covered, district, search, least)
+        if len(found) == len(district):
             settled.update(district.tolist())
-        rows = found
+        covered += cover.covered_by(found)
+        rows = np.union1d(np.setdiff1d(rows, district), found)
     return rows
 
 
 def _around_first(cover: Cover, rows: IntArray, settled: set[int]) -> IntArray:
     """The first row that is not settled, with those that see the same columns, directly or over others."""
-    first = next((k for k, row in enumerate(rows.tolist()) if row not in settled), None)
+    first = next((row for row in rows.tolist() if row not in settled), None)
     if first is None:
         return rows[:0]
-    sees = cover.sees[rows]
-    found, newest = np.array([first]), np.array([first])
+    is_chosen = np.zeros(cover.rows, dtype=bool)
+    is_chosen[rows] = True
+    found = newest = np.array([first], dtype=np.int64)
     while len(newest) and len(found) < SIZE:
-        seen = np.zeros(cover.columns, dtype=np.int64)
-        seen[sees[newest].indices] = 1
-        newest = np.setdiff1d(np.flatnonzero(sees @ seen), found)
+        seers = np.unique(cover.worths.seers(np.unique(cover.sees[newest].indices)))
+        newest = np.setdiff1d(seers[is_chosen[seers]], found)
         found = np.concatenate([found, newest])
-    return np.sort(rows[found[:SIZE]])
+    return np.sort(found[:SIZE])
 
 
 def _searched(
-    cover: Cover, rows: IntArray, district: IntArray, search: DistrictSearch, at_least: int
+    cover: Cover,
+    rows: IntArray,
+    covered: IntArray,
+    district: IntArray,
+    search: DistrictSearch,
+    least: int,
 ) -> IntArray:
-    """The rows, with fewer in one district if the search finds them."""
-    others = np.setdiff1d(rows, district)
-    problem, offered = _problem_of(cover, others, district)
-    least = max(0, len(district) - (len(rows) - at_least))
+    """The district's rows, or fewer if the search finds them; `covered` is what the other rows cover."""
+    problem, offered = _problem_of(cover, np.setdiff1d(rows, district), covered, district)
     found = search(problem, np.searchsorted(offered, district), least)
-    return np.sort(np.concatenate([others, offered[found]])) if len(found) < len(district) else rows
+    return offered[found] if len(found) < len(district) else district
 
 
-def _problem_of(cover: Cover, others: IntArray, district: IntArray) -> tuple[Cover, IntArray]:
+def _problem_of(
+    cover: Cover, others: IntArray, covered: IntArray, district: IntArray
+) -> tuple[Cover, IntArray]:
     """The problem that the other rows leave in a district, and the rows offered there (ascending)."""
-    covered = cover.covered_by(others)
     lost = np.flatnonzero((covered < cover.asks) & (cover.covered_by(district) > 0))
     offered = np.setdiff1d(np.union1d(cover.seen_by[lost].indices, district), others).astype(np.int64)
     sees = cover.sees[offered]

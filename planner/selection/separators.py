@@ -10,6 +10,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.cover import Cover
 
 
@@ -18,10 +21,27 @@ def components_of(links: csr_array, rows: IntArray) -> list[IntArray]:
     rows = _without(links, rows)
     if not len(rows):
         return []
-    _, label = connected_components(links[rows][:, rows], directed=False)
+    label = _labels(links, rows)
     ends = np.cumsum(np.bincount(label))
     found = np.split(rows[np.argsort(label, kind="stable")], ends[:-1])
     return sorted(found, key=lambda component: (-len(component), int(component[0])))
+
+
+def _labels(links: csr_array, rows: IntArray) -> IntArray:
+    """Number of the component of each row (n,)."""
+    kernel = compiled(label_components, large=False)
+    if kernel is None:
+        return np.asarray(connected_components(links[rows][:, rows], directed=False)[1])
+    label, stack = np.full(links.shape[0], -1, dtype=np.int64), np.empty(links.shape[0], dtype=np.int64)
+    kernel(*_adjacency(links), _mask(links, rows).astype(np.int64), label, stack)
+    return label[rows]
+
+
+@instance_cached
+def _adjacency(links: csr_array) -> tuple[IntArray, IntArray]:
+    """First link of each row and the rows of all links, in 64-bit integers."""
+    first, to = (np.ascontiguousarray(part, np.int64) for part in (links.indptr, links.indices))
+    return first, to
 
 
 def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:

@@ -12,10 +12,12 @@ from stopgo.mission.geometry import IntArray
 from stopgo.mission.settings import Settings
 from stopgo.planner.selection import EXACT_ROUNDS, ROUNDS, Searches
 from stopgo.planner.selection.bound import lower_bound
+from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.connected_selection import ConnectedCover, connected
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.separators import components_of, meets
 from tests.faults.sizes import size
+from tests.planner.kernels import interpret
 
 EXACT = Settings(selector="exact")
 
@@ -95,3 +97,22 @@ def test_many_rows_meet_the_demands_as_few_would(seed: int) -> None:
     for count in range(13):
         rows = np.sort(random.permutation(12)[:count])
         assert meets(cover, rows) == (not cover.missing(cover.covered_by(rows)).any())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_components_are_the_same_compiled_interpreted_and_by_scipy(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    random = np.random.default_rng(seed)
+    later = np.triu(random.random((60, 60)) < 0.02, 1).astype(np.int64)
+    links = csr_array(later + later.T)
+    rows = np.flatnonzero(random.random(60) < 0.8)
+    compiled = [component.tolist() for component in components_of(links, rows)]
+    interpreted = np.full(60, -1)
+    label_components(
+        links.indptr, links.indices, np.isin(np.arange(60), rows), interpreted, np.empty(60, int)
+    )
+    interpret(monkeypatch)
+    assert [component.tolist() for component in components_of(links, rows)] == compiled
+    assert interpreted.max() + 1 == len(compiled) > 1
+    assert all(len(set(interpreted[component].tolist())) == 1 for component in compiled)

@@ -146,3 +146,19 @@ def test_a_leaning_wall_is_acquired_where_the_plan_promises_it(
 def planned_walls(read: Read, house: House, tmp_path: Path) -> dict:
     read(house)
     return planned(tmp_path / "house.ifc", "--coverage", "1")["kinds"]["walls"]
+
+
+def test_what_lies_between_two_rays_is_not_acquired_and_not_claimed(
+    read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Rays 2° apart are 7 to 28 cm apart at 2 to 8 m: they miss many units of 5 cm, seen from two rooms."""
+    pytest.importorskip("embreex")
+    read(two_rooms())
+    planned(tmp_path / "house.ifc", "--angular-step", "2", "--min-views", "2")
+    capsys.readouterr()
+    mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
+    main(["prove", mission, "--floor", floor, "--solids", "model", "--json"])
+    proof = json.loads(capsys.readouterr().out)
+    (walls,) = [item for item in proof["areas"] if item["kind"] == "walls"]
+    assert walls["shown"] < 0.95
+    assert walls["claimed"] == pytest.approx(walls["shown"], abs=0.02)
