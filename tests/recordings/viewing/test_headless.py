@@ -51,6 +51,7 @@ def test_without_a_viewer_it_says_so(plan: Path, tmp_path: Path, monkeypatch: py
     assert "no Rerun viewer" in told.stderr
 
 
+@pytest.mark.rerun_threads
 def test_a_viewer_that_ends_at_once_is_reported(
     plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
