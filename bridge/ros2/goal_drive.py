@@ -10,6 +10,7 @@ line, its pose must arrive, and nobody else may drive it; else it is stopped fir
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from threading import Event
 from typing import Literal
 
@@ -36,7 +37,6 @@ PROGRESS_M = 0.05
 PROGRESS_RAD = math.radians(3.0)
 TRIES = 4
 """Number of goals for one straight: each further one begins where the robot stands."""
-
 
 Line = tuple[Point, Point] | None
 """The straight that the robot must stay near; `None` where it finds its own way."""
@@ -73,29 +73,37 @@ class GoalDrive:
 
     def straight(self, end: Point, end_heading: float | None, near_m: float, interrupt: Event) -> None:
         """Drive straight to `end`; raises `RosDriveEnded` if that cannot be done."""
-        start, why = self._here(), ""
+        spacing_m = self._settings.drive.spacing_m
+
+        def send(here: Point) -> RosGoal:
+            return self._port.follow(poses_along(here, end, spacing_m, end_heading))
+
+        self._until_near(send, (self._here(), end), end, (spacing_m / 2, near_m), interrupt)
+
+    def navigate(self, end: Pose, near_m: float, interrupt: Event) -> None:
+        """Let Nav2 find its own way to `end`; raises `RosDriveEnded` if the robot does not come near."""
+        there = (end.x, end.y)
+        self._until_near(lambda here: self._port.navigate(end), None, there, (near_m, near_m), interrupt)
+
+    def _until_near(
+        self,
+        send: Callable[[Point], RosGoal],
+        line: Line,
+        end: Point,
+        limits_m: tuple[float, float],
+        interrupt: Event,
+    ) -> None:
+        """Send goals, each if `end` is farther than the first limit, until it is nearer than the second."""
+        why, (at_m, near_m) = "", limits_m
         for _ in range(TRIES):
             here = self._here()
-            spacing_m = self._settings.drive.spacing_m
-            if math.dist(here, end) > spacing_m / 2:
-                goal = self._port.follow(poses_along(here, end, spacing_m, end_heading))
-                why = self._outcome(goal, (start, end), interrupt)
+            if math.dist(here, end) > at_m:
+                why = self._outcome(send(here), line, interrupt)
             away = math.dist(self._here(), end)
             if away <= near_m:
                 return
             why = why or f"Nav2 reports success {away:.2f} m from the goal"
         raise RosDriveEnded("blocked", why)
-
-    def navigate(self, end: Pose, near_m: float, interrupt: Event) -> None:
-        """Let Nav2 find its own way to `end`; raises `RosDriveEnded` if the robot does not come near."""
-        why = ""
-        for _ in range(TRIES):
-            if math.dist(self._here(), (end.x, end.y)) <= near_m:
-                return
-            why = self._outcome(self._port.navigate(end), None, interrupt)
-        away = math.dist(self._here(), (end.x, end.y))
-        if away > near_m:
-            raise RosDriveEnded("blocked", why or f"Nav2 reports success {away:.2f} m from the goal")
 
     def turn(self, heading: float, within_rad: float, interrupt: Event) -> None:
         """Turn on the spot, as often as it takes."""

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.ros2.goal_guard import CANCEL
 from stopgo.bridge.ros2.ros_port import RosClient, RosNode
-from stopgo.bridge.ros2.ros_settings import RosSettings
+from stopgo.bridge.ros2.ros_settings import NAVIGATORS, RosSettings
 from stopgo.bridge.ros2.ros_telemetry import RosTelemetry
 from stopgo.bridge.ros2.ros_types import RosFields, check_scan, checked_fields
 from stopgo.bridge.ros2.sent_goal import ACTIVE, SentCall, SentGoal
@@ -23,8 +23,6 @@ from stopgo.mission.run.events import Pose
 
 FOLLOW_PATH, SPIN = "nav2_msgs/action/FollowPath", "nav2_msgs/action/Spin"
 NAVIGATE = "nav2_msgs/action/NavigateToPose"
-NAVIGATORS = ("navigate_to_pose", "navigate_through_poses")
-"""Actions of Nav2 whose goals no other action of it sends."""
 ODOMETRY, TF = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 ZERO_S, ZERO_HZ = 2.0, 20.0
 """Time and rate of zero velocity after a stop: a controller's last commands may come later than the first."""

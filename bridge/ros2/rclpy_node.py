@@ -214,20 +214,18 @@ def with_parameters(node: Any, settings: RosSettings) -> RosSettings:
     """Declare the settings as parameters of the node, such as `limits.jump_m`, and return them."""
     wrong = load("rclpy.exceptions").InvalidParameterTypeException
     read_only = load("rcl_interfaces.msg").ParameterDescriptor(read_only=True)
-    changes: dict[str, Any] = {}
-    auto = "autostart_node"
+
+    def declared(name: str, value: Any) -> Any:
+        try:
+            taken = node.declare_parameter(name, value, read_only).value
+        except wrong as error:
+            raise InputError(f"parameter {name}: {error}") from None
+        return list(taken) if isinstance(value, list | tuple) else taken
+
+    changes: dict[str, Any] = {"autostart_node": declared("autostart_node", settings.autostart_node)}
     for table in ("frames", "topics", "drive", "limits"):
         values = msgspec.to_builtins(getattr(settings, table))
-        for key, value in values.items():
-            try:
-                taken = node.declare_parameter(f"{table}.{key}", value, read_only).value
-            except wrong as error:
-                raise InputError(f"parameter {table}.{key}: {error}") from None
-            changes.setdefault(table, {})[key] = list(taken) if isinstance(value, list | tuple) else taken
-    try:
-        changes[auto] = node.declare_parameter(auto, settings.autostart_node, read_only).value
-    except wrong as error:
-        raise InputError(f"parameter {auto}: {error}") from None
+        changes[table] = {key: declared(f"{table}.{key}", value) for key, value in values.items()}
     return changed_settings(settings, changes)
 
 

@@ -18,6 +18,10 @@ NeededName = Annotated[str, msgspec.Meta(pattern=r"^[~/]?[A-Za-z_][A-Za-z0-9_/]*
 TypeName = Annotated[str, msgspec.Meta(pattern=r"^[a-z][a-z0-9_]*/(srv|action)/[A-Z][A-Za-z0-9]*$")]
 
 
+NAVIGATORS = ("navigate_to_pose", "navigate_through_poses")
+"""Actions of Nav2 whose goals no other action of it sends."""
+
+
 class RosSection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A table of the file."""
 
@@ -56,7 +60,7 @@ class DriveActions(RosSection, frozen=True):
     """nav2_msgs/action/NavigateToPose: drives where a mission's policy lets the robot find its own way."""
     behavior_tree: str = ""
     """Behaviour tree that goals of `navigate` name; empty for Nav2's own."""
-    cancel: tuple[NeededName, ...] = ("navigate_to_pose", "navigate_through_poses")
+    cancel: tuple[NeededName, ...] = NAVIGATORS
     """Other actions that may drive the robot; a stop cancels their goals, too."""
     controller_id: str = ""
     goal_checker_id: str = ""

@@ -66,7 +66,7 @@ def make() -> None:
     subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
     python = str(venv / "bin" / "python")
     pip = [python, "-m", "pip", "install", "-q", "--no-compile", "--disable-pip-version-check"]
-    subprocess.run([*pip, "--upgrade", "pip"], check=True)
+    subprocess.run([*pip, "-c", str(ROOT / "constraints.txt"), "--upgrade", "pip"], check=True)
     subprocess.run([*pip, "-c", str(VERSIONS), *WHEELS], check=True)
     _mend_paths(python, venv)
     for package in PACKAGES:

@@ -99,11 +99,11 @@ def _of_properties(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
     dated = _sets_with(model, (START_NAMES.search, FINISH_NAMES.search))
     for relation in model.by_type("IfcRelDefinesByProperties") if dated else ():
         properties = relation.RelatingPropertyDefinition
-        if properties.id() not in dated:
+        if properties is None or properties.id() not in dated:
             continue
         start, finish, name = _days_in(properties)
         if start or finish:
-            for item in relation.RelatedObjects:
+            for item in relation.RelatedObjects or ():
                 if item.is_a("IfcProduct"):
                     yield item, Task(name, start, finish, source=f"property {name}")
 
@@ -118,7 +118,7 @@ def _sets_with(model: ifcopenshell.file, patterns: tuple[Callable[[str], Any], .
     def fits(name: str) -> bool:
         return any(pattern(name) for pattern in patterns)
 
-    wanted = [item for item in model.by_type("IfcProperty") if fits(item[0])]
+    wanted = [item for item in model.by_type("IfcProperty") if fits(item[0] or "")]
     holders = (holder for item in wanted for holder in model.get_inverse(item))
     return {holder.id(): holder for holder in holders if holder.is_a("IfcPropertySet")}
 
@@ -132,9 +132,9 @@ def _days_in(properties: Any) -> tuple[str | None, str | None, str]:
         day = _day(item.NominalValue.wrappedValue)
         if day is None:
             continue
-        if START_NAMES.search(item.Name):
+        if START_NAMES.search(item.Name or ""):
             start = day
-        elif FINISH_NAMES.search(item.Name):
+        elif FINISH_NAMES.search(item.Name or ""):
             finish = day
         else:
             continue
@@ -160,8 +160,9 @@ def _of_types(model: ifcopenshell.file, phased: dict[int, Any]) -> Iterator[tupl
     """Products with the property sets of their types that are among some."""
     typed = set()
     for relation in model.by_type("IfcRelDefinesByType") if phased else ():
-        own = [item for item in relation.RelatingType.HasPropertySets or () if item.id() in phased]
-        for product in {item.id() for item in relation.RelatedObjects}.difference(typed):
+        sets = getattr(relation.RelatingType, "HasPropertySets", None) or ()
+        own = [item for item in sets if item.id() in phased]
+        for product in {item.id() for item in relation.RelatedObjects or ()}.difference(typed):
             typed.add(product)
             yield from ((product, item) for item in own)
 
@@ -170,10 +171,10 @@ def _of_objects(model: ifcopenshell.file, phased: dict[int, Any]) -> Iterator[tu
     """Products with their own property sets that are among some."""
     for relation in model.by_type("IfcRelDefinesByProperties") if phased else ():
         definition = relation.RelatingPropertyDefinition
-        several = definition.is_a("IfcPropertySetDefinitionSet")
+        several = definition is not None and definition.is_a("IfcPropertySetDefinitionSet")
         for item in definition.wrappedValue if several else (definition,):
-            if item.id() in phased:
-                yield from ((product.id(), item) for product in relation.RelatedObjects)
+            if item is not None and item.id() in phased:
+                yield from ((product.id(), item) for product in relation.RelatedObjects or ())
 
 
 def _phases_in(sets: dict[str, dict[str, Any]]) -> tuple[str, str]:

@@ -50,6 +50,14 @@ def test_nothing_drives_before_the_guard_is_ready(tmp_path: Path) -> None:
         guard.close()
 
 
+def assert_replaced(guard: GoalGuard, first: int, reports: Queue[str]) -> None:
+    """The end of the first process is reported, and then that another one is ready."""
+    assert reports.get(timeout=LAST_RESORT_S) == ENDED
+    while reports.get(timeout=LAST_RESORT_S):
+        pass
+    assert guard.pid != first
+
+
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_guard_that_was_killed_or_frozen_is_reported_and_replaced(how: signal.Signals) -> None:
     reports: Queue[str] = Queue()
@@ -57,10 +65,7 @@ def test_a_guard_that_was_killed_or_frozen_is_reported_and_replaced(how: signal.
     try:
         first = guard.pid
         os.kill(first, how)
-        assert reports.get(timeout=LAST_RESORT_S) == ENDED
-        while reports.get(timeout=LAST_RESORT_S):
-            pass
-        assert guard.pid != first
+        assert_replaced(guard, first, reports)
     finally:
         guard.close()
 
@@ -79,10 +84,7 @@ def test_a_guard_that_cannot_be_started_again_at_once_is_started_later(
     try:
         monkeypatch.setattr(GoalGuard, "_started", scarce)
         os.kill(first, signal.SIGKILL)
-        assert reports.get(timeout=LAST_RESORT_S) == ENDED
-        while reports.get(timeout=LAST_RESORT_S):
-            pass
-        assert guard.pid != first
+        assert_replaced(guard, first, reports)
     finally:
         guard.close()
 

@@ -66,9 +66,9 @@ def node() -> FakeNode:
 
 
 @pytest.fixture
-def port(node: FakeNode) -> Nav2Port:
+def port(node: Any) -> Nav2Port:
     clock, settings = SimulatedClock(), RosSettings(drive=DriveActions(spin="spin"))
-    return Nav2Port(node, settings, RosTelemetry(clock, settings.frames, settings.limits), clock)  # type: ignore[arg-type]
+    return Nav2Port(node, settings, RosTelemetry(clock, settings.frames, settings.limits), clock)
 
 
 def test_goals_that_nav2_sends_to_its_own_servers_for_ours_are_nobody_elses(

@@ -12,7 +12,7 @@ import pytest
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan, Rank
-from stopgo.planner.floors.ifc.construction_dates import phases_by_product
+from stopgo.planner.floors.ifc.construction_dates import phases_by_product, tasks_by_product
 from stopgo.planner.floors.ifc.model import Task
 from stopgo.planner.floors.ifc.status import status_on
 from tests.planner.floors.ifc.conftest import Read
@@ -202,6 +202,31 @@ def test_a_product_has_the_phases_of_its_type_where_its_own_sets_name_none() -> 
         ("Shell", "Fit-out"),
     ]
     assert house.things["column"].id() not in found
+
+
+@pytest.mark.parametrize(
+    ("kind", "attribute"),
+    [
+        ("IfcRelDefinesByType", "RelatingType"),
+        ("IfcRelDefinesByType", "RelatedObjects"),
+        ("IfcRelDefinesByProperties", "RelatingPropertyDefinition"),
+        ("IfcRelDefinesByProperties", "RelatedObjects"),
+        ("IfcPropertySingleValue", "Name"),
+    ],
+)
+def test_a_damaged_relation_takes_nothing_from_the_others(kind: str, attribute: str) -> None:
+    """A file of another program may have `$` where the schema wants something."""
+    house = two_rooms()
+    types = [house.box("IfcWallType", name, (0, 0, 0, 1, 1, 1)) for name in ("one", "other")]
+    for number, (wall, type_) in enumerate(zip(("north", "west"), types, strict=True)):
+        thing = house.things[wall]
+        with_phases(house, thing, "Dates", {"Start": "2024-01-01", f"Mark {number}": "7"})
+        with_phases(house, type_, "Phasing", {"Phase Created": "Shell"})
+        ifcopenshell.api.type.assign_type(house.model, related_objects=[thing], relating_type=type_)
+    setattr(house.model.by_type(kind)[-1], attribute, None)
+    model = ifcopenshell.file.from_string(house.model.to_string())
+    assert phases_by_product(model)[house.things["north"].id()] == ("Shell", "")
+    assert house.things["north"].id() in tasks_by_product(model)
 
 
 def test_a_schedule_of_another_model_is_reported_as_a_warning(read: Read, tmp_path: Path) -> None:
