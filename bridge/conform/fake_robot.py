@@ -69,6 +69,10 @@ class FaultyLink:
     def distrusted(self) -> str:
         return self._link.distrusted
 
+    @property
+    def may_be_sent(self) -> bool:
+        return self._link.may_be_sent
+
     def serve(self, key: str, answer: Answering) -> None:
         def answered(request: Request) -> bytes:
             with self._lock:

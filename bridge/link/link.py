@@ -47,6 +47,10 @@ class Link(Protocol):
     def distrusted(self) -> str:
         """Reason of the last message that was not accepted; empty if all were."""
 
+    @property
+    def may_be_sent(self) -> bool:
+        """True once a question may have left for another end, which may get it later."""
+
     def serve(self, key: str, answer: Answering) -> None:
         """Answer every question on `key` (which may hold wildcards), one at a time."""
 

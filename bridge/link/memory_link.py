@@ -74,6 +74,7 @@ class MemoryLink:
         self._board = board
         self._signing = signing
         self._announced: list[str] = []
+        self.may_be_sent = False
 
     @property
     def distrusted(self) -> str:
@@ -109,6 +110,7 @@ class MemoryLink:
         return self._answers(key, payload, {})
 
     def _answers(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> list[bytes]:
+        self.may_be_sent |= any(matches(served, key) for _, served, _ in self._board.serving)
         question = self._signing.sign_question(key, payload, parameters)
         arrived = self._board.answers(
             SignedMessage("question", key, payload, question.attachment, parameters)

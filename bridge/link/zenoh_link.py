@@ -214,6 +214,7 @@ class ZenohLink:
         self._publishers: list[zenoh.Publisher] = []
         self._lock = threading.Lock()
         self._silent = False
+        self.may_be_sent = False
         self.admission: Admission | None = None
         """What accepts the connections, if zenoh's own listener does not."""
 
@@ -224,9 +225,13 @@ class ZenohLink:
     def await_others(self, count: int, within_s: float) -> None:
         """Wait until `count` others are connected, or the time is over."""
         deadline = time.monotonic() + within_s
-        info = self._session.info
-        while len([*info.routers_zid(), *info.peers_zid()]) < count and time.monotonic() < deadline:
+        while len(self._others()) < count and time.monotonic() < deadline:
             time.sleep(POLL_S)
+
+    def _others(self) -> set[str]:
+        """Return the zenoh ids of all who are connected now."""
+        info = self._session.info
+        return {str(one) for one in (*info.routers_zid(), *info.peers_zid())}
 
     def fall_silent(self) -> None:
         """Disappear for the others, while the session stays open."""
@@ -291,6 +296,7 @@ class ZenohLink:
         if self._silent:
             return
         question = self._signing.sign_question(key, payload, parameters)
+        linked = self._others()
         replies = self._session.get(
             zenoh.Selector(key, dict(parameters)),
             payload=payload,
@@ -303,13 +309,17 @@ class ZenohLink:
             congestion_control=zenoh.CongestionControl.BLOCK,
             express=not bulk,
         )
+        linked |= self._others()
         for reply in replies:
+            self.may_be_sent = True  # also an error: zenoh's own one of a question without an answer in time
             if reply.ok is not None:
                 opened = self._signing.verify_answer(
                     question, reply.ok.payload.to_bytes(), _attachment_of(reply.ok)
                 )
                 if opened is not None:
                     yield opened
+        # Without any reply there was nobody to ask, or one who was asked is lost.
+        self.may_be_sent |= not linked <= self._others()
 
     def hear(self, key: str, heard: Hearing) -> None:
         judged = self._signing.verify_publications(heard)

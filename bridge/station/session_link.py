@@ -66,6 +66,11 @@ class SessionLink:
     def distrusted(self) -> str:
         return self._distrusted if self._own is None else self._own.distrusted
 
+    @property
+    def may_be_sent(self) -> bool:
+        """True always: the open session has found the robot."""
+        return True
+
     def ask(
         self,
         key: str,

@@ -148,8 +148,6 @@ class Station:
         self._seen = threading.Event()
         self._not_found: Callable[[], RobotUnreachable] | None = None
         """Error for a robot that does not show its token; `None` if no token is looked for."""
-        self._may_be_sent = False
-        """True if a query was not answered at once with nothing: it may have reached the robot."""
 
     def look_for(
         self, endpoint: str, *, why: Callable[[], str] = lambda: ""
@@ -389,7 +387,8 @@ class Station:
         if self.direct is not None and order.verb in FREE_VERBS:
             direct = self.direct(key, payload, timeout_s=within_s)
         reply = self._ask_repeatedly(key, payload, within_s, beside=direct)
-        if reply is None and self._not_found is not None and not (self._seen.is_set() or self._may_be_sent):
+        may_be_sent = self._seen.is_set() or self.link.may_be_sent or (direct and direct.may_be_sent)
+        if reply is None and self._not_found is not None and not may_be_sent:
             raise self._not_found()
         if reply is None and order.verb not in FREE_VERBS and within_s >= order.valid_for_s:
             raise OutcomeUnknown(
@@ -487,15 +486,12 @@ class Station:
         """Repeat a query until it is answered, there or by `beside`, or the time is up."""
         deadline = time.monotonic() + within_s
         while (left := deadline - time.monotonic()) > 0:
-            if beside is not None:
-                self._may_be_sent = self._may_be_sent or beside.may_be_sent
-                if beside.reply is not None:
-                    return beside.reply
-            began, wait_s = time.monotonic(), min(try_s, left)
+            if beside is not None and beside.reply is not None:
+                return beside.reply
+            wait_s = min(try_s, left)
             reply = self.link.ask(key, payload, timeout_s=wait_s, parameters=parameters, bulk=bulk)
             if reply is not None:
                 return reply
-            self._may_be_sent = self._may_be_sent or time.monotonic() - began >= wait_s / 2
             time.sleep(min(PAUSE_S, left))
         return None
 

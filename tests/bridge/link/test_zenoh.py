@@ -6,14 +6,17 @@ import json
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
+import zenoh
 
 from stopgo.bridge.commands.spawn import end_robot, robot_process, start_robot
 from stopgo.bridge.link.protocol import PosePage, decode
-from stopgo.bridge.link.zenoh_link import Guard, check_endpoint
+from stopgo.bridge.link.zenoh_link import Guard, ZenohLink, check_endpoint, connecting
 from stopgo.bridge.station.follow import Followed
 from stopgo.bridge.station.station import connect
 from stopgo.mission.document import with_digest
@@ -122,6 +125,50 @@ def test_a_robot_that_is_not_there_is_unreachable_and_nothing_is_sent() -> None:
     unreached = connect(f"tcp/127.0.0.1:{free_port()}", robot="r1", timeout_s=0.3)
     with pytest.raises(RobotUnreachable, match=r"robot r1 not found within 0\.3 s"), unreached:
         pass
+
+
+def test_a_slow_station_knows_that_nothing_was_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = ZenohLink.ask
+
+    def slowly(link: ZenohLink, *given: Any, timeout_s: float, **details: Any) -> bytes | None:
+        time.sleep(timeout_s)
+        return asked(link, *given, timeout_s=timeout_s, **details)
+
+    monkeypatch.setattr(ZenohLink, "ask", slowly)
+    with connect("tcp/127.0.0.1:1", robot="r1", timeout_s=0.2, at_once=True) as station:
+        with pytest.raises(RobotUnreachable, match="nothing was sent"):
+            station.command("pause")
+        assert not station.link.may_be_sent
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_question_that_left_may_be_sent(lost: bool) -> None:
+    endpoint, arrived = f"tcp/127.0.0.1:{free_port()}", threading.Event()
+    config = zenoh.Config()
+    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    kept = []
+    with zenoh.open(config) as other, connecting(endpoint) as link:
+        link.await_others(1, 20.0)
+        link.ask("a/b", timeout_s=20.0)
+        assert not link.may_be_sent  # the other end serves nothing
+
+        def keep(query: zenoh.Query) -> None:
+            kept.append(query)  # never answered
+            arrived.set()
+
+        def ask_until_it_arrives() -> None:
+            while not arrived.is_set():
+                link.ask("a/b", timeout_s=20.0 if lost else 0.5)
+
+        served = other.declare_queryable("a/b", keep, complete=True)
+        asking = threading.Thread(target=ask_until_it_arrives)
+        asking.start()
+        assert arrived.wait(20.0)
+        if lost:
+            other.close()
+        asking.join()
+        assert served and link.may_be_sent
 
 
 def test_a_session_that_is_open_does_not_keep_the_interpreter() -> None:

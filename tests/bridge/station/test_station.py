@@ -50,6 +50,7 @@ class DeafLink(MemoryLink):
     ) -> bytes | None:
         self.asked.append(key)
         if self.deaf in key:
+            self.may_be_sent = True
             self.time.sleep(timeout_s)
             return None
         return super().ask(key, payload, timeout_s=timeout_s, parameters=parameters)
