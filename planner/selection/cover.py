@@ -87,6 +87,17 @@ class Cover:
         return Worths(self.adds_to, self.seen_by)
 
     @cached_property
+    def tables(self) -> tuple[IntArray, ...]:
+        """The problem as kernels take it: first column of each row, columns; then those of `Worths`."""
+        return (np.ascontiguousarray(self.sees.indptr, np.int64), self._seen, *self.worths.tables)
+
+    @cached_property
+    def most_demands(self) -> int:
+        """Most demands to which the columns of one row add."""
+        seen, adds = (_pattern(matrix) for matrix in (self.sees, self.adds_to))
+        return int(np.diff(csr_array(seen @ adds).indptr).max(initial=0))
+
+    @cached_property
     def _seen(self) -> IntArray:
         return np.ascontiguousarray(self.sees.indices, np.int64)
 
@@ -201,6 +212,12 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
     left = _sorted((diags_array(factor) @ sees).tocsr().astype(np.int64))
     left.eliminate_zeros()
     return left
+
+
+def _pattern(matrix: csr_array) -> csr_array:
+    """1 where the matrix has an entry, even of 0."""
+    ones = np.ones(len(matrix.indices), dtype=np.int64)
+    return csr_array((ones, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _sorted(matrix: csr_array) -> csr_array:

@@ -33,6 +33,11 @@ class Worths:
         self._sums = np.zeros(self._demands, dtype=np.int64)
         self._gains = np.zeros(3, dtype=np.int64)
 
+    @property
+    def tables(self) -> tuple[IntArray, ...]:
+        """First row of each column, rows; first demand of each column, demands, and the worth to each."""
+        return (*self._seen, *self._adds, self._worth)
+
     def of(self, columns: IntArray) -> IntArray:
         """Worth of columns to each demand (demands,)."""
         kernel = compiled(add_worth, large=False)
