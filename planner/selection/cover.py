@@ -87,9 +87,9 @@ class Cover:
         return Worths(self.adds_to, self.seen_by)
 
     @cached_property
-    def tables(self) -> tuple[IntArray, ...]:
-        """The problem as kernels take it: first column of each row, columns; then those of `Worths`."""
-        return (np.ascontiguousarray(self.sees.indptr, np.int64), self._seen, *self.worths.tables)
+    def seen_columns(self) -> tuple[IntArray, IntArray]:
+        """First entry of each row, and their end (rows + 1,); and the columns that rows see: for kernels."""
+        return np.ascontiguousarray(self.sees.indptr, np.int64), self._seen
 
     @cached_property
     def most_demands(self) -> int:

@@ -48,7 +48,8 @@ def by_kernel(kernel: Callable[..., int], cover: Cover, rows: list[int], swaps: 
     tables += [scratch(many * cover.rows * most), scratch(cover.rows), scratch(4)]
     demands = len(cover.needed)
     others = [np.full(demands, -1, dtype=np.int64), scratch(cover.rows), scratch(3 * demands)]
-    met = kernel(swaps, most, *cover.tables, *state, *tables, *others)
+    problem = (*cover.seen_columns, *cover.worths.rows_of, *cover.worths.added)
+    met = kernel(swaps, most, *problem, *state, *tables, *others)
     return np.sort(chosen) if met else None
 
 

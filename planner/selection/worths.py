@@ -34,9 +34,14 @@ class Worths:
         self._gains = np.zeros(3, dtype=np.int64)
 
     @property
-    def tables(self) -> tuple[IntArray, ...]:
-        """First row of each column, rows; first demand of each column, demands, and the worth to each."""
-        return (*self._seen, *self._adds, self._worth)
+    def rows_of(self) -> tuple[IntArray, IntArray]:
+        """First entry of each column, and their end (columns + 1,); and the rows that see it: for kernels."""
+        return self._seen
+
+    @property
+    def added(self) -> tuple[IntArray, IntArray, IntArray]:
+        """First entry of each column and their end (columns + 1,); demands; and the worth to each."""
+        return (*self._adds, self._worth)
 
     def of(self, columns: IntArray) -> IntArray:
         """Worth of columns to each demand (demands,)."""
