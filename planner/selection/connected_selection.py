@@ -60,8 +60,12 @@ class ConnectedCover:
         return self._problems[len(self.cuts)]
 
     def _with_cuts(self) -> Cover:
+        return self._offering.with_one_of_each(list(self.cuts.values()))
+
+    @cached_property
+    def _offering(self) -> Cover:
         rows = np.sort(np.concatenate([np.empty(0, np.int64), *self.regions]))
-        return self.cover.offering(rows).with_one_of_each(list(self.cuts.values()))
+        return self.cover.offering(rows)
 
     def take_cuts(self, rows: IntArray) -> bool:
         """Add the separators of these rows to the problem; return True if any is new."""

@@ -156,9 +156,13 @@ class Cover:
             return self
         worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, to guide greedy
         sizes = [len(rows) for rows in sets]
-        entries = (np.ones(sum(sizes)), (np.concatenate(sets), np.repeat(np.arange(len(sets)), sizes)))
+        entries = (
+            np.ones(sum(sizes), np.int64),
+            (np.concatenate(sets), np.repeat(np.arange(len(sets)), sizes)),
+        )
         chosen = coo_array(entries, shape=(self.rows, len(sets)))
-        worths = block_diag([self.worth, diags_array(np.full(len(sets), float(worth)))])
+        priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
+        worths = block_diag([self.worth, priced])
         return Cover(
             _sorted(hstack([self.sees, chosen]).astype(np.int64)),
             _sorted(worths.astype(np.int64)),

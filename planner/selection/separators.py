@@ -81,7 +81,7 @@ class SeparatorSearch:
         every = np.concatenate([np.empty(0, np.int64), *regions])
         self._region_of = np.full(cover.rows, -1, dtype=np.int64)
         self._region_of[every] = np.repeat(np.arange(len(regions)), [len(region) for region in regions])
-        self._every = RunningCoverage(cover, every)
+        self._every, self._elsewhere = RunningCoverage(cover, every), RunningCoverage(cover, every)
         self._part = np.full(cover.rows, -1, dtype=np.int64)
 
     def separators(self, rows: IntArray) -> Iterator[IntArray]:
@@ -89,8 +89,8 @@ class SeparatorSearch:
 
         A node separator is such a set if neither side meets every demand by itself, with all other regions.
         """
-        for separator, _, _, elsewhere in self._found(rows):
-            if not any(self._enough(separator, elsewhere)):
+        for separator, _, _ in self._found(rows):
+            if not any(self._enough(separator)):
                 yield separator.between
 
     def conditions(self, rows: IntArray) -> Iterator[tuple[IntArray, tuple[int, ...]]]:
@@ -98,38 +98,38 @@ class SeparatorSearch:
 
         Each is a set of rows and its ends: one row of the set is chosen if all the ends are.
         """
-        for separator, component, others, elsewhere in self._found(rows):
-            here, beyond = self._enough(separator, elsewhere)
+        for separator, component, others in self._found(rows):
+            here, beyond = self._enough(separator)
             is_near = np.isin(others, separator.near)
             far = int(others[~is_near if separator.is_here else is_near].min())
             ends = ((int(component[0]),) if beyond else ()) + ((far,) if here else ())
             yield separator.between, ends
 
-    def _enough(self, separator: NodeSeparator, elsewhere: RunningCoverage) -> tuple[bool, bool]:
+    def _enough(self, separator: NodeSeparator) -> tuple[bool, bool]:
         """True for the side of the component, and for the one beyond, if it meets every demand."""
-        near = elsewhere.enough_with(separator.near)
+        near = self._elsewhere.enough_with(separator.near)
         far = self._every.enough_without(np.concatenate([separator.near, separator.between]))
         return (near, far) if separator.is_here else (far, near)
 
-    def _found(self, rows: IntArray) -> Iterator[tuple[NodeSeparator, IntArray, IntArray, RunningCoverage]]:
-        """Node separators between each component of the rows and its others, with both.
-
-        The last of each is what the other regions cover.
-        """
+    def _found(self, rows: IntArray) -> Iterator[tuple[NodeSeparator, IntArray, IntArray]]:
+        """Node separators between each component of the rows and its others, with both."""
         inside = np.zeros(self._cover.rows, dtype=np.int64)
-        components = components_of(self._graph.links, rows[self._region_of[rows] >= 0])
-        for number, region in enumerate(self._regions):
-            inner = [one for one in components if self._region_of[one[0]] == number]
-            if len(inner) < 2:
-                continue
-            others = [*self._regions[:number], *self._regions[number + 1 :]]
-            elsewhere = RunningCoverage(self._cover, np.concatenate([np.empty(0, np.int64), *others]))
-            inside[region] = 1
-            for k, component in enumerate(inner):
-                rest = np.concatenate([*inner[:k], *inner[k + 1 :]])
-                for separator in self._around(component, rest, inside, len(region)):
-                    yield separator, component, rest, elsewhere
-            inside[region] = 0
+        components: dict[int, list[IntArray]] = {}
+        for one in components_of(self._graph.links, rows[self._region_of[rows] >= 0]):
+            components.setdefault(int(self._region_of[one[0]]), []).append(one)
+        for number, inner in sorted(components.items()):
+            if len(inner) > 1:
+                region = self._regions[number]
+                inside[region] = 1
+                self._elsewhere.remove(region)
+                try:
+                    for k, component in enumerate(inner):
+                        others = np.concatenate([*inner[:k], *inner[k + 1 :]])
+                        for separator in self._around(component, others, inside, len(region)):
+                            yield separator, component, others
+                finally:
+                    self._elsewhere.add(region)
+                    inside[region] = 0
 
     def _around(
         self, component: IntArray, others: IntArray, inside: IntArray, size: int
