@@ -32,6 +32,11 @@ class Board:
         """Shortfall of each demand (demands,)."""
         return np.maximum(0, self._cover.needed - self._reached)
 
+    def state(self) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        """Views that each column needs, shortage and penalty of each demand, gains by row: for a kernel."""
+        gains = np.ascontiguousarray(self._adds.T).ravel()
+        return self._left, self._cover.needed - self._reached, self.weight, gains
+
     def raise_penalties(self) -> None:
         """Raise the penalty of each unmet demand, so that the search leaves local minima."""
         self.weight[self.missing > 0] += 1

@@ -1,6 +1,6 @@
-"""Connected components of some rows of a symmetric graph.
+"""Connected components of some rows of a symmetric graph: all of them, or those around some rows.
 
-One plain function over arrays: the same source runs interpreted and compiled, with the types of
+Plain functions over arrays: the same source runs interpreted and compiled, with the types of
 `component_kernel_compiled.pxd`. All numbers are rows or entries of the graph, far below 2**62.
 """
 
@@ -38,3 +38,79 @@ def label_components(first: Any, to: Any, inside: Any, label: Any, stack: Any) -
                     label[there], stack[size] = components, there
                     size += 1
         components += 1
+
+
+def grow_parts(
+    first: Any, to: Any, inside: Any, seeds: Any, label: Any, parent: Any, head: Any, tail: Any,
+    following: Any, met: Any,
+) -> int:  # fmt: skip
+    """Grow a part from each seed, by turns, until all but one are whole; return the number of rows met.
+
+    Parts that meet become one. So the largest part is met only as far as the second largest one reaches,
+    or until the parts have met.
+
+    The arguments are as for `label_components`, and: `seeds` from which parts grow (n,); `label`, -1, which
+    receives the part of each row met, and `met`, the rows met (rows,); `parent`, `head` and `tail`, which
+    receive what each part became, and from and to which row it has yet to grow, or -1 (n,); `following`,
+    scratch, the next such row after each (rows,).
+    """
+    parts = plant(inside, seeds, label, parent, head, tail, following, met)
+    growing, count, part = parts, parts, 0
+    while growing > 1:
+        if parent[part] == part and head[part] >= 0:
+            here = head[part]
+            head[part] = following[here]
+            for link in range(first[here], first[here + 1]):
+                if inside[to[link]] == 0:
+                    continue
+                if label[to[link]] < 0:
+                    label[to[link]], met[count], following[to[link]] = part, to[link], -1
+                    append(part, to[link], to[link], head, tail, following)
+                    count += 1
+                else:
+                    growing -= join(root(label[to[link]], parent), part, parent, head, tail, following)
+            growing -= head[part] < 0
+        part = (part + 1) % parts
+    for k in range(count):
+        label[met[k]] = root(label[met[k]], parent)
+    return count
+
+
+def plant(
+    inside: Any, seeds: Any, label: Any, parent: Any, head: Any, tail: Any, following: Any, met: Any
+) -> int:
+    """Begin a part with each seed that is inside; return their number."""
+    parts = 0
+    for k in range(len(seeds)):
+        if inside[seeds[k]] == 1 and label[seeds[k]] < 0:
+            label[seeds[k]], parent[parts], head[parts], tail[parts] = parts, parts, seeds[k], seeds[k]
+            following[seeds[k]], met[parts] = -1, seeds[k]
+            parts += 1
+    return parts
+
+
+def join(other: int, part: int, parent: Any, head: Any, tail: Any, following: Any) -> int:
+    """Let a part become one with another; return 1, or 0 if they are one already."""
+    if other == part:
+        return 0
+    parent[other] = part
+    if head[other] >= 0:
+        append(part, head[other], tail[other], head, tail, following)
+    return 1
+
+
+def append(part: int, begin: int, end: int, head: Any, tail: Any, following: Any) -> None:
+    """Append the rows from one to another to those from which a part has not grown yet."""
+    if head[part] < 0:
+        head[part] = begin
+    else:
+        following[tail[part]] = begin
+    tail[part] = end
+
+
+def root(part: int, parent: Any) -> int:
+    """The part that a part has become."""
+    while parent[part] != part:
+        parent[part] = parent[parent[part]]
+        part = parent[part]
+    return part

@@ -20,12 +20,13 @@ from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.connecting_rows import connecting_rows
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.greedy import greedy
+from stopgo.planner.selection.link_graph import LinkGraph
+from stopgo.planner.selection.running_coverage import RunningCoverage
 from stopgo.planner.selection.separators import (
     Conditions,
+    SeparatorSearch,
     components_of,
-    conditions_between,
     regions_of,
-    separators,
 )
 
 Search = Callable[[Cover, IntArray, Conditions], tuple[IntArray, int]]
@@ -59,15 +60,28 @@ class ConnectedCover:
         return self._problems[len(self.cuts)]
 
     def _with_cuts(self) -> Cover:
+        return self._offering.with_one_of_each(list(self.cuts.values()))
+
+    @cached_property
+    def _offering(self) -> Cover:
         rows = np.sort(np.concatenate([np.empty(0, np.int64), *self.regions]))
-        return self.cover.offering(rows).with_one_of_each(list(self.cuts.values()))
+        return self.cover.offering(rows)
 
     def take_cuts(self, rows: IntArray) -> bool:
         """Add the separators of these rows to the problem; return True if any is new."""
         before = len(self.cuts)
-        for cut in separators(self.cover, self.links, self.regions, rows):
+        for cut in self.separating.separators(rows):
             self.cuts.setdefault(cut.tobytes(), cut)
         return len(self.cuts) > before
+
+    @cached_property
+    def graph(self) -> LinkGraph:
+        """The links, prepared for searches around rows."""
+        return LinkGraph(self.links)
+
+    @cached_property
+    def separating(self) -> SeparatorSearch:
+        return SeparatorSearch(self.cover, self.graph, self.regions)
 
     @cached_property
     def _region_of(self) -> IntArray:
@@ -82,6 +96,21 @@ class ConnectedCover:
         inside = rows[self._region_of[rows] >= 0]  # no link leads out of a region
         return len(components_of(self.links, inside)) - len(np.unique(self._region_of[inside]))
 
+    def inside(self, rows: IntArray) -> IntArray:
+        """1 for each of these rows that is in a region, else 0 (all rows,)."""
+        found = np.zeros(self.links.shape[0], dtype=np.int64)
+        found[rows] = self._region_of[rows] >= 0
+        return found
+
+    def splits(self, row: int, inside: IntArray) -> bool:
+        """True if the rows `inside`, connected in each region, were not without this one."""
+        if inside[row] == 0:
+            return False
+        inside[row] = 0
+        parts = self.graph.parts_around(self.graph.neighbours(np.array([row])), inside)
+        inside[row] = 1
+        return len(parts.whole) + min(1, len(parts.last)) > 1
+
 
 def connected(task: ConnectedCover, search: Search, *, rounds: int) -> tuple[IntArray, int]:
     """Rows that meet every demand and are connected as far as links allow, and a lower bound."""
@@ -94,10 +123,8 @@ def connected(task: ConnectedCover, search: Search, *, rounds: int) -> tuple[Int
         best = found if len(found) < len(best) else best
         if len(best) <= bound or not task.parts(rows):
             break
-        if not task.take_cuts(rows):
-            more = conditions_between(task.cover, task.links, task.regions, rows)
-            if not conditions.take(more):
-                break
+        if not task.take_cuts(rows) and not conditions.take(task.separating.conditions(rows)):
+            break
     return best, bound
 
 
@@ -132,18 +159,16 @@ def _without_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
 
 
 def _without_some_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
-    cover = task.cover
-    covered = cover.covered_by(rows)
-    reached = cover.reached(covered)
-    columns = {row: cover.columns_of(row) for row in rows.tolist()}
-    alone = [int(cover.weight[seen][covered[seen] <= cover.asks[seen]].sum()) for seen in columns.values()]
+    """One look at each row, in each region of which the rows are connected."""
+    cover, coverage, inside = task.cover, RunningCoverage(task.cover, rows), task.inside(rows)
+    alone = [
+        int(cover.weight[seen][coverage.covered[seen] <= cover.asks[seen]].sum())
+        for seen in map(cover.columns_of, rows.tolist())
+    ]
     for row in rows[np.argsort(alone, kind="stable")].tolist():
-        seen = columns[row]
-        lost = cover.worths.of(seen[covered[seen] == cover.asks[seen]])
-        rest = rows[rows != row]
-        if (reached - lost < cover.needed).any() or task.parts(rest):
-            continue
-        covered[seen] -= 1
-        reached -= lost
-        rows = rest
+        one = np.array([row])
+        if coverage.enough_without(one) and not task.splits(row, inside):
+            coverage.remove(one)
+            inside[row] = 0
+            rows = rows[rows != row]
     return rows

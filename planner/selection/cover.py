@@ -87,6 +87,17 @@ class Cover:
         return Worths(self.adds_to, self.seen_by)
 
     @cached_property
+    def seen_columns(self) -> tuple[IntArray, IntArray]:
+        """First entry of each row, and their end (rows + 1,); and the columns that rows see: for kernels."""
+        return np.ascontiguousarray(self.sees.indptr, np.int64), self._seen
+
+    @cached_property
+    def most_demands(self) -> int:
+        """Most demands to which the columns of one row add."""
+        seen, adds = (_pattern(matrix) for matrix in (self.sees, self.adds_to))
+        return int(np.diff(csr_array(seen @ adds).indptr).max(initial=0))
+
+    @cached_property
     def _seen(self) -> IntArray:
         return np.ascontiguousarray(self.sees.indices, np.int64)
 
@@ -145,9 +156,13 @@ class Cover:
             return self
         worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, to guide greedy
         sizes = [len(rows) for rows in sets]
-        entries = (np.ones(sum(sizes)), (np.concatenate(sets), np.repeat(np.arange(len(sets)), sizes)))
+        entries = (
+            np.ones(sum(sizes), np.int64),
+            (np.concatenate(sets), np.repeat(np.arange(len(sets)), sizes)),
+        )
         chosen = coo_array(entries, shape=(self.rows, len(sets)))
-        worths = block_diag([self.worth, diags_array(np.full(len(sets), float(worth)))])
+        priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
+        worths = block_diag([self.worth, priced])
         return Cover(
             _sorted(hstack([self.sees, chosen]).astype(np.int64)),
             _sorted(worths.astype(np.int64)),
@@ -201,6 +216,12 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
     left = _sorted((diags_array(factor) @ sees).tocsr().astype(np.int64))
     left.eliminate_zeros()
     return left
+
+
+def _pattern(matrix: csr_array) -> csr_array:
+    """1 where the matrix has an entry, even of 0."""
+    ones = np.ones(len(matrix.indices), dtype=np.int64)
+    return csr_array((ones, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _sorted(matrix: csr_array) -> csr_array:

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.running_coverage import RunningCoverage
 
 SIZE = 60
 """Most stops of a district."""
@@ -27,15 +28,14 @@ def improved_by_districts(
 
     Rows `settled` were searched before without success, and are again only around others. More are added.
     """
-    rows = np.sort(chosen)
-    covered = cover.covered_by(rows)
+    rows, coverage = np.sort(chosen), RunningCoverage(cover, chosen)
     while len(rows) > at_least and len(district := _around_first(cover, rows, settled)):
-        covered -= cover.covered_by(district)
+        coverage.remove(district)
         least = max(0, len(district) - (len(rows) - at_least))
-        found = _searched(cover, rows, covered, district, search, least)
+        found = _searched(coverage, np.setdiff1d(rows, district), district, search, least)
         if len(found) == len(district):
             settled.update(district.tolist())
-        covered += cover.covered_by(found)
+        coverage.add(found)
         rows = np.union1d(np.setdiff1d(rows, district), found)
     return rows
 
@@ -56,33 +56,34 @@ def _around_first(cover: Cover, rows: IntArray, settled: set[int]) -> IntArray:
 
 
 def _searched(
-    cover: Cover,
-    rows: IntArray,
-    covered: IntArray,
-    district: IntArray,
-    search: DistrictSearch,
-    least: int,
+    others: RunningCoverage, rows: IntArray, district: IntArray, search: DistrictSearch, least: int
 ) -> IntArray:
-    """The district's rows, or fewer if the search finds them; `covered` is what the other rows cover."""
-    problem, offered = _problem_of(cover, np.setdiff1d(rows, district), covered, district)
+    """The district's rows, or fewer if the search finds them; `others` covers what all other `rows` do."""
+    problem, offered = _problem_of(others, rows, district)
     found = search(problem, np.searchsorted(offered, district), least)
     return offered[found] if len(found) < len(district) else district
 
 
-def _problem_of(
-    cover: Cover, others: IntArray, covered: IntArray, district: IntArray
-) -> tuple[Cover, IntArray]:
+def _problem_of(others: RunningCoverage, rows: IntArray, district: IntArray) -> tuple[Cover, IntArray]:
     """The problem that the other rows leave in a district, and the rows offered there (ascending)."""
-    lost = np.flatnonzero((covered < cover.asks) & (cover.covered_by(district) > 0))
-    offered = np.setdiff1d(np.union1d(cover.seen_by[lost].indices, district), others).astype(np.int64)
-    sees = cover.sees[offered]
-    columns = np.flatnonzero((covered < cover.asks) & (np.asarray(sees.sum(axis=0)).ravel() > 0))
-    missing = cover.missing(covered)
+    cover, left = others.cover, others.cover.asks - others.covered
+    seen = np.unique(cover.sees[district].indices)
+    seers = cover.worths.seers(seen[left[seen] > 0].astype(np.int64))
+    offered = np.setdiff1d(np.union1d(seers, district), rows).astype(np.int64)
+    sees, missing = cover.sees[offered], others.missing
+    columns = np.unique(sees.indices)
+    columns = columns[left[columns] > 0]
     demands = np.union1d([0], np.flatnonzero(missing))
-    problem = Cover(
-        csr_array(sees[:, columns]),
-        csr_array(cover.worth[demands][:, columns]),
-        missing[demands],
-        (cover.asks - covered)[columns],
+    worth = _with_columns(cover.adds_to[columns], demands)
+    return Cover(_with_columns(sees, columns), csr_array(worth.T), missing[demands], left[columns]), offered
+
+
+def _with_columns(matrix: csr_array, columns: IntArray) -> csr_array:
+    """These columns (ascending) of a matrix, at no cost for all the others."""
+    place = np.searchsorted(columns, matrix.indices)
+    place[place == len(columns)] = 0
+    kept = columns[place] == matrix.indices if len(columns) else np.zeros(len(place), dtype=bool)
+    counts = np.concatenate([[0], np.cumsum(kept)])
+    return csr_array(
+        (matrix.data[kept], place[kept], counts[matrix.indptr]), shape=(matrix.shape[0], len(columns))
     )
-    return problem, offered

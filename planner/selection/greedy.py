@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
+from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.greedy_kernel import choose
 
 
 def greedy(cover: Cover) -> IntArray:
@@ -33,6 +36,9 @@ def _by_gain(cover: Cover, queue: list[Gain], *, until_met: bool) -> IntArray:
     Gains only fall while rows are chosen. So an outdated gain is computed again only when its row
     reaches the head of the queue (Minoux, 1978).
     """
+    kernel = compiled(choose, large=False)
+    if kernel is not None:
+        return _by_kernel(kernel, cover, queue, until_met=until_met)
     covered = np.zeros(cover.columns, dtype=np.int64)
     short, missing = cover.views_needed.copy(), cover.needed
     heapq.heapify(queue)
@@ -50,6 +56,18 @@ def _by_gain(cover: Cover, queue: list[Gain], *, until_met: bool) -> IntArray:
         covered[cover.columns_of(row)] += 1
         missing = short if cover.once else cover.missing(covered)
     return np.array(chosen, dtype=np.int64)
+
+
+def _by_kernel(kernel: Callable[..., int], cover: Cover, queue: list[Gain], *, until_met: bool) -> IntArray:
+    """`_by_gain` by the kernel, compiled or as written."""
+    gains = np.array(queue, dtype=np.int64).reshape(-1, 4)
+    keys = np.zeros((cover.rows, 3), dtype=np.int64)
+    keys[gains[:, 3]] = gains[:, :3]
+    covered, sums = (np.zeros(size, dtype=np.int64) for size in (cover.columns, len(cover.needed)))
+    wanted, needed = cover.views_needed.astype(np.int64), cover.needed.astype(np.int64)
+    heap, chosen = gains[:, 3].copy(), np.zeros(len(gains), dtype=np.int64)
+    state = (cover.asks, covered, wanted, needed, keys.ravel(), heap, sums, chosen)
+    return chosen[: kernel(int(until_met), *cover.seen_columns, *cover.worths.added, *state)]
 
 
 def _first_gains(cover: Cover) -> list[Gain]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.districts import improved_by_districts
-from stopgo.planner.selection.swaps import SwapBoard
+from stopgo.planner.selection.swap_search import TENURE, repaired
 
 SWAPS = 400
 """Most swaps in the search for a smaller selection; a count, so that no plan depends on speed."""
@@ -21,8 +19,6 @@ LARGE = 100
 """Stops of a selection above which it is searched by districts."""
 DISTRICT_SWAPS = 60
 """Swaps in a district before its search ends."""
-TENURE = 7
-"""Swaps for which a removed row may not return."""
 
 
 def improved(
@@ -50,7 +46,7 @@ def improved(
 
 def _improved(cover: Cover, best: IntArray, at_least: int, swaps: int) -> IntArray:
     while len(best) > at_least:
-        smaller = _repaired(cover, _without_least(cover, best), swaps)
+        smaller = repaired(cover, _without_least(cover, best), swaps)
         if smaller is None:
             return best
         best = smaller
@@ -62,23 +58,3 @@ def _without_least(cover: Cover, chosen: IntArray) -> list[int]:
     covered = cover.covered_by(chosen)
     alone = [int(cover.weight[c][covered[c] == cover.asks[c]].sum()) for c in map(cover.columns_of, chosen)]
     return np.delete(chosen, int(np.argmin(alone))).tolist()
-
-
-def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
-    """Swap rows by tabu search until every demand is met; None after the last swap."""
-    board = SwapBoard(cover, rows)
-    tabu: deque[int] = deque(maxlen=TENURE)
-    for _ in range(swaps):
-        if not board.missing.any():
-            return np.array(sorted(rows), dtype=np.int64)
-        if len(rows) in (0, cover.rows):
-            return None
-        if len(set(rows) | set(tabu)) == cover.rows:
-            tabu.clear()  # no other row is left to add
-        out, into = board.best_swap(rows, [*rows, *tabu])
-        board.raise_penalties()
-        board.drop(out)
-        board.take(into)
-        rows[rows.index(out)] = into
-        tabu.append(out)
-    return None

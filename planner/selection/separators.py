@@ -14,6 +14,8 @@ from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.link_graph import LinkedParts, LinkGraph
+from stopgo.planner.selection.running_coverage import RunningCoverage
 
 
 def components_of(links: csr_array, rows: IntArray) -> list[IntArray]:
@@ -47,10 +49,13 @@ def _adjacency(links: csr_array) -> tuple[IntArray, IntArray]:
 def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
     """The components needed to meet every demand: the smallest superfluous ones are dropped first."""
     needed = list(components)
+    coverage = RunningCoverage(cover, np.concatenate([np.empty(0, np.int64), *components]))
     for component in reversed(components):
-        rest = [other for other in needed if other is not component]
-        if rest and meets(cover, np.concatenate(rest)):
-            needed = rest
+        coverage.remove(component)
+        if len(needed) > 1 and coverage.is_enough:
+            needed = [other for other in needed if other is not component]
+        else:
+            coverage.add(component)
     return needed
 
 
@@ -59,25 +64,111 @@ class NodeSeparator:
     """Rows that split a region in two: every path from one side to the other contains one of them."""
 
     between: IntArray
-    here: IntArray
-    beyond: IntArray
-    elsewhere: IntArray
-    """All rows of other regions."""
-
-    def enough(self, cover: Cover) -> tuple[bool, bool]:
-        """True for each side that meets every demand by itself, with all other regions."""
-        here, beyond = (np.concatenate([side, self.elsewhere]) for side in (self.here, self.beyond))
-        return meets(cover, here), meets(cover, beyond)
+    near: IntArray
+    """All rows of the side of which all rows are known; the other side is the rest of the region."""
+    is_here: bool
+    """True if the near side is that of the component around which the separator lies."""
 
 
-def separators(cover: Cover, links: csr_array, regions: list[IntArray], rows: IntArray) -> Iterator[IntArray]:
-    """Sets of rows (n,) of which every selection that is connected in each region has at least one.
+class SeparatorSearch:
+    """The regions of a covering problem, prepared for searches for separators in them.
 
-    A node separator is such a set if neither side meets every demand by itself, with all other regions.
+    What is around a component, and what a side sees, is found without a look at all the rest of its region.
     """
-    for separator, _, _ in _separators(links, regions, rows):
-        if not any(separator.enough(cover)):
-            yield separator.between
+
+    def __init__(self, cover: Cover, graph: LinkGraph, regions: list[IntArray]) -> None:
+        self._cover, self._graph, self._regions = cover, graph, regions
+        every = np.concatenate([np.empty(0, np.int64), *regions])
+        self._region_of = np.full(cover.rows, -1, dtype=np.int64)
+        self._region_of[every] = np.repeat(np.arange(len(regions)), [len(region) for region in regions])
+        self._every, self._elsewhere = RunningCoverage(cover, every), RunningCoverage(cover, every)
+        self._part = np.full(cover.rows, -1, dtype=np.int64)
+
+    def separators(self, rows: IntArray) -> Iterator[IntArray]:
+        """Sets of rows (n,) of which every selection that is connected in each region has at least one.
+
+        A node separator is such a set if neither side meets every demand by itself, with all other regions.
+        """
+        for separator, _, _ in self._found(rows):
+            if not any(self._enough(separator)):
+                yield separator.between
+
+    def conditions(self, rows: IntArray) -> Iterator[tuple[IntArray, tuple[int, ...]]]:
+        """Separators where one side suffices: they bind only if rows of both sides are chosen.
+
+        Each is a set of rows and its ends: one row of the set is chosen if all the ends are.
+        """
+        for separator, component, others in self._found(rows):
+            here, beyond = self._enough(separator)
+            is_near = np.isin(others, separator.near)
+            far = int(others[~is_near if separator.is_here else is_near].min())
+            ends = ((int(component[0]),) if beyond else ()) + ((far,) if here else ())
+            yield separator.between, ends
+
+    def _enough(self, separator: NodeSeparator) -> tuple[bool, bool]:
+        """True for the side of the component, and for the one beyond, if it meets every demand."""
+        near = self._elsewhere.enough_with(separator.near)
+        far = self._every.enough_without(np.concatenate([separator.near, separator.between]))
+        return (near, far) if separator.is_here else (far, near)
+
+    def _found(self, rows: IntArray) -> Iterator[tuple[NodeSeparator, IntArray, IntArray]]:
+        """Node separators between each component of the rows and its others, with both."""
+        inside = np.zeros(self._cover.rows, dtype=np.int64)
+        components: dict[int, list[IntArray]] = {}
+        for one in components_of(self._graph.links, rows[self._region_of[rows] >= 0]):
+            components.setdefault(int(self._region_of[one[0]]), []).append(one)
+        for number, inner in sorted(components.items()):
+            if len(inner) > 1:
+                region = self._regions[number]
+                inside[region] = 1
+                self._elsewhere.remove(region)
+                try:
+                    for k, component in enumerate(inner):
+                        others = np.concatenate([*inner[:k], *inner[k + 1 :]])
+                        for separator in self._around(component, others, inside, len(region)):
+                            yield separator, component, others
+                finally:
+                    self._elsewhere.add(region)
+                    inside[region] = 0
+
+    def _around(
+        self, component: IntArray, others: IntArray, inside: IntArray, size: int
+    ) -> Iterator[NodeSeparator]:
+        """Separators between a component and others, for each part of its region beyond its neighbours.
+
+        The rows `inside` are those of the region, which has `size`. Large parts come first, then by their
+        lowest row.
+        """
+        near = self._graph.neighbours(component)
+        near = near[(inside[near] == 1) & ~np.isin(near, component)]
+        inside[component], inside[near] = 0, 0
+        parts = self._graph.parts_around(self._graph.neighbours(near), inside)
+        inside[component], inside[near] = 1, 1
+        between = self._between(near, parts)
+        known = np.concatenate([component, near, *parts.whole])
+        found = [
+            (-len(part), int(part[0]), NodeSeparator(between[k], part, is_here=False))
+            for k, part in enumerate(parts.whole) if np.isin(others, part).any()
+        ]  # fmt: skip
+        if len(parts.last) and not np.isin(others, known).all():
+            rest = inside.copy()
+            rest[known] = 0
+            here = np.setdiff1d(known, between[-1])
+            separator = NodeSeparator(between[-1], here, is_here=True)
+            found.append((len(known) - size, int(np.argmax(rest)), separator))
+        return (separator for *_, separator in sorted(found, key=lambda one: one[:2]))
+
+    def _between(self, near: IntArray, parts: LinkedParts) -> list[IntArray]:
+        """The rows of those near that have a link to each part (n,), the last one included."""
+        every = [*parts.whole, parts.last]
+        for k, part in enumerate(every):
+            self._part[part] = k
+        around = self._graph.links[near]
+        part_at = self._part[around.indices]
+        row = np.repeat(near, np.diff(around.indptr))
+        for part in every:
+            self._part[part] = -1
+        return [np.unique(row[part_at == k]).astype(np.int64) for k in range(len(every))]
 
 
 @dataclass(eq=False)
@@ -106,43 +197,6 @@ class Conditions:
     @property
     def least(self) -> FloatArray:
         return np.array([1.0 - len(ends) for _, ends in self._known])
-
-
-def conditions_between(
-    cover: Cover, links: csr_array, regions: list[IntArray], rows: IntArray
-) -> Iterator[tuple[IntArray, tuple[int, ...]]]:
-    """Separators where one side suffices: they bind only if rows of both sides are chosen.
-
-    Each is a set of rows and its ends: one row of the set is chosen if all the ends are.
-    """
-    for separator, component, others in _separators(links, regions, rows):
-        here, beyond = separator.enough(cover)
-        far = int(np.intersect1d(separator.beyond, others)[0])
-        ends = ((int(component[0]),) if beyond else ()) + ((far,) if here else ())
-        yield separator.between, ends
-
-
-def _separators(
-    links: csr_array, regions: list[IntArray], rows: IntArray
-) -> Iterator[tuple[NodeSeparator, IntArray, IntArray]]:
-    """Node separators between each component of the rows and its others, with both."""
-    for k, region in enumerate(regions):
-        elsewhere = np.concatenate([np.empty(0, np.int64), *regions[:k], *regions[k + 1 :]])
-        inner = components_of(links, np.intersect1d(rows, region))
-        for component in inner if len(inner) > 1 else []:
-            is_other = _mask(links, *inner)
-            is_other[component] = False
-            others = np.flatnonzero(is_other)
-            for beyond in components_of(links, _without(links, region, neighbours(links, component))):
-                if is_other[beyond].any():
-                    between = neighbours(links, beyond)
-                    here = _without(links, region, beyond, between)
-                    yield NodeSeparator(between, here, beyond, elsewhere), component, others
-
-
-def neighbours(links: csr_array, rows: IntArray) -> IntArray:
-    """Other rows that have a link to one of these."""
-    return _without(links, links[rows].indices, rows)
 
 
 def _without(links: csr_array, rows: IntArray, *others: IntArray) -> IntArray:

@@ -1,4 +1,4 @@
-"""Sums of the worth of columns, for each demand, and for each demand and row.
+"""Sums of the worth of columns, for each demand, and for each demand and row; and what rows reach.
 
 Plain functions over lists or arrays: the same source runs interpreted and compiled, with the types of
 `worth_kernel_compiled.pxd`. Worths are weights of units, and their sum over a floor is below 2**62.
@@ -56,6 +56,32 @@ def add_worth_by_row(
             begin = place[demand[entry]] * rows
             for pair in range(seen_first[column], seen_first[column + 1]):
                 sums[begin + seer[pair]] += worth[entry]
+
+
+def count_views(
+    rows: Any, step: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, asks: Any,
+    covered: Any, reached: Any,
+) -> None:  # fmt: skip
+    """Count the views of rows that come (step 1) or leave (step -1), and what each demand then reaches.
+
+    Parameters
+    ----------
+    rows, step
+        Numbers of rows (n,), and 1 or -1.
+    row_first, seen
+        First entry of each row in `seen`, and their end (rows + 1,); columns that the row sees.
+    adds_first, demand, worth
+        As for `add_worth`.
+    asks, covered, reached
+        Views that each column needs and has (columns,), and the worth reached (demands,).
+    """
+    for k in range(len(rows)):
+        for at in range(row_first[rows[k]], row_first[rows[k] + 1]):
+            column = seen[at]
+            if max(covered[column], covered[column] + step) == asks[column]:
+                for entry in range(adds_first[column], adds_first[column + 1]):
+                    reached[demand[entry]] += step * worth[entry]
+            covered[column] += step
 
 
 def take_gain(

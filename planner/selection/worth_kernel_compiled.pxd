@@ -16,6 +16,13 @@ cpdef void add_worth_by_row(
     const whole[::1] demand, const whole[::1] worth, const whole[::1] place, whole rows, whole[::1] sums
 ) noexcept nogil
 
+@cython.locals(at=whole, column=whole, entry=whole, k=whole)
+cpdef void count_views(
+    const whole[::1] rows, whole step, const whole[::1] row_first, const whole[::1] seen,
+    const whole[::1] adds_first, const whole[::1] demand, const whole[::1] worth,
+    const whole[::1] asks, whole[::1] covered, whole[::1] reached
+) noexcept nogil
+
 @cython.locals(column=whole, entry=whole, k=whole, total=whole)
 cpdef void take_gain(
     const whole[::1] columns, const whole[::1] covered, const whole[::1] asks, const whole[::1] adds_first,

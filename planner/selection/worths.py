@@ -33,6 +33,16 @@ class Worths:
         self._sums = np.zeros(self._demands, dtype=np.int64)
         self._gains = np.zeros(3, dtype=np.int64)
 
+    @property
+    def rows_of(self) -> tuple[IntArray, IntArray]:
+        """First entry of each column, and their end (columns + 1,); and the rows that see it: for kernels."""
+        return self._seen
+
+    @property
+    def added(self) -> tuple[IntArray, IntArray, IntArray]:
+        """First entry of each column and their end (columns + 1,); demands; and the worth to each."""
+        return (*self._adds, self._worth)
+
     def of(self, columns: IntArray) -> IntArray:
         """Worth of columns to each demand (demands,)."""
         kernel = compiled(add_worth, large=False)
