@@ -227,7 +227,7 @@ def steep_enough(found: Candidates, positions: np.ndarray) -> np.ndarray:
     along = (b - a) / np.maximum(np.hypot(*(b - a).T), 1e-9)[:, None]
     across = np.abs(ray[..., 0] * along[:, 1] - ray[..., 1] * along[:, 0])
     away = np.hypot(ray[..., 0], ray[..., 1])
-    return across >= np.cos(np.radians(most)) * away
+    return (across >= np.cos(np.radians(most)) * away) | (a == b).all(axis=1)
 
 
 def seen_by_eyes(found: Candidates, eyes: np.ndarray) -> np.ndarray:
