@@ -56,7 +56,8 @@ class ConnectedCover:
     def problem(self) -> Cover:
         """The covering problem with one demand for each separator found."""
         if len(self.cuts) not in self._problems:
-            self._problems = {len(self.cuts): self._with_cuts()}
+            self._problems.clear()  # before the next one: each is a large part of the memory
+            self._problems[len(self.cuts)] = self._with_cuts()
         return self._problems[len(self.cuts)]
 
     def _with_cuts(self) -> Cover:
