@@ -387,8 +387,7 @@ class Station:
         if self.direct is not None and order.verb in FREE_VERBS:
             direct = self.direct(key, payload, timeout_s=within_s)
         reply = self._ask_repeatedly(key, payload, within_s, beside=direct)
-        may_be_sent = self._seen.is_set() or self.link.may_be_sent or (direct and direct.may_be_sent)
-        if reply is None and self._not_found is not None and not may_be_sent:
+        if reply is None and self._not_found is not None and not self._may_be_sent(direct):
             raise self._not_found()
         if reply is None and order.verb not in FREE_VERBS and within_s >= order.valid_for_s:
             raise OutcomeUnknown(
@@ -400,6 +399,10 @@ class Station:
             why = f"{answer.reason}: {answer.message}"
             raise NegativeResult(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
         return answer
+
+    def _may_be_sent(self, direct: DirectQuestion | None) -> bool:
+        """True if a command that was not answered may have left for the robot."""
+        return self._seen.is_set() or self.link.may_be_sent or (direct is not None and direct.may_be_sent)
 
     def stop_order(self, verb: Verb, **details: Any) -> RunCommand:
         """Make a pause or an abort: a few hundred bytes, without an earlier query of the robot."""

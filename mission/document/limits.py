@@ -52,7 +52,7 @@ def limits_of(settings: Settings) -> ViewLimits:
     The scanner does not see a cone below it. A wall is visible down to its foot only from outside the cone's
     radius on the floor, so that smaller distances count as too near.
     """
-    incidence, density, step = settings.max_incidence, settings.density, settings.angular_step
+    incidence, density, step = settings.most_incidence, settings.density, settings.angular_step
     return ViewLimits(
         max_incidence=None if incidence is None else math.radians(incidence),
         near=blind_range(settings),

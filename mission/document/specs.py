@@ -47,7 +47,7 @@ def scanner_of(settings: Settings) -> ScannerSpec:
 def limits_spec_of(settings: Settings) -> LimitsSpec | UnsetType:
     """Return the limits at which a target counts as covered; absent if there is no limit."""
     limits = {
-        "max_incidence_deg": settings.max_incidence,
+        "max_incidence_deg": settings.most_incidence,
         "near": blind_range(settings) or None,
         "density_mm": settings.density,
         "wall_height": settings.wall_height,

@@ -9,6 +9,7 @@ from typing import Any
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import PARAMETERS, Settings
+from stopgo.mission.settings.coverage_parameters import ANY_INCIDENCE
 from stopgo.mission.settings.parameter import Parameter
 from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.settings.scanners import SCANNERS
@@ -50,15 +51,16 @@ def read_settings(
 def recorded_settings(parameters: dict[str, Any]) -> Settings:
     """Settings from the parameters that a mission records, also from one of an earlier version.
 
-    Scans of missions without `register` must register only if they give an overlap ratio.
+    Scans of missions without `register` must register only if they give an overlap ratio. In those without
+    `max_incidence` any angle counts.
 
     Raises
     ------
     InputError
         As in `read_settings`.
     """
-    earlier = {} if "register" in parameters else {"register": bool(parameters.get("overlap"))}
-    return read_settings(None, {**parameters, **earlier})
+    earlier = {"register": bool(parameters.get("overlap")), "max_incidence": ANY_INCIDENCE}
+    return read_settings(None, {**earlier, **parameters})
 
 
 _NAMES = {**{item.key: name for name, item in PARAMETERS.items()}, **{name: name for name in PARAMETERS}}

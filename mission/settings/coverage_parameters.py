@@ -10,6 +10,9 @@ from stopgo.mission.settings.parameter import Pair, Parameter, millimetres
 
 LEAST_FRACTION = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
+INCIDENCE = 80.0
+"""At this angle 5 cm of a wall 5 m away measure 0.1° from the scanner, which is the step of a coarse scan."""
+ANY_INCIDENCE = 90.0
 OVERLAP_RANGE_M = 20.0
 """Scanners reach much farther than the range within which targets are seen well enough."""
 
@@ -43,7 +46,14 @@ class CoverageParameters:
     ] = None
     max_incidence: Annotated[
         float | None,
-        _limit("Maximum angle from the surface normal", "degrees", group="Scanner", above=0, below=90),
+        _plan(
+            "Maximum angle from the surface normal; 90 is any",
+            "degrees",
+            group="Scanner",
+            above=0,
+            most=ANY_INCIDENCE,
+            undecided=f"{INCIDENCE:g}; any with --coverage-rule paper",
+        ),
     ] = None
     density: Annotated[
         float | None,
@@ -124,6 +134,13 @@ class CoverageParameters:
         if self.coverage_rule == "paper":
             return None
         return LEAST_FRACTION if given is None else given
+
+    @property
+    def most_incidence(self) -> float | None:
+        """Largest angle from the surface normal at which a target counts, in degrees; None for any."""
+        default = ANY_INCIDENCE if self.coverage_rule == "paper" else INCIDENCE
+        most = default if self.max_incidence is None else self.max_incidence
+        return None if most == ANY_INCIDENCE else most
 
     @property
     def registers(self) -> bool:

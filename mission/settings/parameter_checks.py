@@ -79,7 +79,7 @@ def _check_scanner(settings: Settings) -> None:
     if settings.density is not None and settings.angular_step is None:
         known = ", ".join(SCANNERS)
         _refuse(settings, "density", f"needs the scanner's --angular-step; give it, or a scanner: {known}")
-    if settings.wall_height is not None and settings.max_incidence is None and settings.density is None:
+    if settings.wall_height is not None and settings.most_incidence is None and settings.density is None:
         _refuse(settings, "wall_height", "has no effect without --max-incidence or --density; give one")
 
 

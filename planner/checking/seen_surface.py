@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from stopgo.mission.document.limits import scanner_height
-from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
-from stopgo.mission.stages import Route
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.stages import KEPT, UNREACHABLE, Route
 from stopgo.mission.stages.seen_area import SeenArea, SeenSurface
 from stopgo.planner.overlap.boundary import ray_step
+from stopgo.planner.visibility.exact_sight import exact
+from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.solid_rays import MOST_PAIRS, solid_rays
 
 
 def seen_surface(route: Route) -> SeenSurface | None:
     """Return the area of the targets that a route's stops see; None if the floor's solids are unknown.
 
-    Where the rays of several stops may miss a unit, it counts by the chance that those of one hit it.
+    Rays also hit a unit that is seen too flat to count. Where those of several stops may miss it, it counts
+    by the chance that those of one hit it.
     """
     space, solids = route.space, route.space.floor.solids
     rays = solid_rays(space)
@@ -26,8 +31,8 @@ def seen_surface(route: Route) -> SeenSurface | None:
     targets, elements, cells = space.targets, space.floor.elements, rays.cells
     seen = np.zeros(cells.there.shape)
     promised = np.zeros(targets.total, dtype=bool)
-    for stop, units in _sights(route):
-        promised[units] = True
+    for stop, counted, units in _sights(route):
+        promised[counted] = True
         for part in np.array_split(units, max(1, -(-units.size * cells.z.shape[1] // MOST_PAIRS))):
             hit = rays.reached(stop, part) * _between_rays(route, stop, part)[:, None]
             seen[part] += (1 - seen[part]) * hit
@@ -65,8 +70,18 @@ def _area(of_kind: BoolArray, promised: BoolArray, area: FloatArray, seen: Float
     )
 
 
-def _sights(route: Route) -> Iterator[tuple[FloatArray, IntArray]]:
-    """Position of each stop, and the units that it sees in the plan."""
-    visibility, candidates = route.visibility, route.visibility.candidates
-    for row in route.selection.chosen.tolist():
-        yield candidates.xy[candidates.kept[row]], visibility.seen_by(row)
+def _sights(route: Route) -> Iterator[tuple[FloatArray, IntArray, IntArray]]:
+    """Position of each stop, the units that count as seen from it, and all in its line of sight."""
+    visible, candidates = route.visibility, route.visibility.candidates
+    fov = math.radians(route.settings.fov)
+    rows = np.sort(route.selection.chosen)
+    stops = candidates.kept[rows]
+    reason = np.full(len(candidates.xy), UNREACHABLE)
+    reason[stops] = KEPT
+    in_sight = exact(replace(candidates, reason=frozen(reason, np.int64)))
+    for k, (row, stop) in enumerate(zip(rows.tolist(), stops.tolist(), strict=True)):
+        xy, units = candidates.xy[stop], in_sight.seen_by(k)
+        if len(candidates.heading):
+            offset = route.space.targets.unit_xy[units] - xy
+            units = units[in_view(offset, float(candidates.heading[stop]), fov=fov)]
+        yield xy, visible.seen_by(row), units

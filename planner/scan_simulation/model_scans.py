@@ -11,7 +11,7 @@ from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation
 from stopgo.planner.scan_simulation.casting import RayFan
-from stopgo.planner.scan_simulation.scanning import CLOUD_DEG, ScanCount, ScannerPose
+from stopgo.planner.scan_simulation.scanning import CLOUD_DEG, ScanCount, ScannerPose, incidence
 from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 ON_SURFACE_M = 0.02
@@ -127,6 +127,7 @@ def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulati
         columns=frozen(columns, np.int64),
         away=frozen(far[cell]),
         incidence=frozen(np.arccos(np.clip(cosine[cell], 0.0, 1.0))),
+        in_plan=frozen(incidence(towards[cell, :2], strips.normal[cell, :2])),
         cloud=frozen(_cloud(scene, pose, simulation)),
     )
 

@@ -46,6 +46,8 @@ class ScanCount:
     """Distance from the scanner to the centre of each, metres."""
     incidence: FloatArray
     """Angle between the ray and the surface normal at each, radians."""
+    in_plan: FloatArray
+    """The same angle between their directions in the plan, as a plan's limit has it; 0 on undersides."""
     cloud: FloatArray
     """Some of the points, relative to the scanner, with noise (n, 3)."""
 
@@ -73,12 +75,14 @@ def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation
         kept = _in_cloud(solids, pose.position, met, directions, -block.start % every, every)
         cloud.append(_points(solids, pose.position, met[kept], directions[kept], simulation, random))
     cell = np.flatnonzero(counts.points)
+    towards = strips.middle[cell] - pose.position
     return ScanCount(
         cell=frozen(cell, np.int64),
         points=frozen(counts.points[cell], np.int64),
         columns=frozen(counts.columns[cell], np.int64),
-        away=frozen(np.linalg.norm(strips.middle[cell] - pose.position, axis=1)),
-        incidence=frozen(_incidence(strips, cell, pose.position)),
+        away=frozen(np.linalg.norm(towards, axis=1)),
+        incidence=frozen(incidence(towards, strips.normal[cell])),
+        in_plan=frozen(incidence(towards[:, :2], strips.normal[cell, :2])),
         cloud=frozen(np.concatenate(cloud)),
     )
 
@@ -132,10 +136,11 @@ def _within(far: FloatArray, directions: FloatArray, reach: float, *, slant: boo
     return found
 
 
-def _incidence(strips: Strips, cell: IntArray, position: FloatArray) -> FloatArray:
-    towards = strips.middle[cell] - position
-    cosine = np.abs(np.einsum("ij,ij->i", towards, strips.normal[cell])) / np.linalg.norm(towards, axis=1)
-    found: FloatArray = np.arccos(np.clip(cosine, 0.0, 1.0))
+def incidence(towards: FloatArray, normal: FloatArray) -> FloatArray:
+    """Angle between rays and surface normals (n, 2 or 3), which may point to either side, in radians (n,)."""
+    size = np.linalg.norm(towards, axis=1) * np.linalg.norm(normal, axis=1)
+    cosine = np.abs(np.einsum("ij,ij->i", towards, normal)) / np.maximum(size, 1e-12)
+    found: FloatArray = np.where(size > 1e-12, np.arccos(np.clip(cosine, 0.0, 1.0)), 0.0)
     return found
 
 

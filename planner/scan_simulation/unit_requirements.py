@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stopgo.mission.document.limits import limits_of, scanner_height
+from stopgo.mission.document.limits import limits_of
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.planner.scan_simulation.scanning import ScanCount
@@ -30,27 +30,28 @@ class UnitRequirements:
     """Largest distance between neighbouring points, metres; None without a limit."""
     needed: IntArray
     """Number of cells that each unit must show (units,)."""
+    in_plan: bool
+    """True if angles are those in the plan."""
 
     @classmethod
     def of(cls, settings: Settings, strips: Strips) -> UnitRequirements:
-        """The requirements of a plan's limits: at the scanner's height, or from the floor to `wall_height`.
+        """The requirements of a plan's limits: at one height, or from the floor to `wall_height`.
 
-        Beams need only points, because a plan's angles are angles in the plane.
+        One height is the scanner's, or any other where that is hidden; angles are those in the plan.
+        Beams need only points.
         """
-        limits, height = limits_of(settings), scanner_height(settings)
+        limits = limits_of(settings)
         unit = strips.unit_of_cell
-        rows = np.diff(strips.first_cell)
-        row = np.arange(strips.cells) - strips.first_cell[unit]
-        if settings.wall_height is None:
-            level = np.clip(((height - strips.low) / CELL_M).astype(np.int64), 0, rows - 1)
-            wanted = row == level[unit]
-        else:
-            wanted = strips.low[unit] + (row + 1) * CELL_M <= settings.wall_height + 1e-9
         none = limits.max_incidence is None and limits.spacing is None
-        cells = wanted & ~strips.under[unit] & (not none)
+        cells = ~strips.under[unit] & (not none)
+        if settings.wall_height is not None:
+            row = np.arange(strips.cells) - strips.first_cell[unit]
+            cells &= strips.low[unit] + (row + 1) * CELL_M <= settings.wall_height + 1e-9
         needed = np.bincount(unit, cells, minlength=len(strips.low)).astype(np.int64)
+        if settings.wall_height is None:
+            needed = np.minimum(needed, 1)
         steepest = None if limits.max_incidence is None else limits.max_incidence + math.radians(SLACK_DEG)
-        return cls(strips, cells, steepest, limits.spacing, needed)
+        return cls(strips, cells, steepest, limits.spacing, needed, settings.wall_height is None)
 
     def shown(self, scan: ScanCount) -> BoolArray:
         """True for each unit that a scan shows as required (units,)."""
@@ -62,7 +63,8 @@ class UnitRequirements:
         return found
 
     def _steep(self, scan: ScanCount) -> BoolArray | bool:
-        return True if self.steepest is None else scan.incidence <= self.steepest
+        angle = scan.in_plan if self.in_plan else scan.incidence
+        return True if self.steepest is None else angle <= self.steepest
 
     def _dense(self, scan: ScanCount, unit: IntArray) -> BoolArray | bool:
         """True where points are dense enough in both directions; one more point may lie next to a cell."""

@@ -17,7 +17,7 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.overlap import links_of
-from stopgo.planner.selection.bound import counting_bound, lower_bound
+from stopgo.planner.selection.bound import counting_bound, first_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
@@ -93,9 +93,10 @@ def select(visibility: Visibility, *, joined: bool = True) -> Selection:
 
 
 def quick_estimate(visibility: Visibility) -> tuple[int, int]:
-    """Estimated number of stops, from greedy and a few swaps, and a lower bound on it."""
+    """Estimated number of stops, from greedy and a few swaps, and a first lower bound on it."""
     _, fixed, problem = cover_problem(visibility)
-    start, bound = _greedy(problem, visibility.settings)
+    start = greedy(problem)
+    bound = first_bound(problem, found=len(start))
     rows = improved(problem, start, at_least=bound, swaps=QUICK_SWAPS)
     return len(fixed) + len(rows), len(fixed) + bound
 

@@ -51,11 +51,19 @@ def lower_bound(cover: Cover, *, found: int, quickly: bool = False) -> int:
     if simple >= found or not cover.needed.any():
         return simple
     if quickly and entries > QUICK:
-        steps = min(FIRST_STEPS, FIRST_WORK // entries)
-        return max(simple, multiplier_bound(cover, found=found, steps=steps))
+        return first_bound(cover, found=found)
     return max(
         simple, relaxation_bound(cover) if entries <= LARGEST else multiplier_bound(cover, found=found)
     )
+
+
+def first_bound(cover: Cover, *, found: int) -> int:
+    """Lower bound by a few steps of the multiplier bound; `found` rows are known to suffice."""
+    simple = counting_bound(cover)
+    if simple >= found or not cover.needed.any():
+        return simple
+    steps = min(FIRST_STEPS, FIRST_WORK // max(1, cover.sees.nnz))
+    return max(simple, multiplier_bound(cover, found=found, steps=steps))
 
 
 def multiplier_bound(cover: Cover, *, found: int, steps: int = STEPS) -> int:

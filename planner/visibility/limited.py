@@ -13,6 +13,7 @@ from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import Settings
+from stopgo.mission.settings.coverage_parameters import ANY_INCIDENCE
 from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.shapes import local_origin, to_grid
 from stopgo.planner.visibility.sight.well_seen import SeenSegments, clipped
@@ -65,6 +66,8 @@ LIMITS = ("max_incidence", "near", "density", "wall_height", "views")
 def without_limit(settings: Settings, key: str) -> Settings:
     """The settings with one limit switched off."""
     off: dict[str, Any] = dict.fromkeys((key, "blind_cone") if key == "near" else (key,))
+    if key == "max_incidence":
+        off[key] = ANY_INCIDENCE
     return replace(settings, **off)
 
 

@@ -43,6 +43,10 @@ CELL_M = 0.1
 """Height of the cells in which a target's area is counted."""
 ON_FACE_M = 0.02
 """A face this near to a unit is the unit's own."""
+AT_EDGE_M = 0.001
+"""A point this near to a face's edge is on the face."""
+PARALLEL = 0.3
+"""Sine of the largest angle between a unit and a face of its own."""
 SOLID_M = 0.04
 """Columns within this of the plan's solids are theirs."""
 MOST_PAIRS = 200_000
@@ -61,8 +65,7 @@ class SolidRays:
         self._height = scanner_height(space.settings)
         self._targets = space.targets
         self.cells = UnitCells.of(space, solids)
-        along = (space.targets.b - space.targets.a)[space.targets.unit_segment]
-        self._along = along / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+        self._along = _along(space)
         self._outward = _outward(space, self._along)
 
     def reached(self, xy: FloatArray, units: IntArray) -> BoolArray:
@@ -88,6 +91,13 @@ class SolidRays:
         two_sided = ~outward.any(axis=1)
         clear = self._columns.reached(start, ends, self._along[units], z, self._height)
         return clear & (before | two_sided)[:, None]
+
+
+def _along(space: NavigableSpace) -> FloatArray:
+    """Directions of the units' lines (n, 2)."""
+    along = (space.targets.b - space.targets.a)[space.targets.unit_segment]
+    found: FloatArray = along / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    return found
 
 
 def _outward(space: NavigableSpace, along: FloatArray) -> FloatArray:
@@ -179,12 +189,16 @@ def _on_faces(space: NavigableSpace, triangles: FloatArray, z: FloatArray) -> tu
     plan = shapely.linestrings(upright[:, [0, 1, 2], :2])
     points = shapely.points(space.targets.unit_xy)
     unit, face = shapely.STRtree(plan).query(points, predicate="dwithin", distance=ON_FACE_M)
+    direction = _direction(upright[face])
+    along = _along(space)[unit]
+    same = np.abs(along[:, 0] * direction[:, 1] - along[:, 1] * direction[:, 0]) <= PARALLEL
+    unit, face, direction = unit[same], face[same], direction[same]
     found = np.zeros(z.shape, dtype=bool)
     along = upright[face, :, :2] - space.targets.unit_xy[unit, None]
-    t = np.einsum("nkd,nd->nk", along, _direction(upright[face]))
+    t = np.einsum("nkd,nd->nk", along, direction)
     low, high = _heights_at(t, upright[face, :, 2])
     for k in range(z.shape[1]):
-        here = (z[unit, k] >= low - ON_FACE_M) & (z[unit, k] <= high + ON_FACE_M)
+        here = (z[unit, k] >= low - AT_EDGE_M) & (z[unit, k] <= high + AT_EDGE_M)
         found[unit[here], k] = True
     has_face = np.isin(np.arange(len(z)), unit)
     found[~has_face] = True
@@ -217,8 +231,8 @@ def _heights_at(t: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         at = z[:, a] + fraction * (z[:, b] - z[:, a])
         on = (
             ~level
-            & (np.minimum(t[:, a], t[:, b]) <= ON_FACE_M)
-            & (np.maximum(t[:, a], t[:, b]) >= -ON_FACE_M)
+            & (np.minimum(t[:, a], t[:, b]) <= AT_EDGE_M)
+            & (np.maximum(t[:, a], t[:, b]) >= -AT_EDGE_M)
         )
         low = np.where(on, np.minimum(low, at), low)
         high = np.where(on, np.maximum(high, at), high)

@@ -207,7 +207,27 @@ def by_force(found: Candidates, rows: np.ndarray) -> np.ndarray:
     eyes, row = viewpoints_of(found)
     seen = seen_by_eyes(found, eyes[np.isin(row, rows)])
     of = np.searchsorted(rows, row[np.isin(row, rows)])
-    return np.array([seen[of == k].any(axis=0) for k in range(len(rows))])
+    steep = steep_enough(found, found.xy[found.kept][rows])
+    return np.array([seen[of == k].any(axis=0) for k in range(len(rows))]) & steep
+
+
+def steep_enough(found: Candidates, positions: np.ndarray) -> np.ndarray:
+    """True for units whose normal is within the largest angle of the ray from a position (p, units)."""
+    most = found.settings.most_incidence
+    if most is None:
+        return np.ones((len(positions), found.space.targets.total), dtype=bool)
+    targets, origin = found.space.targets, local_origin(found.floor)
+    a, b = (to_grid(end - origin)[targets.unit_segment].astype(float) for end in (targets.a, targets.b))
+    number = np.arange(targets.total) - targets.first_unit[targets.unit_segment]
+    ray = (
+        a
+        + ((number + 0.5) / targets.units[targets.unit_segment])[:, None] * (b - a)
+        - to_grid(positions - origin)[:, None]
+    )
+    along = (b - a) / np.maximum(np.hypot(*(b - a).T), 1e-9)[:, None]
+    across = np.abs(ray[..., 0] * along[:, 1] - ray[..., 1] * along[:, 0])
+    away = np.hypot(ray[..., 0], ray[..., 1])
+    return (across >= np.cos(np.radians(most)) * away) | (a == b).all(axis=1)
 
 
 def seen_by_eyes(found: Candidates, eyes: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from stopgo.mission.document.floor_source import FloorSource
 from stopgo.mission.settings import Settings
 
 DIGEST = "0" * 64
-PLAIN = "8e3eb962160421246979a76d4468c7c1"
+PLAIN = "2b7fc8214c3ae5701baf55c99eecf50b"
 """The id of a floor that is nothing but its file's digest, by the default parameters."""
 
 
