@@ -7,6 +7,7 @@ only the rings around the box. Its result is the same as that of a cut of the wh
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import floor
 
 import numpy as np
 import shapely
@@ -18,6 +19,10 @@ from stopgo.planner.geometry.shapes import polygon_parts
 
 FEW = 300
 """Vertices of a shape that is cut as a whole."""
+LONG = 20_000
+"""Vertices of a polygon that is triangulated as a whole: the drive area of some 17 000 m²."""
+CUT = 20.0
+"""Side in metres of the squares into which a large shape is cut."""
 TILE = 10.0
 """Metres: small shapes that begin in one square of this side are intersected with the same cut."""
 
@@ -40,9 +45,8 @@ class RingIndex:
 
     def within(self, bounds: Sequence[float]) -> BaseGeometry:
         """The polygons of the shape in a box."""
-        box = shapely.box(*bounds)
         # Not clip_by_rect: it fails where it leaves less than a triangle of a shape.
-        return shapely.MultiPolygon(polygon_parts(self.around(bounds).intersection(box)))
+        return shapely.MultiPolygon(polygon_parts(self.around(bounds).intersection(shapely.box(*bounds))))
 
     def around(self, bounds: Sequence[float]) -> BaseGeometry:
         """A shape that is the same in a box: the parts around it, with the holes around it."""
@@ -58,6 +62,20 @@ class RingIndex:
         if len(own) == self._hole_count[part]:
             return self._parts[part]
         return shapely.Polygon(self._parts[part].exterior, list(self._holes[own]))
+
+
+def triangles_of(shape: BaseGeometry) -> NDArray[np.object_]:
+    """Triangles that cover a polygon; one with very many vertices is cut into squares first.
+
+    The time of a triangulation grows faster than its vertices.
+    """
+    if shapely.get_num_coordinates(shape) <= LONG:
+        return shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    index, bounds = RingIndex(shape), shape.bounds
+    x, y = (np.arange(floor(bounds[k] / CUT), floor(bounds[k + 2] / CUT) + 1) for k in range(2))
+    boxes = [(a * CUT, b * CUT, (a + 1) * CUT, (b + 1) * CUT) for a in x.tolist() for b in y.tolist()]
+    parts = np.array([part for box in boxes for part in polygon_parts(index.within(box))], dtype=object)
+    return shapely.get_parts(shapely.constrained_delaunay_triangles(parts))
 
 
 def areas_within(cells: NDArray[np.object_], shape: BaseGeometry) -> FloatArray:

@@ -36,7 +36,7 @@ def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
     overlaps, share = overlaps_of(candidates), candidates.settings.least_overlap
     rows, others = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
-    for pairs in overlaps.later():
+    for pairs in overlaps.later(least_m=LEAST_COMMON_M):
         good = registers(pairs, share=share)
         rows.append(pairs.row[good])
         others.append(pairs.other[good])

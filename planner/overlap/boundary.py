@@ -98,10 +98,11 @@ def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
     stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)
     taken = candidates.kept[rows]
-    heading = candidates.heading[taken] if len(candidates.heading) else None
-    return shown_by(
-        boundary, candidates.xy[taken] - origin, stretches.pieces(len(rows)), heading, space.settings
-    )
+    xy, settings = candidates.xy[taken] - origin, space.settings
+    if len(candidates.heading) and settings.fov < 360:
+        pieces = stretches.pieces(len(rows))
+        return shown_by(boundary, xy, pieces, candidates.heading[taken], settings)
+    return _shown(boundary, xy, stretches.joined(_faces(boundary)), ray_step(settings))
 
 
 def _viewpoints(candidates: Candidates, rows: IntArray) -> tuple[FloatArray, IntArray]:
@@ -128,6 +129,19 @@ class _Stretches:
             own = slice(bounds[k], bounds[k + 1])
             yield np.unique(ranges(self.first[own], self.last[own] - self.first[own] + 1))
 
+    def joined(self, face: IntArray) -> _Stretches:
+        """The same pieces in as few stretches as possible, each of one `face` (pieces,), as all are here."""
+        order = np.lexsort((self.first, self.row))
+        row, first, last = self.row[order], self.first[order], self.last[order]
+        ahead = row * len(face)  # so that no piece of a row is beyond those of the next
+        farthest = np.maximum.accumulate(ahead + last)
+        new = np.ones(len(row), dtype=bool)
+        new[1:] = (np.diff(row) != 0) | (np.diff(face[first]) != 0)
+        new[1:] |= (ahead + first)[1:] > farthest[:-1] + 1
+        starts = np.flatnonzero(new)
+        ends = np.append(starts[1:], len(row))[: len(starts)] - 1
+        return _Stretches(row[starts], first[starts], (farthest - ahead)[ends])
+
 
 def shown_by(
     boundary: Boundary,
@@ -141,7 +155,7 @@ def shown_by(
     With a field of view below 360° only the part within it about each `heading` (rows,) is shown. What the
     scanner sees too flat or too sparsely for a surface with a direction is not shown.
     """
-    face = np.repeat(np.arange(len(boundary.pieces)), boundary.pieces)
+    face = _faces(boundary)
     if heading is not None and settings.fov < 360:
         fov, middle = math.radians(settings.fov), _middles(boundary, face)
         looks = zip(pieces, xy, heading.tolist(), strict=True)
@@ -149,17 +163,28 @@ def shown_by(
     runs = [runs_of(own, face) for own in pieces]
     empty = np.empty(0, np.int64)
     first, last = (np.concatenate([empty, *(run[k] for run in runs)]) for k in range(2))
-    start = (np.cumsum(boundary.pieces) - boundary.pieces)[face[first]]
-    piece = (np.hypot(*(boundary.b - boundary.a).T) / boundary.pieces)[face[first]]
     row = np.repeat(np.arange(len(xy)), [len(run[0]) for run in runs])
-    low, high = _measured(boundary, face[first], xy[row], step=ray_step(settings))
-    begin = np.maximum((first - start) * piece, low)
-    end = np.minimum((last + 1 - start) * piece, high)
+    return _shown(boundary, xy, _Stretches(row, first, last), ray_step(settings))
+
+
+def _faces(boundary: Boundary) -> IntArray:
+    """Face of each piece."""
+    return np.repeat(np.arange(len(boundary.pieces)), boundary.pieces)
+
+
+def _shown(boundary: Boundary, xy: FloatArray, seen: _Stretches, step: float) -> ShownBoundary:
+    """The boundary shown from positions (rows, 2) that see stretches of it, each of one face."""
+    row, face = seen.row, _faces(boundary)[seen.first]
+    start = (np.cumsum(boundary.pieces) - boundary.pieces)[face]
+    piece = (np.hypot(*(boundary.b - boundary.a).T) / boundary.pieces)[face]
+    low, high = _measured(boundary, face, xy[row], step=step)
+    begin = np.maximum((seen.first - start) * piece, low)
+    end = np.minimum((seen.last + 1 - start) * piece, high)
     some = end > begin
     return ShownBoundary(
         boundary=boundary,
         pointer=frozen(np.searchsorted(row[some], np.arange(len(xy) + 1)), np.int64),
-        face=frozen(face[first][some], np.int64),
+        face=frozen(face[some], np.int64),
         begin=frozen(begin[some]),
         end=frozen(end[some]),
         xy=frozen(xy),

@@ -81,11 +81,14 @@ class Overlaps:
             self._by_row[row] = self._pairs(np.array([row]), np.array([0]))
         return self._by_row[row]
 
-    def later(self) -> Iterator[Pairs]:
-        """All rows with every later row, in blocks; not cached, since a large floor would take gigabytes."""
+    def later(self, *, least_m: float = 0.0) -> Iterator[Pairs]:
+        """All rows with every later row that has at least so much boundary in common, in blocks.
+
+        They are not cached, since a large floor would take gigabytes.
+        """
         for begin in range(0, self.rows, BLOCK):
             rows = np.arange(begin, min(begin + BLOCK, self.rows))
-            yield self._pairs(rows, rows + 1)
+            yield self._pairs(rows, rows + 1, least_m=least_m)
 
     def middle_of_common(self, row: int, other: int) -> FloatArray:
         """The middle of the longest stretch of boundary that two rows see, local metres (2,)."""
@@ -131,13 +134,16 @@ class Overlaps:
         both = (high - low > LEAST_STRETCH_M - EPSILON_M) & (self._row[there] != self._row[mine])
         return mine[both], there[both], low[both], high[both]
 
-    def _pairs(self, rows: IntArray, first: IntArray) -> Pairs:
+    def _pairs(self, rows: IntArray, first: IntArray, *, least_m: float = 0.0) -> Pairs:
         seen = self._seen
         mine, there, begin, end = self._common(rows, first)
         both, index = np.unique(self._row[mine] * self.rows + self._row[there], return_inverse=True)
-        row, other = np.divmod(both, max(1, self.rows))
-        moments = self._moments(seen.face[there], begin + EDGE_M, end - EDGE_M, index, len(both))
         common = np.bincount(index, end - begin, len(both))
+        enough = np.round(common, DIGITS) >= least_m
+        kept, common = enough[index], common[enough]
+        there, begin, end, index = there[kept], begin[kept], end[kept], (np.cumsum(enough) - 1)[index[kept]]
+        row, other = np.divmod(both[enough], max(1, self.rows))
+        moments = self._moments(seen.face[there], begin + EDGE_M, end - EDGE_M, index, len(common))
         least = np.minimum(self.shown_m[row], self.shown_m[other])
         hold = np.minimum(_least_hold(moments, seen.xy[row]), _least_hold(moments, seen.xy[other]))
         share = common / np.maximum(least, 1e-12)

@@ -21,6 +21,7 @@ from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing.colony import ant_colony
 from stopgo.planner.routing.grid_graph import grid_paths
 from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.nearby_bound import nearby_bound
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths
 from stopgo.planner.routing.proof import tour_proof
@@ -37,6 +38,10 @@ GRAPHS: dict[str, Graph] = {"exact": paths_between, "grid": grid_paths}
 
 ALL_PAIRS_UP_TO = 500
 """Points up to which the paths between all pairs are found first."""
+
+
+BOUNDS_UP_TO = 2000
+"""Points up to which lower bounds on the lengths of all pairs are used too, for the bound of a tour."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ def _route_over_nearby(
     """The route over many points, of which only near pairs have exact lengths.
 
     The tour is searched over upper bounds on all other lengths, so that it is no longer than it seems. Its
-    own lengths are then exact, and lower bounds on all others give its bound.
+    own lengths are then exact. Its bound is that of `nearby_bound`, or of fewer points the better of two.
     """
     paths = nearby_paths_between(selection.space, points)
     if not paths.connected:
@@ -88,9 +93,24 @@ def _route_over_nearby(
     order = canonical(by_place[router.called(matrix, seed=selection.settings.seed)])
     del matrix
     sequence = _sequence(order, ends, len(points))
-    paths.learn(np.stack([sequence, np.roll(sequence, -1)], axis=1))
-    bound = tour_bound(paths.at_least(), sequence, ends)
+    legs = paths.learn(np.stack([sequence, np.roll(sequence, -1)], axis=1))
+    bound = _bound_over_nearby(paths, float(legs.sum() if ends.closed else legs[:-1].sum()), ends)
+    if len(points) <= BOUNDS_UP_TO:
+        bound = max(bound, tour_bound(paths.at_least(), sequence, ends))
     return assembled(selection, points, paths, sequence, ends, bound, METHODS["default"])
+
+
+def _bound_over_nearby(paths: NearbyPaths, length: float, ends: Ends) -> float:
+    """Lower bound in metres on a route between these ends over all points; one is as long as given."""
+    if ends.closed:
+        return max(0.0, nearby_bound(paths, None, best=round(length * NANOMETRES)) / NANOMETRES)
+    fixed = [end for end in (ends.first, ends.last) if end is not None]
+    far = float(np.ceil(3 * paths.farthest) + 1)
+    last = np.full(paths.points, far if fixed else 0.0)
+    last[fixed] = 0.0
+    extra = far if len(fixed) == 1 else 0.0
+    best = round((length + extra) * NANOMETRES)
+    return max(0.0, nearby_bound(paths, last, best=best) / NANOMETRES - extra)
 
 
 def _not_connected(selection: Selection) -> NegativeResult:

@@ -40,7 +40,7 @@ class NearbyPaths:
         nearest: int = NEAREST,
         landmarks: int = LANDMARKS,
     ) -> None:
-        self._xy, self._points = xy, points
+        self._xy, self.points = xy, points
         self._search = _PointSearch(edge_lengths(xy, edges), points)
         self._away = self._from_landmarks(landmarks)
         """Metres from each landmark to each point (landmarks, points)."""
@@ -58,20 +58,48 @@ class NearbyPaths:
         """Distances of all points from the first one, and from each point farthest from all those before."""
         found = [self._search.distances(0)]
         nearest = found[0].copy()
-        for _ in range(min(landmarks, self._points) - 1):
+        for _ in range(min(landmarks, self.points) - 1):
             found.append(self._search.distances(int(np.argmax(nearest))))
             np.minimum(nearest, found[-1], out=nearest)
         return np.array(found)
 
     def _find_near(self, nearest: int) -> None:
-        found = [self._search.nearest(point, nearest) for point in range(self._points)]
-        begin = np.repeat(np.arange(self._points), [len(ends) for ends, _ in found])
+        found = [self._search.nearest(point, nearest) for point in range(self.points)]
+        self._others: IntArray = np.array([ends for ends, _ in found])
+        self._nearest: FloatArray = np.array([away for _, away in found])
+        """Nearest other points of each, and their distances (points, nearest)."""
+        begin = np.repeat(np.arange(self.points), [len(ends) for ends, _ in found])
         end = np.concatenate([ends for ends, _ in found])
         self._take(np.stack([begin, end], axis=1), np.concatenate([away for _, away in found]))
 
-    def learn(self, pairs: IntArray) -> None:
+    def near_pairs(self, many: int) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Pairs (n, 2) of each point with the nearest others, so `many`; their lengths; and how far that is.
+
+        A pair that is in neither direction among them is at least as long as the last of either point.
+        """
+        many = min(many, self._nearest.shape[1])
+        begin, end = np.repeat(np.arange(self.points), many), self._others[:, :many].ravel()
+        low, high = np.minimum(begin, end), np.maximum(begin, end)
+        pairs, which = np.unique(low * self.points + high, return_inverse=True)
+        lengths = np.full(len(pairs), np.inf)
+        np.minimum.at(lengths, which, self._nearest[:, :many].ravel())
+        ends = np.stack(np.divmod(pairs, self.points), axis=1).astype(np.int64)
+        return ends, lengths, self._nearest[:, many - 1]
+
+    def lengths_from(self, point: int) -> FloatArray:
+        """Metres from a point to every point (points,)."""
+        return self._search.distances(point)
+
+    @property
+    def farthest(self) -> float:
+        """Metres that no two points are farther apart."""
+        return 2 * float(self._away[0].max())
+
+    def learn(self, pairs: IntArray) -> FloatArray:
         """Find the exact lengths of pairs of points (n, 2)."""
-        self._take(pairs, np.array([self._search.length(a, b) for a, b in pairs.tolist()]))
+        lengths = np.array([self._search.length(a, b) for a, b in pairs.tolist()])
+        self._take(pairs, lengths)
+        return lengths
 
     def _take(self, pairs: IntArray, lengths: FloatArray) -> None:
         """Note lengths, those from the lower point of a pair to the higher last, so that these count."""
@@ -82,8 +110,8 @@ class NearbyPaths:
 
     def at_most(self) -> FloatArray:
         """Metres between all points (points, points): exact for known pairs, an upper bound for others."""
-        most = np.full((self._points, self._points), np.inf)
-        for k in range(0, self._points, BLOCK):
+        most = np.full((self.points, self.points), np.inf)
+        for k in range(0, self.points, BLOCK):
             some = most[k : k + BLOCK]
             for away in self._away:
                 np.minimum(some, away[k : k + BLOCK, None] + away, out=some)
@@ -91,8 +119,8 @@ class NearbyPaths:
 
     def at_least(self) -> FloatArray:
         """Metres between all points (points, points): exact for known pairs, a lower bound for others."""
-        least = np.zeros((self._points, self._points))
-        for k in range(0, self._points, BLOCK):
+        least = np.zeros((self.points, self.points))
+        for k in range(0, self.points, BLOCK):
             some = least[k : k + BLOCK]
             for away in self._away:
                 np.maximum(some, np.abs(away[k : k + BLOCK, None] - away), out=some)
@@ -128,18 +156,18 @@ class _PointSearch:
         arrays: list[Any] = [*given, *scratch, np.zeros(points)]
         if self._kernel is None:
             self._kernel, arrays = reach, [array.tolist() for array in arrays]
-        self._points, self._arrays = points, arrays
+        self.points, self._arrays = points, arrays
         self._before, self._found, self._away = arrays[4], arrays[9], arrays[10]
 
     def nearest(self, source: int, wanted: int) -> tuple[IntArray, FloatArray]:
         """The nearest other points of one, fewer where no path leads to so many, and their distances."""
-        many = self._kernel(source, -1, self._points, wanted, *self._arrays) if wanted else 0
+        many = self._kernel(source, -1, self.points, wanted, *self._arrays) if wanted else 0
         return np.array(self._found[:many], dtype=np.int64), np.array(self._away[:many], dtype=np.float64)
 
     def distances(self, source: int) -> FloatArray:
         """Distance of every point (points,); infinite where no path leads."""
-        found, lengths = self.nearest(source, self._points)
-        away = np.full(self._points, np.inf)
+        found, lengths = self.nearest(source, self.points)
+        away = np.full(self.points, np.inf)
         away[source] = 0.0
         away[found] = lengths
         return away
@@ -158,7 +186,7 @@ class _PointSearch:
 
     def _found_at(self, source: int, target: int) -> int:
         """Search up to a point; its place among the points found."""
-        many = self._kernel(source, target, self._points, self._points, *self._arrays)
+        many = self._kernel(source, target, self.points, self.points, *self._arrays)
         if not many or self._found[many - 1] != target:
             raise ValueError(f"no path from point {source} to point {target}")
         return int(many) - 1

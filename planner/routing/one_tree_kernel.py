@@ -1,4 +1,4 @@
-"""The smallest one-tree of a weighted matrix, by Prim's algorithm.
+"""The smallest one-tree of a weighted matrix, by Prim's algorithm; the smallest tree of edges, by Kruskal's.
 
 Plain functions over lists or arrays: the same source runs interpreted and compiled, with the
 types of `one_tree_kernel_compiled.pxd`. The longest edge times the number of points is below 2**62, and
@@ -79,3 +79,35 @@ def close(cost: Any, weight: Any, degree: Any) -> int:
     for point in range(n):
         total -= 2 * weight[point]
     return total
+
+
+def join_all(order: Any, a: Any, b: Any, joined: Any, used: Any) -> int:
+    """Choose a spanning tree's edges, the first in `order` that join two parts; return their number.
+
+    Parameters
+    ----------
+    order
+        Edges, the shortest first (edges,).
+    a, b
+        Points at both ends of each edge (edges,).
+    joined
+        The number of each point (points,); receives, for each, one of those that it is joined with.
+    used
+        Receives the edges chosen (points,).
+    """
+    count = 0
+    for k in range(len(order)):
+        here, there = a[order[k]], b[order[k]]
+        while joined[here] != here:
+            joined[here] = joined[joined[here]]
+            here = joined[here]
+        while joined[there] != there:
+            joined[there] = joined[joined[there]]
+            there = joined[there]
+        if here != there:
+            joined[here] = there
+            used[count] = order[k]
+            count += 1
+            if count == len(joined) - 1:
+                break
+    return count

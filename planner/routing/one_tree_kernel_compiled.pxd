@@ -16,3 +16,8 @@ cpdef whole grow(
     apart=whole, first=whole, last=whole, n=whole, point=whole, row=whole, second=whole, total=whole
 )
 cdef whole close(const whole[::1] cost, const whole[::1] weight, whole[::1] degree) noexcept nogil
+
+@cython.locals(count=whole, here=whole, k=whole, there=whole)
+cpdef whole join_all(
+    const whole[::1] order, const whole[::1] a, const whole[::1] b, whole[::1] joined, whole[::1] used
+) noexcept nogil

@@ -31,7 +31,7 @@ NEAREST = 10
 LONGEST_STRETCH = 50
 """Points in each of the two stretches that a perturbation exchanges, at most."""
 BLOCK = 256
-"""Points whose neighbours are sorted at a time."""
+"""Points whose lengths are converted, and whose neighbours are sorted, at a time."""
 JOURNAL = 1000
 """Most reversals in a trial, so that it can be undone."""
 
@@ -54,8 +54,10 @@ def nanometres(lengths: FloatArray) -> IntArray:
     if float(np.max(lengths, initial=0.0)) * NANOMETRES * len(lengths) > LARGEST:
         longest, most = float(lengths.max()), LARGEST / NANOMETRES / len(lengths)
         raise InputError(f"route: a path of {longest:g} m between {len(lengths)} stops; at most {most:g} m")
-    whole = lengths * NANOMETRES
-    return np.floor(whole, out=whole).astype(np.int64)
+    whole = np.empty(lengths.shape, dtype=np.int64)
+    for k in range(0, len(lengths), BLOCK):  # of thousands of points a copy is a large part of the memory
+        whole[k : k + BLOCK] = np.floor(lengths[k : k + BLOCK] * NANOMETRES)
+    return whole
 
 
 def length_of(cost: IntArray, order: IntArray) -> int:

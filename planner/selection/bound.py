@@ -32,7 +32,8 @@ SMOOTHING = 0.7
 def counting_bound(cover: Cover) -> int:
     """Fewest rows whose views could meet the hardest demand, if no views overlapped without need."""
     gains = (cover.sees @ cover.worth.T).tocsc()
-    simple = max((_fewest(gains[:, [k]].data, need) for k, need in enumerate(cover.views_needed)), default=0)
+    each = np.split(gains.data, gains.indptr[1:-1])
+    simple = max(map(_fewest, each, cover.views_needed.tolist()), default=0)
     return max(simple, int(cover.asks.min(initial=simple)) if cover.needed.any() else 0)
 
 

@@ -56,7 +56,8 @@ class ConnectedCover:
     def problem(self) -> Cover:
         """The covering problem with one demand for each separator found."""
         if len(self.cuts) not in self._problems:
-            self._problems = {len(self.cuts): self._with_cuts()}
+            self._problems.clear()  # before the next one: each is a large part of the memory
+            self._problems[len(self.cuts)] = self._with_cuts()
         return self._problems[len(self.cuts)]
 
     def _with_cuts(self) -> Cover:
@@ -107,7 +108,7 @@ class ConnectedCover:
         if inside[row] == 0:
             return False
         inside[row] = 0
-        parts = self.graph.parts_around(self.graph.neighbours(np.array([row])), inside)
+        parts = self.graph.parts_around(self.graph.ends(np.array([row]))[1], inside)
         inside[row] = 1
         return len(parts.whole) + min(1, len(parts.last)) > 1
 
@@ -140,12 +141,12 @@ def _by_greedy(task: ConnectedCover) -> IntArray:
 
 def connected_rows(task: ConnectedCover, rows: IntArray) -> IntArray:
     """The rows, with others that connect their components and without superfluous ones."""
+    coverage = RunningCoverage(task.cover, rows)
     for region in task.regions:
         while len(found := components_of(task.links, np.intersect1d(rows, region))) > 1:
-            gain = task.cover.sees @ np.where(
-                task.cover.covered_by(rows) < task.cover.asks, task.cover.weight, 0
-            )
-            rows = np.union1d(rows, connecting_rows(task.links, region, found, gain))
+            more = connecting_rows(task.links, region, found, coverage.added_by)
+            coverage.add(np.setdiff1d(more, rows))
+            rows = np.union1d(rows, more)
     return _without_idle(task, np.unique(rows))
 
 

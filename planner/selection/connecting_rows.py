@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -10,11 +12,14 @@ from stopgo.mission.geometry import IntArray
 
 
 def connecting_rows(
-    links: csr_array, region: IntArray, components: list[IntArray], gain: IntArray
+    links: csr_array,
+    region: IntArray,
+    components: list[IntArray],
+    gain_of: Callable[[IntArray], IntArray],
 ) -> IntArray:
     """The row of a region that connects most of its components; if none connects two, the shortest path.
 
-    Of rows that connect as many, it is the one with the largest coverage `gain` (rows,).
+    Of rows that connect as many, it is the first with the largest gain in coverage.
     """
     members = np.concatenate(components)
     component = np.repeat(np.arange(len(components)), [len(one) for one in components])
@@ -25,7 +30,7 @@ def connecting_rows(
     if most < 2:
         return _shortest_path(links, region, members, component)
     alike = region[joins == most]
-    return alike[[int(np.argmax(gain[alike]))]]
+    return alike[[int(np.argmax(gain_of(alike)))]]
 
 
 def _shortest_path(links: csr_array, region: IntArray, members: IntArray, component: IntArray) -> IntArray:

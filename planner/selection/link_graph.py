@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.selection.component_kernel import grow_parts
+from stopgo.planner.visibility.unit_ranges import ranges
 
 
 class LinkedParts(NamedTuple):
@@ -32,11 +33,20 @@ class LinkGraph:
             np.ascontiguousarray(part, np.int64) for part in (links.indptr, links.indices)
         )
         self._label = np.full(rows, -1, dtype=np.int64)
+        self._is_end = np.zeros(rows, dtype=bool)
         self._following, self._met = (np.zeros(rows, dtype=np.int64) for _ in range(2))
+
+    def ends(self, rows: IntArray) -> tuple[IntArray, IntArray]:
+        """Links of some rows: how many each has (n,), and the rows to which they lead."""
+        counts = self._first[rows + 1] - self._first[rows]
+        return counts, self._to[ranges(self._first[rows], counts)]
 
     def neighbours(self, rows: IntArray) -> IntArray:
         """Rows that have a link to one of these, once each, ascending (n,)."""
-        return np.unique(self.links[rows].indices).astype(np.int64)
+        self._is_end[self.ends(rows)[1]] = True
+        found = np.flatnonzero(self._is_end).astype(np.int64)
+        self._is_end[found] = False
+        return found
 
     def parts_around(self, seeds: IntArray, inside: IntArray) -> LinkedParts:
         """The connected parts around rows, of those with `inside` 1 (rows,)."""

@@ -52,6 +52,11 @@ class RunningCoverage:
         self._count(rows, 1)
         return enough
 
+    def added_by(self, rows: IntArray) -> IntArray:
+        """Weight of the columns that need more views and that each of these rows sees (n,)."""
+        weight = np.where(self.covered < self.cover.asks, self.cover.weight, 0)
+        return np.asarray(self.cover.sees[rows] @ weight)
+
     def _count(self, rows: IntArray, step: int) -> None:
         cover, kernel = self.cover, compiled(count_views, large=False)
         if kernel is None:

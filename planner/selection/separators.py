@@ -163,9 +163,8 @@ class SeparatorSearch:
         every = [*parts.whole, parts.last]
         for k, part in enumerate(every):
             self._part[part] = k
-        around = self._graph.links[near]
-        part_at = self._part[around.indices]
-        row = np.repeat(near, np.diff(around.indptr))
+        counts, ends = self._graph.ends(near)
+        part_at, row = self._part[ends], np.repeat(near, counts)
         for part in every:
             self._part[part] = -1
         return [np.unique(row[part_at == k]).astype(np.int64) for k in range(len(every))]

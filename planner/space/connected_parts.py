@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.geometry.ring_index import areas_within
+from stopgo.planner.geometry.ring_index import areas_within, triangles_of
 from stopgo.planner.geometry.shapes import GRID, polygon_parts
 
 
@@ -67,7 +67,7 @@ class Parts:
 def parts_of(drive_area: BaseGeometry, gaps: FloatArray) -> Parts:
     """Join the pieces of the drive area by the chains of gap crossings (k, 2, 2) between them."""
     pieces = tuple(sorted(polygon_parts(drive_area), key=lambda piece: piece.bounds))
-    triangles = [shapely.get_parts(shapely.constrained_delaunay_triangles(piece)) for piece in pieces]
+    triangles = [triangles_of(piece) for piece in pieces]
     cells = np.concatenate([np.empty(0, dtype=object), *triangles])
     piece_of = np.repeat(np.arange(len(pieces)), [len(some) for some in triangles]).astype(np.int64)
     tree = shapely.STRtree(cells)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from stopgo.planner.geometry.ring_index import FEW, RingIndex, areas_within
+from stopgo.planner.geometry import ring_index
+from stopgo.planner.geometry.ring_index import FEW, RingIndex, areas_within, triangles_of
 from stopgo.planner.geometry.shapes import polygon_parts
 
 
@@ -51,3 +52,14 @@ def test_areas_of_many_small_shapes_in_a_large_one() -> None:
     assert exact.max() > 0.1
     assert np.allclose(areas_within(cells, whole), exact, rtol=0.0, atol=1e-12)
     assert not len(areas_within(np.empty(0, dtype=object), whole))
+
+
+@pytest.mark.parametrize("angle", [0.0, 24.7])
+def test_triangles_cover_a_large_polygon_once(angle: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    slab = max(polygon_parts(_slabs(60, angle=angle)), key=lambda part: part.area)
+    monkeypatch.setattr(ring_index, "LONG", 3)
+    triangles = triangles_of(slab)
+    assert shapely.area(triangles).sum() == pytest.approx(slab.area)
+    assert shapely.area(shapely.symmetric_difference(shapely.union_all(triangles), slab)) < 1e-9
+    monkeypatch.undo()
+    assert len(triangles_of(slab)) < len(triangles)
