@@ -11,7 +11,14 @@ from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation
 from stopgo.planner.scan_simulation.casting import RayFan
-from stopgo.planner.scan_simulation.scanning import CLOUD_DEG, ScanCount, ScannerPose, incidence
+from stopgo.planner.scan_simulation.scanning import (
+    CLOUD_DEG,
+    ScanCount,
+    ScannerPose,
+    incidence,
+    is_sparse,
+    spread,
+)
 from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 ON_SURFACE_M = 0.02
@@ -58,6 +65,16 @@ class ModelScene:
         slope = np.einsum("ij,ij->i", normal, directions[hit])
         found[hit] = offset / np.where(slope == 0, np.nan, slope)
         return np.nan_to_num(found, nan=np.inf)
+
+    def measured(self, position: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance to the first triangle along each ray from a position, and cosine of the incidence (n,).
+
+        Both are infinite and 1 where there is no triangle.
+        """
+        origins = np.broadcast_to(position, directions.shape)
+        met = self._met(origins, directions)
+        slope = np.abs(np.einsum("ij,ij->i", self._normal[met], directions))
+        return self._away(met, origins, directions), np.where(met == NONE, 1.0, slope)
 
     def existing(self, strips: Strips) -> BoolArray:
         """True for cells that have a surface in the model (cells,): no opening of the wall is there."""
@@ -173,15 +190,21 @@ def _within(towards: FloatArray, far: FloatArray, pose: ScannerPose, simulation:
 
 
 def _cloud(scene: ModelScene, pose: ScannerPose, simulation: Simulation) -> FloatArray:
-    """Measured ends of rays, relative to the scanner (n, 3)."""
+    """Measured ends of rays, relative to the scanner (n, 3): few where points are dense enough, else all."""
     random = np.random.default_rng([simulation.seed, pose.number])
-    fan = RayFan.of(replace(simulation, step_deg=max(CLOUD_DEG, simulation.step_deg)), pose.heading)
+    fan = RayFan.of(simulation, pose.heading)
+    every = max(1, round(CLOUD_DEG / simulation.step_deg))
     found = []
     for block in fan.blocks():
-        directions = fan.directions(block).reshape(-1, 3)
-        away = scene.away(np.broadcast_to(pose.position, directions.shape), directions)
-        level = 1.0 if simulation.slant else np.hypot(directions[:, 0], directions[:, 1])
+        directions = fan.directions(block)
+        first = -block.start % every
+        few = directions[first::every, ::every]
+        far, slope = scene.measured(pose.position, few.reshape(-1, 3))
+        kept = spread(is_sparse(far, slope).reshape(few.shape[:2]), directions.shape[:2], first, every)
+        towards = directions[kept]
+        away, _ = scene.measured(pose.position, towards)
+        level = 1.0 if simulation.slant else np.hypot(towards[:, 0], towards[:, 1])
         near = (away > 0) & (away * level <= simulation.joining_m)
         measured = away[near] + random.normal(0.0, simulation.noise_m, int(near.sum()))
-        found.append(measured[:, None] * directions[near])
+        found.append(measured[:, None] * towards[near])
     return np.concatenate(found)

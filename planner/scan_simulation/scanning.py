@@ -103,10 +103,21 @@ def _in_cloud(
     far = distances(solids, position, few[hit], towards[hit])
     slope = np.abs(np.einsum("ij,ij->i", towards[hit], solids.normal[few[hit]]))
     sparse = np.zeros(few.shape, dtype=bool)
-    sparse[hit] = far * math.radians(CLOUD_DEG) > SPARSE_M * slope
-    kept: BoolArray = np.zeros(met.shape, dtype=bool)
-    if len(few):
-        columns, rows = (np.arange(count) for count in met.shape)
+    sparse[hit] = is_sparse(far, slope)
+    return spread(sparse, met.shape, first, every)
+
+
+def is_sparse(far: FloatArray, slope: FloatArray) -> BoolArray:
+    """True where points of a thinned cloud are too far apart, by distance and cosine of incidence (n,)."""
+    found: BoolArray = np.isfinite(far) & (far * math.radians(CLOUD_DEG) > SPARSE_M * slope)
+    return found
+
+
+def spread(sparse: BoolArray, shape: tuple[int, ...], first: int, every: int) -> BoolArray:
+    """Rays (columns, rows) that are kept: all around those that are `sparse`, else one of `every`."""
+    kept: BoolArray = np.zeros(shape, dtype=bool)
+    if len(sparse):
+        columns, rows = (np.arange(count) for count in shape)
         kept[:] = sparse[np.maximum(columns - first, 0) // every][:, rows // every]
         kept[first::every, ::every] = True
     return kept

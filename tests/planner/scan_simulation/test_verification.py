@@ -16,6 +16,7 @@ from stopgo.mission.document import MissionAllocation
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.files.coverage_json import Coverage, coverage_json
 from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.proof.plan_proof import PlanProof, Simulation
 from stopgo.mission.proof.proof_text import network_words
@@ -26,6 +27,7 @@ from stopgo.planner import plan
 from stopgo.planner.floors import read_floor
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
+from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model
 from stopgo.planner.scan_simulation.registration import (
     _CloudPair,
     _shift,
@@ -178,8 +180,9 @@ def test_the_same_seed_gives_the_same_proof() -> None:
 
 
 def clouds_of(
-    floor: FloorPlan, places: list[tuple[float, float]], simulation: Simulation
+    floor: FloorPlan, places: list[tuple[float, float]], simulation: Simulation, *, model: bool = False
 ) -> list[FloatArray]:
+    """Clouds at the extruded floor, or at the same solids as those of a `model`."""
     space = space_of(floor)
     solids = extruded(space.floor, [], simulation.ceiling_m)
     strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
@@ -187,6 +190,10 @@ def clouds_of(
         ScannerPose(frozen([x, y, 1.3] - np.array([*solids.origin, 0.0])), 0.0, number=k)
         for k, (x, y) in enumerate(places)
     ]
+    if model:
+        triangles = solids.corners + np.array([*solids.origin, 0.0])
+        scene = ModelScene(ModelSolids(frozen(triangles), simulation.ceiling_m), solids.origin)
+        return [scanned_model(scene, strips, stand, simulation).cloud for stand in stands]
     return [scanned(solids, strips, stand, simulation).cloud for stand in stands]
 
 
@@ -196,10 +203,11 @@ def pair_of(floor: FloorPlan, a: tuple[float, float], b: tuple[float, float], si
     return [item.pair for item in found]
 
 
-def test_a_cloud_has_all_rays_where_few_would_lie_too_far_apart() -> None:
+@pytest.mark.parametrize("model", [False, True])
+def test_a_cloud_has_all_rays_where_few_would_lie_too_far_apart(model: bool) -> None:
     """A hall 30 m long: rays every 0.4° lie 2 cm apart on the near end and 18 cm on the far one."""
     simulation = Simulation(range_m=5.0, joining_m=40.0, step_deg=0.2)
-    (cloud,) = clouds_of(hall(30, 4), [(3.0, 2.0)], simulation)
+    (cloud,) = clouds_of(hall(30, 4), [(3.0, 2.0)], simulation, model=model)
     level = np.abs(cloud[:, 2]) < 0.3
     for end, step in ((27.0, 1), (-3.0, 2)):
         there = level & (np.abs(cloud[:, 0] - end) < 0.1)
