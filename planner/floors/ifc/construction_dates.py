@@ -182,7 +182,7 @@ def _phases_in(sets: dict[str, dict[str, Any]]) -> tuple[str, str]:
     made = removed = ""
     for said in sets.values():
         for key, value in said.items():
-            if not isinstance(value, str):
+            if not (isinstance(key, str) and isinstance(value, str)):
                 continue
             if PHASE_NAMES.match(key):
                 made = made or value.strip()

@@ -100,10 +100,36 @@ def main(arguments: list[str]) -> int:
         return 2
     damage = tuple(_complaints())
     alone = frozenset(rest[1:])
-    entities = _shaped_entities(model)
-    shapes = one_by_one(model, entities, alone, Path(f"{out}.at")) if rest else all_at_once(model, entities)
-    Path(out).write_bytes(packed(extracted(model, shapes, damage=damage)))
+    try:
+        entities = _shaped_entities(model)
+        shapes = (
+            one_by_one(model, entities, alone, Path(f"{out}.at")) if rest else all_at_once(model, entities)
+        )
+        Path(out).write_bytes(packed(extracted(model, shapes, damage=damage)))
+    except Exception as error:  # noqa: BLE001 (the end of a process)
+        Path(f"{out}.why").write_text(_why_unread(model, error), encoding="utf-8")
+        return 2
     return 0
+
+
+def _why_unread(model: ifcopenshell.file, error: Exception) -> str:
+    """The reason why a model that was opened is not read: what its schema requires and it lacks, if so."""
+    lacking = next(_lacking(model), None)
+    if lacking is not None:
+        return f"is damaged ({lacking}); export it again"
+    said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    return f"cannot be read ({said}), which is a defect of stopgo; please report it with the model"
+
+
+def _lacking(model: ifcopenshell.file) -> Iterator[str]:
+    """Entities without an attribute that their schema requires, in words."""
+    schema = ifcopenshell.ifcopenshell_wrapper.schema_by_name(model.schema_identifier)
+    for entity in model:
+        declared: Any = schema.declaration_by_name(entity.is_a()).as_entity()
+        attributes = zip(declared.all_attributes(), declared.derived(), strict=True)
+        for number, (attribute, derived) in enumerate(attributes):
+            if not derived and not attribute.optional() and entity[number] in (None, ()):
+                yield f"#{entity.id()} {entity.is_a()} has no {attribute.name()}"
 
 
 def _complaints() -> Iterator[str]:

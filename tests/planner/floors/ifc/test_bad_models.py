@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import ifcopenshell
 import pytest
 
 from stopgo.command_line import main
@@ -36,6 +37,13 @@ def zipped(**files: str) -> bytes:
     return out.getvalue()
 
 
+def lacking(text: str, ifc_class: str, number: int) -> str:
+    """The model with `$` for an attribute of the last entity of a class."""
+    model = ifcopenshell.file.from_string(text)
+    model.by_type(ifc_class)[-1][number] = None
+    return model.to_string()
+
+
 Spoil = Callable[[str], bytes | str]
 BAD: dict[str, tuple[str, Spoil, str]] = {
     "text": ("m.ifc", lambda _: "hello", "is not an IFC file (it starts with b'hello'); export it as IFC"),
@@ -50,6 +58,22 @@ BAD: dict[str, tuple[str, Spoil, str]] = {
         lambda text: text.replace("DATA;", "DATA;\n#99x=IFCWALL(;;"),
         "cannot be read as IFC (",
     ),
+    "no container": (
+        "m.ifc",
+        lambda text: lacking(text, "IFCRELVOIDSELEMENT", 4),
+        "IfcRelVoidsElement has no RelatingBuildingElement); export it again",
+    ),
+    "no placement": (
+        "m.ifc",
+        lambda text: lacking(text, "IFCLOCALPLACEMENT", 1),
+        "IfcLocalPlacement has no RelativePlacement); export it again",
+    ),
+    "no items": (
+        "m.ifc",
+        lambda text: lacking(text, "IFCSHAPEREPRESENTATION", 3),
+        "is damaged (#",
+    ),
+    "no units": ("m.ifc", lambda text: lacking(text, "IFCUNITASSIGNMENT", 0), "has no Units); export it"),
     "nothing in it": ("m.ifc", lambda _: EMPTY, "holds no wall, slab, space or other element with a shape"),
     "a cut zip": ("m.ifczip", lambda text: zipped(m_ifc=text)[:3000], "cannot be unzipped"),
     "a zip of two": ("m.ifczip", lambda text: zipped(a_ifc=text, b_ifc=text), "holds 2 .ifc files"),

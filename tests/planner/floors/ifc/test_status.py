@@ -204,6 +204,15 @@ def test_a_product_has_the_phases_of_its_type_where_its_own_sets_name_none() -> 
     assert house.things["column"].id() not in found
 
 
+def test_a_property_without_a_name_takes_nothing_from_its_set() -> None:
+    house = two_rooms()
+    wall = house.things["north"]
+    with_phases(house, wall, "Phasing", {"Mark": "7", "Phase Created": "Shell"})
+    house.model.by_type("IfcPropertySingleValue")[0].Name = None
+    model = ifcopenshell.file.from_string(house.model.to_string())
+    assert phases_by_product(model)[wall.id()] == ("Shell", "")
+
+
 @pytest.mark.parametrize(
     ("kind", "attribute"),
     [
