@@ -38,7 +38,7 @@ CANCEL = "action_msgs/srv/CancelGoal"
 READY_S = 30.0
 """Longest wait for the first guard."""
 NOT_READY = "the process that stops the robot if this program ends is not ready"
-ENDED = "the process that stops the robot if this program ends has ended or hangs; it is started again"
+ENDED = "the process that stops the robot if this program ends has ended or hangs; starting another"
 
 
 class GoalGuard:

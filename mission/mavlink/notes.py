@@ -39,6 +39,8 @@ def _policy(mission: Mission) -> Iterator[str]:
         f"link_loss {policy.link_loss} and battery_min {policy.battery_min:g} are not sent: "
         "the vehicle has failsafe parameters of its own"
     )
+    if policy.own_way is True:
+        yield "own_way is not sent: the vehicle drives the legs"
 
 
 def _some(ids: list[str]) -> str:

@@ -32,7 +32,7 @@ FRAMES = 40
 END_S = 2.0
 STUCK_S = 1
 """Longest time for which a sign of life waits for a process that reads none, in whole seconds."""
-ENDED = "the process that stops the vehicle if this program ends has ended or hangs; started again"
+ENDED = "the process that stops the vehicle if this program ends has ended or hangs; starting another"
 
 
 class StopGuard:

@@ -217,6 +217,8 @@ def test_what_nobody_asks_for_is_not_noted():
     retried = first_stop(square_tour(), on_failure="retry", retries=2)
     assert translate(retried).notes[0].startswith("stop S1: a failed scan is tried again only by the station")
     assert "no item starts a scan: the station does" in translate(square_tour(), trigger="none").notes
+    free = changed(mission, policy=changed(mission.policy, own_way=True))
+    assert translate(free).notes[-1] == "own_way is not sent: the vehicle drives the legs"
 
 
 @pytest.mark.parametrize("name", NAMES)
