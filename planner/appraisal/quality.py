@@ -28,7 +28,8 @@ MOST_NAMED = 5
 def quality_of(selection: Selection) -> Quality | None:
     """Return the cost of the limits on views, each switched off alone; None if there are no limits.
 
-    The plans without a limit use a fast selection on the known visibility, so the cost is approximate.
+    The cost is the difference of two fast selections on the known visibility, with and without the limit. It
+    is approximate: their scans need not register.
     """
     seen = selection.visibility
     settings = seen.settings
@@ -37,9 +38,11 @@ def quality_of(selection: Selection) -> Quality | None:
         return None
     in_sight = _in_sight(seen)
     stops, costs = len(selection.chosen), []
+    limited, _ = quick_estimate(_under(in_sight, settings))
     for key, words in limits.items():
-        fewer, bound = quick_estimate(_under(in_sight, without_limit(settings, key)))
-        costs.append(LimitCost(key, words, stops=stops, without=fewer, bound=bound))
+        free, bound = quick_estimate(_under(in_sight, without_limit(settings, key)))
+        without = max(bound, stops - max(0, limited - free))
+        costs.append(LimitCost(key, words, stops=stops, without=without, bound=bound))
     totals = totals_of_plan(seen)
     return Quality(tuple(costs), totals.amount(in_sight.visible), totals.amount(_possible(seen)))
 

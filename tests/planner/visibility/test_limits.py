@@ -46,10 +46,12 @@ PLANNED = LAYERED if FULL else LAYERED[:1]
 def test_without_limits_a_plan_is_what_it_was_before(floor: Path) -> None:
     if not floor.exists():
         pytest.skip(f"{floor} is not at hand")
-    document = msgspec.to_builtins(plan(read_floor(floor), Settings(register=False)).mission)
+    document = msgspec.to_builtins(
+        plan(read_floor(floor), Settings(register=False, max_incidence=90.0)).mission
+    )
     told = {key: document[key] for key in ("robot", "scanner", "start", "stops", "return")}
     assert "limits" not in document
-    assert not {"views", "max_incidence", "near", "scanner"} & set(document["origin"]["parameters"])
+    assert not {"views", "near", "scanner"} & set(document["origin"]["parameters"])
     assert hashlib.sha256(canonical(told)).hexdigest()[:16] == WITHOUT_LIMITS[floor.stem]
 
 
@@ -153,7 +155,18 @@ def test_each_limit_is_reported_with_about_what_it_costs() -> None:
     report = PlanReport(made, {}, {})
     assert len(report.as_json()["limits"]["costs"]) == 4
     assert "from 2 stops" in report.as_text()
-    assert plan(FLOOR, Settings()).first.figures.quality is None
+    assert plan(FLOOR, Settings(max_incidence=90.0)).first.figures.quality is None
+
+
+def test_a_limit_is_not_blamed_for_what_registration_costs() -> None:
+    """A scanner that sees 100° takes two more stops to register."""
+    floor = hall(14, 5)
+    made = plan(floor, Settings(fov=100.0, range=4.0)).first
+    alone = plan(floor, Settings(fov=100.0, range=4.0, register=False)).first
+    assert len(made.mission.stops) > len(alone.mission.stops)
+    quality = made.figures.quality
+    assert quality is not None
+    assert [(item.limit, item.stops - item.without) for item in quality.costs] == [("max_incidence", 0)]
 
 
 def test_what_cannot_be_seen_as_asked_is_reported_and_strict_refuses_it() -> None:
