@@ -41,7 +41,10 @@ ALL_PAIRS_UP_TO = 500
 
 
 BOUNDS_UP_TO = 2000
-"""Points up to which lower bounds on the lengths of all pairs are used too, for the bound of a tour."""
+"""Points up to which the bound of a tour comes from lower bounds on the lengths of all pairs.
+
+At 700 to 1 400 points it is 0 to 3 % higher than that of `nearby_bound`, at about the same cost.
+"""
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def _route_over_nearby(
     """The route over many points, of which only near pairs have exact lengths.
 
     The tour is searched over upper bounds on all other lengths, so that it is no longer than it seems. Its
-    own lengths are then exact. Its bound is that of `nearby_bound`, or of fewer points the better of two.
+    own lengths are then exact.
     """
     paths = nearby_paths_between(selection.space, points)
     if not paths.connected:
@@ -94,9 +97,10 @@ def _route_over_nearby(
     del matrix
     sequence = _sequence(order, ends, len(points))
     legs = paths.learn(np.stack([sequence, np.roll(sequence, -1)], axis=1))
-    bound = _bound_over_nearby(paths, float(legs.sum() if ends.closed else legs[:-1].sum()), ends)
     if len(points) <= BOUNDS_UP_TO:
-        bound = max(bound, tour_bound(paths.at_least(), sequence, ends))
+        bound = tour_bound(paths.at_least(), sequence, ends)
+    else:
+        bound = _bound_over_nearby(paths, float(legs.sum() if ends.closed else legs[:-1].sum()), ends)
     return assembled(selection, points, paths, sequence, ends, bound, METHODS["default"])
 
 
