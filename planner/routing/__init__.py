@@ -38,8 +38,6 @@ GRAPHS: dict[str, Graph] = {"exact": paths_between, "grid": grid_paths}
 
 ALL_PAIRS_UP_TO = 500
 """Points up to which the paths between all pairs are found first."""
-
-
 BOUNDS_UP_TO = 2000
 """Points up to which the bound of a tour comes from lower bounds on the lengths of all pairs.
 

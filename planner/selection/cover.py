@@ -72,11 +72,6 @@ class Cover:
         return _sorted(self.sees.T)
 
     @cached_property
-    def seers(self) -> IntArray:
-        """Number of rows that see each column (columns,)."""
-        return np.diff(self.seen_by.indptr).astype(np.int64)
-
-    @cached_property
     def adds_to(self) -> csr_array:
         """The transpose of `worth` (columns, demands)."""
         return _sorted(self.worth.T)

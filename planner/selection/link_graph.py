@@ -10,8 +10,16 @@ from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.component_kernel import grow_parts
 from stopgo.planner.visibility.unit_ranges import ranges
+
+
+@instance_cached
+def adjacency_of(links: csr_array) -> tuple[IntArray, IntArray]:
+    """First link of each row and the rows of all links, in 64-bit integers."""
+    first, to = (np.ascontiguousarray(part, np.int64) for part in (links.indptr, links.indices))
+    return first, to
 
 
 class LinkedParts(NamedTuple):
@@ -29,9 +37,7 @@ class LinkGraph:
     def __init__(self, links: csr_array) -> None:
         self.links = links
         rows = links.shape[0]
-        self._first, self._to = (
-            np.ascontiguousarray(part, np.int64) for part in (links.indptr, links.indices)
-        )
+        self._first, self._to = adjacency_of(links)
         self._label = np.full(rows, -1, dtype=np.int64)
         self._is_end = np.zeros(rows, dtype=bool)
         self._following, self._met = (np.zeros(rows, dtype=np.int64) for _ in range(2))

@@ -11,16 +11,15 @@ from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
-from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.link_graph import LinkedParts, LinkGraph
+from stopgo.planner.selection.link_graph import LinkedParts, LinkGraph, adjacency_of
 from stopgo.planner.selection.running_coverage import RunningCoverage
 
 
 def components_of(links: csr_array, rows: IntArray) -> list[IntArray]:
     """Connected components of the rows, the largest first, then by the lowest row."""
-    rows = _without(links, rows)
+    rows = np.flatnonzero(_mask(links, rows)).astype(np.int64)
     if not len(rows):
         return []
     label = _labels(links, rows)
@@ -35,15 +34,8 @@ def _labels(links: csr_array, rows: IntArray) -> IntArray:
     if kernel is None:
         return np.asarray(connected_components(links[rows][:, rows], directed=False)[1])
     label, stack = np.full(links.shape[0], -1, dtype=np.int64), np.empty(links.shape[0], dtype=np.int64)
-    kernel(*_adjacency(links), _mask(links, rows).astype(np.int64), label, stack)
+    kernel(*adjacency_of(links), _mask(links, rows).astype(np.int64), label, stack)
     return label[rows]
-
-
-@instance_cached
-def _adjacency(links: csr_array) -> tuple[IntArray, IntArray]:
-    """First link of each row and the rows of all links, in 64-bit integers."""
-    first, to = (np.ascontiguousarray(part, np.int64) for part in (links.indptr, links.indices))
-    return first, to
 
 
 def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
@@ -198,28 +190,8 @@ class Conditions:
         return np.array([1.0 - len(ends) for _, ends in self._known])
 
 
-def _without(links: csr_array, rows: IntArray, *others: IntArray) -> IntArray:
-    """The rows that are in none of the others, once each and ascending."""
-    kept = _mask(links, rows)
-    for some in others:
-        kept[some] = False
-    return np.flatnonzero(kept).astype(np.int64)
-
-
-def _mask(links: csr_array, *sets: IntArray) -> BoolArray:
-    """True for each row that is in one of the sets (all rows,)."""
+def _mask(links: csr_array, rows: IntArray) -> BoolArray:
+    """True for each of these rows (all rows,)."""
     found = np.zeros(links.shape[0], dtype=bool)
-    for some in sets:
-        found[some] = True
+    found[rows] = True
     return found
-
-
-def meets(cover: Cover, rows: IntArray) -> bool:
-    """True if these rows meet every demand."""
-    if 2 * len(rows) < cover.rows:
-        covered = cover.covered_by(rows)
-    else:
-        others = np.ones(cover.rows, dtype=bool)
-        others[rows] = False
-        covered = cover.seers - cover.covered_by(np.flatnonzero(others))
-    return not cover.missing(covered).any()

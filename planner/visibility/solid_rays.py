@@ -190,8 +190,8 @@ def _on_faces(space: NavigableSpace, triangles: FloatArray, z: FloatArray) -> tu
     points = shapely.points(space.targets.unit_xy)
     unit, face = shapely.STRtree(plan).query(points, predicate="dwithin", distance=ON_FACE_M)
     direction = _direction(upright[face])
-    along = _along(space)[unit]
-    same = np.abs(along[:, 0] * direction[:, 1] - along[:, 1] * direction[:, 0]) <= PARALLEL
+    own = _along(space)[unit]
+    same = np.abs(own[:, 0] * direction[:, 1] - own[:, 1] * direction[:, 0]) <= PARALLEL
     unit, face, direction = unit[same], face[same], direction[same]
     found = np.zeros(z.shape, dtype=bool)
     along = upright[face, :, :2] - space.targets.unit_xy[unit, None]

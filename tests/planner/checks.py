@@ -18,6 +18,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
 from stopgo.planner.routing.roadmap import paths_between
+from stopgo.planner.selection.cover import Cover
 from stopgo.planner.space.targets import face_segments
 from stopgo.planner.visibility.exact_sight import viewpoints_of
 from tests.faults.sizes import FULL
@@ -242,6 +243,11 @@ def seen_by_eyes(found: Candidates, eyes: np.ndarray) -> np.ndarray:
         targets.occluding,
         reach=round(space.settings.range / GRID),
     )
+
+
+def meets(cover: Cover, rows: np.ndarray) -> bool:
+    """True if these rows meet every demand."""
+    return not cover.missing(cover.covered_by(rows)).any()
 
 
 def check_rooms_are_joined(space: NavigableSpace) -> int:

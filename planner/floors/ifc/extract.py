@@ -107,6 +107,7 @@ def main(arguments: list[str]) -> int:
         )
         Path(out).write_bytes(packed(extracted(model, shapes, damage=damage)))
     except Exception as error:  # noqa: BLE001 (the end of a process)
+        Path(out).unlink(missing_ok=True)  # on a full disk it leaves room for the reason
         Path(f"{out}.why").write_text(_why_unread(model, error), encoding="utf-8")
         return 2
     return 0
@@ -114,22 +115,35 @@ def main(arguments: list[str]) -> int:
 
 def _why_unread(model: ifcopenshell.file, error: Exception) -> str:
     """The reason why a model that was opened is not read: what its schema requires and it lacks, if so."""
-    lacking = next(_lacking(model), None)
-    if lacking is not None:
-        return f"is damaged ({lacking}); export it again"
+    if isinstance(error, MemoryError):
+        return "takes more memory than there is; export one building or storey"
+    if isinstance(error, OSError):
+        return f"cannot be read ({error.strerror or error}); free space for temporary files"
+    lacking = _lacking(model)
+    if lacking:
+        return f"is damaged ({'; '.join(lacking[:MOST_COMPLAINTS])}); export it again"
     said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
     return f"cannot be read ({said}), which is a defect of stopgo; please report it with the model"
 
 
-def _lacking(model: ifcopenshell.file) -> Iterator[str]:
-    """Entities without an attribute that their schema requires, in words."""
+def _lacking(model: ifcopenshell.file) -> list[str]:
+    """One entity of each class that lacks an attribute which its schema requires, for each such attribute."""
     schema = ifcopenshell.ifcopenshell_wrapper.schema_by_name(model.schema_identifier)
+    found: dict[tuple[str, str], str] = {}
     for entity in model:
         declared: Any = schema.declaration_by_name(entity.is_a()).as_entity()
         attributes = zip(declared.all_attributes(), declared.derived(), strict=True)
         for number, (attribute, derived) in enumerate(attributes):
-            if not derived and not attribute.optional() and entity[number] in (None, ()):
-                yield f"#{entity.id()} {entity.is_a()} has no {attribute.name()}"
+            if not derived and not attribute.optional() and _is_missing(attribute, entity[number]):
+                words = f"#{entity.id()} {entity.is_a()} has no {attribute.name()}"
+                found.setdefault((entity.is_a(), attribute.name()), words)
+    return list(found.values())
+
+
+def _is_missing(attribute: Any, value: Any) -> bool:
+    """True if an attribute has no value, or an empty one where its schema requires an item."""
+    several = attribute.type_of_attribute().as_aggregation_type()
+    return value is None or (value == () and several is not None and several.bound1() > 0)
 
 
 def _complaints() -> Iterator[str]:

@@ -182,7 +182,7 @@ def _crashed_at(out: Path, code: int, path: Path) -> str:
 
 def _why(out: Path, code: int, path: Path) -> str:
     why = Path(f"{out}.why")
-    if why.exists():
+    if why.exists() and why.stat().st_size:
         return f"{path}: {why.read_text(encoding='utf-8')}"
     if code == -signal.SIGKILL:
         return f"{path}: reading it was killed, probably for lack of memory; export one building or storey"

@@ -15,8 +15,9 @@ from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.connected_selection import ConnectedCover, connected
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.separators import components_of, meets
+from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size
+from tests.planner.checks import meets
 from tests.planner.kernels import interpret
 
 EXACT = Settings(selector="exact")

@@ -12,8 +12,8 @@ from stopgo.planner.selection.connected_selection import ConnectedCover, connect
 from stopgo.planner.selection.districts import improved_by_districts
 from stopgo.planner.selection.greedy import greedy
 from stopgo.planner.selection.improve import improved
-from stopgo.planner.selection.separators import meets
 from tests.faults.sizes import size
+from tests.planner.checks import meets
 from tests.planner.selection.test_connected_selection import task_of
 from tests.planner.selection.test_swaps import cover_of_rooms
 

@@ -14,8 +14,9 @@ from stopgo.planner.selection.connected_selection import ConnectedCover
 from stopgo.planner.selection.greedy import greedy
 from stopgo.planner.selection.link_graph import LinkGraph
 from stopgo.planner.selection.running_coverage import RunningCoverage
-from stopgo.planner.selection.separators import components_of, meets, regions_of
+from stopgo.planner.selection.separators import components_of, regions_of
 from tests.faults.sizes import size
+from tests.planner.checks import meets
 from tests.planner.kernels import interpret
 from tests.planner.selection.test_connected_selection import task_of
 from tests.planner.selection.test_swaps import cover_of_rooms
