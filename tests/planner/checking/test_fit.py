@@ -152,14 +152,6 @@ def test_the_return_is_checked_too() -> None:
 # ---- the command ----
 
 
-@pytest.fixture
-def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
-    """A planned mission; its floor lies next to it."""
-    assert main(["plan", str(drawn(tmp_path / "floor.dxf")), "-o", str(tmp_path)]) == 0
-    capsys.readouterr()
-    return tmp_path / "mission.json"
-
-
 def problems(mission: Path, floor: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, str]]:
     assert main(["check", str(mission), "--floor", str(floor), "--json"]) == 1
     found: list[dict[str, str]] = json.loads(capsys.readouterr().out)["problems"]
