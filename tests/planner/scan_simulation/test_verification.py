@@ -25,7 +25,6 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.floors import read_floor
-from stopgo.planner.scan_simulation import verification
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
 from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model
@@ -58,12 +57,6 @@ from tests.planner.worlds import (
 
 COARSE = Simulation(range_m=10.0, step_deg=0.2)
 COARSEST = Simulation(range_m=10.0, step_deg=0.5)
-
-
-@pytest.fixture
-def no_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Register no scans: the test asks what each one acquires, and registration takes most of the time."""
-    monkeypatch.setattr(verification, "registered", lambda *given: ())
 
 
 def verified(floor: FloorPlan, settings: Settings, simulation: Simulation = COARSE) -> PlanProof:

@@ -12,7 +12,6 @@ import pytest
 from stopgo.command_line import main
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.floors.ifc import loading
-from stopgo.planner.scan_simulation import verification
 from tests.planner.floors.ifc.conftest import Read, in_process
 from tests.planner.floors.ifc.house import House, two_rooms
 
@@ -42,12 +41,6 @@ def boarded(models: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(loading, "_run", in_process)
         return path, planned(path, "--no-register")
-
-
-@pytest.fixture
-def no_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Register no scans: the test asks what they acquire, and registration takes most of the time."""
-    monkeypatch.setattr(verification, "registered", lambda *given: ())
 
 
 def test_bare_rooms_are_seen_over_their_whole_height(read: Read, tmp_path: Path) -> None:
