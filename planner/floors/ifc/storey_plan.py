@@ -84,7 +84,7 @@ def _with_heights(item: Element, model: Model, level: Level) -> Element:
     mesh = model.meshes.get(item.global_id or "")
     if mesh is None:
         return item
-    low, high = (round(z - level.z, 4) for z in mesh.z)
+    low, high = (round(z - level.z, 4) + 0.0 for z in mesh.z)  # no minus zero
     return replace(item, heights=(low, high))
 
 
