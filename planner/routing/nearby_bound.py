@@ -25,6 +25,8 @@ STEPS = 1_000
 """Most one-trees; a count, so that the bound does not depend on speed."""
 WORK = 30_000_000
 """Edges sorted in all one-trees together, so that those of long tours are fewer."""
+FIRST_STEP = 1.0
+"""First change of a weight, in lengths of half a mean edge; twice as long ones never reach a higher bound."""
 
 
 def nearby_bound(paths: NearbyPaths, last: FloatArray | None, *, best: int) -> int:
@@ -34,7 +36,8 @@ def nearby_bound(paths: NearbyPaths, last: FloatArray | None, *, best: int) -> i
     closes the tour.
     """
     tree = _NearTree(paths, last)
-    return highest(tree.at, tree.points + 1, best=best, steps=min(STEPS, WORK // tree.edges))[0]
+    steps = min(STEPS, WORK // tree.edges)
+    return highest(tree.at, tree.points + 1, best=best, steps=steps, first_step=FIRST_STEP)[0]
 
 
 class _NearTree:
