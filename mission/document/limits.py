@@ -86,6 +86,11 @@ def scanner_height(settings: Settings) -> float:
     return settings.scanner_height or settings.scan_height or SCANNER_HEIGHT_M
 
 
+def section_height(settings: Settings) -> float:
+    """Return the metres from the floor to the section of its model that the floor is drawn by."""
+    return settings.scan_height or SCANNER_HEIGHT_M
+
+
 def limits_in_words(limits: LimitsSpec | UnsetType, *, brief: bool = False) -> dict[str, str]:
     """Return the texts of the limits, by the parameters that set them."""
     if isinstance(limits, UnsetType):

@@ -43,7 +43,7 @@ READERS: tuple[Reader, ...] = (
         kind="building model",
         suffixes=(".ifc", ".ifczip"),
         holds=lambda data: b"ISO-10303-21" in data[:1024] or _is_zipped_model(data),
-        module="stopgo.planner.floors.ifc",
+        module="stopgo.planner.floors.ifc.storey_reader",
         takes=frozenset(
             {
                 *("storey", "level", "scan_height", "robot_height", "date", "since", "schedule"),

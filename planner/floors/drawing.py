@@ -18,6 +18,7 @@ from ezdxf.lldxf.tagger import binary_tags_loader
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
+from stopgo.planner.floors.legible_text import legible
 
 BROKEN_INPUT = (
     ezdxf.DXFError,
@@ -145,10 +146,3 @@ def _recover(data: bytes, *, source: Path, cause: BaseException) -> tuple[Drawin
 
 def _one_line(error: BaseException) -> str:
     return legible(str(error)) or type(error).__name__
-
-
-def legible(text: str, *, most: int = 120) -> str:
-    """Return text from a file as one line that every terminal and file accepts."""
-    sound = text.encode("utf-8", errors="replace").decode("utf-8")
-    line = " ".join(sound.split())
-    return "".join(letter if letter.isprintable() else "?" for letter in line)[:most]

@@ -12,8 +12,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.geometry import FloatArray, polyline_length
+from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.linework.swings import swings_of
-from stopgo.planner.floors.strokes import Stroke
 
 DrawingBox = tuple[float, float, float, float]
 """x0, y0, x1, y1 in metres."""

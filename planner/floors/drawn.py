@@ -13,6 +13,7 @@ import shapely
 
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, polyline_length, ring_area
+from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.rings import (
     GAP,
     SNAP,
@@ -25,7 +26,6 @@ from stopgo.planner.floors.rings import (
     repaired,
     without_repeats,
 )
-from stopgo.planner.floors.strokes import Stroke
 
 
 @dataclass(frozen=True)

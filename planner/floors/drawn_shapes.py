@@ -17,9 +17,10 @@ from ezdxf.xclip import XClip
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
-from stopgo.planner.floors.drawing import BROKEN_INPUT, legible
+from stopgo.planner.floors.drawing import BROKEN_INPUT
 from stopgo.planner.floors.layer_names import LayerReading
 from stopgo.planner.floors.layers import IGNORE, ROLES, Layers
+from stopgo.planner.floors.legible_text import legible
 from stopgo.planner.geometry.instance_cache import instance_cached
 
 _PREFIX = re.compile(r"^.*(\$\d+\$|\|)")

@@ -20,9 +20,10 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import bounds
 from stopgo.mission.settings.layer_kinds import layer_option
-from stopgo.planner.floors.drawing import legible, open_drawing
+from stopgo.planner.floors.drawing import open_drawing
 from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
+from stopgo.planner.floors.legible_text import legible
 from stopgo.planner.floors.linework import Derived, as_room_name, completed, derived
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.raised_floor import with_heights

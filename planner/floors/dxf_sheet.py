@@ -13,12 +13,13 @@ from ezdxf.entities import DXFEntity, Insert
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
 from stopgo.mission.settings.layer_kinds import layer_option
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
 from stopgo.planner.floors.drawn_shapes import Shape, shapes_of
 from stopgo.planner.floors.layers import BY_GEOMETRY, Layers, is_layered, missing_in
+from stopgo.planner.floors.legible_text import legible
+from stopgo.planner.floors.lines_and_texts import Stroke, Word
 from stopgo.planner.floors.reader import FloorOptions
-from stopgo.planner.floors.strokes import Stroke, Word, strokes_of
+from stopgo.planner.floors.strokes import strokes_of
 from stopgo.planner.floors.units import unit_of
 from stopgo.planner.geometry.instance_cache import instance_cached
 

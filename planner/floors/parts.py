@@ -14,10 +14,10 @@ from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawn import Drawn, drawn, outline_faces
 from stopgo.planner.floors.elements import elements_of
 from stopgo.planner.floors.joints import without_joints
+from stopgo.planner.floors.lines_and_texts import Stroke, Word
 from stopgo.planner.floors.openings import openings_of
 from stopgo.planner.floors.rings import GAP, SNAP, Region, canonical_region, even_odd
 from stopgo.planner.floors.rooms import rooms_of
-from stopgo.planner.floors.strokes import Stroke, Word
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ import shapely
 
 from stopgo.mission.floor import Finding, Room
 from stopgo.planner.floors.drawn import Anomaly, Closed, Drawn, hole_indices, outline_faces, place, region_key
+from stopgo.planner.floors.lines_and_texts import Word
 from stopgo.planner.floors.rings import Region, canonical_region, parents, polygons_of
-from stopgo.planner.floors.strokes import Word
 
 _NOISE = 1e-4
 """Area in m² below which an overlap of two rooms is numerical noise."""

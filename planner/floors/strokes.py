@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -15,8 +15,10 @@ from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, frozen, ring_area
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.curves import LARGEST, Curve, Fineness, curves_of
-from stopgo.planner.floors.drawing import BROKEN_INPUT, legible
+from stopgo.planner.floors.drawing import BROKEN_INPUT
 from stopgo.planner.floors.drawn_shapes import Shape
+from stopgo.planner.floors.legible_text import legible
+from stopgo.planner.floors.lines_and_texts import Stroke, Word
 from stopgo.planner.floors.rings import depths
 
 SAGITTA = 0.001
@@ -24,34 +26,6 @@ SAGITTA = 0.001
 SMALLEST = 1e-12
 """A coordinate nearer to 0 than this, in any unit, is 0: so small a number cannot be divided by."""
 _COARSE = Fineness(chord=LARGEST, sagitta=LARGEST)
-
-
-@dataclass(frozen=True, eq=False)
-class Stroke:
-    """A polyline (n, 2) in metres on a layer; a `closed` one need not repeat its first point."""
-
-    points: FloatArray
-    layer: str
-    role: str
-    closed: bool = False
-    curved: bool = False
-    """Drawn as one arc."""
-    fill: bool = False
-    """One boundary of a hatch: counter-clockwise around what is filled, clockwise around a hole."""
-    global_id: str | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Word:
-    """A text, and its possible positions: the insertion point and the alignment point.
-
-    A dimension or another note is a word without text.
-    """
-
-    text: str
-    layer: str
-    role: str
-    at: tuple[tuple[float, float], ...] = ()
 
 
 def sketch(shapes: Iterable[Shape]) -> list[FloatArray]:

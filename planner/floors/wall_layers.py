@@ -24,10 +24,11 @@ from stopgo.mission.geometry import polyline_length
 from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.dxf_sheet import DxfSheet, layers_of, sheet_of
+from stopgo.planner.floors.lines_and_texts import Word
 from stopgo.planner.floors.linework import Derived
 from stopgo.planner.floors.reader import FloorOptions
 from stopgo.planner.floors.room_words import names_a_room
-from stopgo.planner.floors.strokes import Word, sketch
+from stopgo.planner.floors.strokes import sketch
 from stopgo.planner.floors.units import UnitAsked
 from stopgo.planner.floors.written_measures import area_in
 

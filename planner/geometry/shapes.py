@@ -79,6 +79,8 @@ def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
     union, the union is made again on a grid far finer than SLACK, which is reliable.
     """
     found = np.array(list(shapes), dtype=object)
+    if len(found) == 1 and found[0].geom_type == "Polygon" and found[0].is_valid:
+        return shapely.normalize(shapely.remove_repeated_points(found[0]))
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
     whole = shapely.union_all(ordered)
     if len(found) > 1:

@@ -17,6 +17,7 @@ from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.one_tree_kernel import join_all
 from stopgo.planner.routing.tour import nanometres
+from stopgo.planner.routing.tour_bound import highest
 
 NEAREST = 24
 """Near points of each point."""
@@ -24,10 +25,8 @@ STEPS = 1_000
 """Most one-trees; a count, so that the bound does not depend on speed."""
 WORK = 30_000_000
 """Edges sorted in all one-trees together, so that those of long tours are fewer."""
-PATIENCE = 12
-"""One-trees without a higher bound after which steps are halved."""
-MEMORY = 0.3
-"""Weight of the previous direction in each step's direction."""
+FIRST_STEP = 1.0
+"""First change of a weight, in lengths of half a mean edge; twice as long ones never reach a higher bound."""
 
 
 def nearby_bound(paths: NearbyPaths, last: FloatArray | None, *, best: int) -> int:
@@ -37,21 +36,8 @@ def nearby_bound(paths: NearbyPaths, last: FloatArray | None, *, best: int) -> i
     closes the tour.
     """
     tree = _NearTree(paths, last)
-    weight, direction = np.zeros(tree.points + 1), np.zeros(tree.points + 1)
-    value, degree = tree.at(weight.astype(np.int64))
-    most, scale, waited = value, 1.0, 0
-    for _ in range(min(STEPS, WORK // tree.edges)):
-        off = (degree - 2).astype(float)
-        if not off.any() or most >= best:
-            break
-        direction = off + MEMORY * direction
-        weight += scale * max(best - value, 1) / float((off * off).sum()) * direction
-        value, degree = tree.at(np.rint(weight).astype(np.int64))
-        waited = 0 if value > most else waited + 1
-        most = max(most, value)
-        if waited == PATIENCE:
-            scale, waited = scale / 2, 0
-    return most
+    steps = min(STEPS, WORK // tree.edges)
+    return highest(tree.at, tree.points + 1, best=best, steps=steps, first_step=FIRST_STEP)[0]
 
 
 class _NearTree:

@@ -22,6 +22,8 @@ COMPARE_ALL_UP_TO = 9
 """Points up to which comparing all tours is quicker than a search."""
 ROUNDS = 100
 """Perturbations per point that are tried; a count, so that plans do not depend on speed."""
+MOST_TRIALS = 100_000
+"""Perturbations of a long tour: of rooms along corridors ten per point find the tour of a hundred."""
 SHORT = 30
 """Points of a short tour, which is mostly found in the first search."""
 ROUNDS_OF_SHORT = 20
@@ -46,7 +48,7 @@ def shortest_tour(lengths: FloatArray, *, seed: int) -> IntArray:
     if n <= COMPARE_ALL_UP_TO:
         return canonical(best_of_all(cost))
     rounds = ROUNDS_OF_SHORT if n <= SHORT else ROUNDS
-    return canonical(search(cost, trials(cost, rounds * n, seed=seed)))
+    return canonical(search(cost, trials(cost, min(rounds * n, MOST_TRIALS), seed=seed)))
 
 
 def nanometres(lengths: FloatArray) -> IntArray:

@@ -1,8 +1,8 @@
 """A lower bound on a tour's length from smallest one-trees, and the edges that a shorter tour may use.
 
 Held and Karp, "The traveling-salesman problem and minimum spanning trees", Operations Research 1970;
-step sizes after Volgenant and Jonker, EJOR 1982. Weights are whole numbers like the lengths, so a
-one-tree's value is exact, however its weights were found.
+steps that shrink to nothing, after Volgenant and Jonker, EJOR 1982. Weights are whole numbers like the
+lengths, so a one-tree's value is exact, however its weights were found.
 """
 
 from __future__ import annotations
@@ -20,14 +20,19 @@ STEPS = 300
 """One-trees computed for few points; a count, so that the bound does not depend on speed."""
 FEW = 120
 """Points up to which branch and bound goes on from the bound."""
-WORK = 300_000_000
+WORK = 1_000_000_000
 """Edges examined in all one-trees of more points, so that those of long tours are fewer."""
 MOST_STEPS = 3_000
 """One-trees of more points."""
-PATIENCE = 12
-"""One-trees without a higher bound after which steps are halved."""
+FIRST_STEP = 2.0
+"""First change of a weight, in lengths of half a mean edge, for a point that is used once too often.
+
+Tours into corridors and back need weights of several edges: at 0.5 the bound of 300 such stops is 2.7 %
+lower, at 8 that of 1 000 is 4 % lower. Of stops in four far clusters the bound is 78 to 100 % of the route.
+With steps in proportion to the gap, halved without a gain, it was 68 to 90 %.
+"""
 MEMORY = 0.3
-"""Weight of the previous direction in each step's direction."""
+"""Share of the previous direction in each step's direction."""
 NEVER = np.iinfo(np.int64).max
 """Cost of an edge that must not be used."""
 
@@ -48,31 +53,43 @@ class OneTree:
 
 
 def one_tree_bound(cost: IntArray, *, best: int) -> OneTree:
-    """The one-tree of the highest value found; the length `best` of a tour sets the step size.
-
-    The weight of a point rises if a one-tree uses the point too often, and falls if too seldom. Every tour
-    changes by the same amount, so that the value less that amount remains a bound.
-    """
+    """The one-tree of the highest value found; a tour of the length `best` ends the search."""
     n = len(cost)
-    weight, direction = np.zeros(n), np.zeros(n)
-    highest = weight.astype(np.int64)
-    tree_at = _growing(cost)
-    value, degree = tree_at(highest)
-    most, scale, waited = value, 1.0, 0
-    for _ in range(STEPS if n <= FEW else min(MOST_STEPS, WORK // n**2)):
+    steps = STEPS if n <= FEW else min(MOST_STEPS, WORK // n**2)
+    _, weight = highest(_growing(cost), n, best=best, steps=steps)
+    return one_tree(cost, weight)
+
+
+def highest(
+    tree_at: Callable[[IntArray], tuple[int, IntArray]],
+    points: int,
+    *,
+    best: int,
+    steps: int,
+    first_step: float = FIRST_STEP,
+) -> tuple[int, IntArray]:
+    """The highest value found of one-trees at weights of the points, and these weights (points,).
+
+    The weight of a point rises if a one-tree uses the point too often, and falls if too seldom, by steps
+    that shrink to nothing with the square of those that are left. Every tour changes by the same amount, so
+    that the value less that amount remains a bound.
+    """
+    weight, before = np.zeros(points), np.zeros(points)
+    top = np.zeros(points, dtype=np.int64)
+    value, degree = tree_at(top)
+    most, longest = value, first_step * max(value, 1) / (2 * points)
+    for k in range(steps):
         off = (degree - 2).astype(float)
         if not off.any() or most >= best:
             break
-        direction = off + MEMORY * direction
-        weight += scale * max(best - value, 1) / float(off @ off) * direction
+        direction = (1 - MEMORY) * off + MEMORY * before if k else off
+        weight += longest * (1 - k / steps) ** 2 * direction
+        before = off
         rounded = np.rint(weight).astype(np.int64)
         value, degree = tree_at(rounded)
-        waited = 0 if value > most else waited + 1
         if value > most:
-            most, highest = value, rounded
-        if waited == PATIENCE:
-            scale, waited = scale / 2, 0
-    return one_tree(cost, highest)
+            most, top = value, rounded
+    return most, top
 
 
 def _growing(cost: IntArray) -> Callable[[IntArray], tuple[int, IntArray]]:

@@ -97,6 +97,13 @@ def iterated_search(
     return most
 
 
+def on_ring(index: int, n: int) -> int:
+    """The index on a ring of n that is one of -n to 2n - 1: a remainder without a division."""
+    if index < 0:
+        return index + n
+    return index if index < n else index - n
+
+
 def copy_tour(order: Any, best: Any) -> None:
     """Copy a tour."""
     for k in range(len(order)):
@@ -107,7 +114,7 @@ def enqueue(point: int, queue: Any, waiting: Any, state: Any) -> None:
     """Put a point into the queue, unless it is there already."""
     if waiting[point] == 0:
         waiting[point] = 1
-        queue[(state[QUEUE_HEAD] + state[QUEUE_LENGTH]) % len(queue)] = point
+        queue[on_ring(state[QUEUE_HEAD] + state[QUEUE_LENGTH], len(queue))] = point
         state[QUEUE_LENGTH] += 1
 
 
@@ -119,7 +126,7 @@ def improve(
     most = len(journal) // 2 - MOVE_REVERSALS
     while state[QUEUE_LENGTH] > 0 and state[REVERSALS] <= most:
         point = queue[state[QUEUE_HEAD]]
-        state[QUEUE_HEAD] = (state[QUEUE_HEAD] + 1) % len(queue)
+        state[QUEUE_HEAD] = on_ring(state[QUEUE_HEAD] + 1, len(queue))
         state[QUEUE_LENGTH] -= 1
         waiting[point] = 0
         gain = two_opt(point, cost, near, order, position, queue, waiting, journal, state)
@@ -146,14 +153,14 @@ def two_opt(
     n = len(order)
     reach = len(near) // n
     for step in range(1, -2, -2):
-        b = order[(position[a] + step) % n]
+        b = order[on_ring(position[a] + step, n)]
         ab = cost[a * n + b]
         for k in range(a * reach, a * reach + reach):
             c = near[k]
             ac = cost[a * n + c]
             if ac >= ab:
                 break
-            d = order[(position[c] + step) % n]
+            d = order[on_ring(position[c] + step, n)]
             gain = ab + cost[c * n + d] - ac - cost[b * n + d]
             if gain > 0:
                 first, last = (b, c) if step > 0 else (c, b)
@@ -180,10 +187,10 @@ def or_opt(
     """Move a stretch a..z next to a point near `a`, either way round, if shorter; return the gain, else 0."""
     n = len(order)
     for step in range(1, -2, -2):
-        before = order[(position[a] - step) % n]
+        before = order[on_ring(position[a] - step, n)]
         z = a
         for size in range(1, LONGEST_SEGMENT + 1):
-            after = order[(position[z] + step) % n]
+            after = order[on_ring(position[z] + step, n)]
             saved = cost[before * n + a] + cost[z * n + after] - cost[before * n + after]
             c, d, gain = best_gap(a, z, size, step, saved, cost, near, order, position)
             if gain > 0:
@@ -210,12 +217,12 @@ def best_gap(
         spare = saved - cost[a * n + c]
         if spare <= 0:
             break
-        if ((position[c] - position[a]) * step) % n < size:
+        if on_ring((position[c] - position[a]) * step, n) < size:
             continue
         for side in range(1, -2, -2):
-            d = order[(position[c] + side) % n]
+            d = order[on_ring(position[c] + side, n)]
             gain = spare + cost[c * n + d] - cost[z * n + d]
-            if gain > 0 and ((position[d] - position[a]) * step) % n >= size:
+            if gain > 0 and on_ring((position[d] - position[a]) * step, n) >= size:
                 return c, d, gain
     return a, a, 0
 
@@ -226,15 +233,15 @@ def move(
     """Put the stretch a..z, which runs along `step`, between the neighbours c and d, `a` next to c."""
     n = len(order)
     first, last = (a, z) if step > 0 else (z, a)
-    left, right = (c, d) if order[(position[c] + 1) % n] == d else (d, c)
-    if (position[left] - position[last]) % n <= (position[first] - position[right]) % n:
-        begin, end = order[(position[last] + 1) % n], left
+    left, right = (c, d) if order[on_ring(position[c] + 1, n)] == d else (d, c)
+    if on_ring(position[left] - position[last], n) <= on_ring(position[first] - position[right], n):
+        begin, end = order[on_ring(position[last] + 1, n)], left
         reverse(position[first], position[end], order, position, journal, state)
     else:
-        begin, end = right, order[(position[first] - 1) % n]
+        begin, end = right, order[on_ring(position[first] - 1, n)]
         reverse(position[begin], position[last], order, position, journal, state)
     turn_between(begin, end, order, position, journal, state)
-    if order[(position[a] + 1) % n] != c and order[(position[a] - 1) % n] != c:
+    if order[on_ring(position[a] + 1, n)] != c and order[on_ring(position[a] - 1, n)] != c:
         turn_between(a, z, order, position, journal, state)
 
 
@@ -252,9 +259,9 @@ def double_bridge(
     """Exchange the two stretches of the trial at `cut`; return the gain, mostly negative."""
     n = len(order)
     at, mid, far = trials[cut], trials[cut] + trials[cut + 1], trials[cut] + trials[cut + 1] + trials[cut + 2]
-    p, a = order[(at - 1) % n], order[at]
-    b, c = order[(mid - 1) % n], order[mid % n]
-    d, q = order[(far - 1) % n], order[far % n]
+    p, a = order[on_ring(at - 1, n)], order[at]
+    b, c = order[on_ring(mid - 1, n)], order[on_ring(mid, n)]
+    d, q = order[on_ring(far - 1, n)], order[on_ring(far, n)]
     reverse(position[a], position[d], order, position, journal, state)
     turn_between(c, d, order, position, journal, state)
     turn_between(a, b, order, position, journal, state)
@@ -271,7 +278,7 @@ def double_bridge(
 def turn_between(p: int, q: int, order: Any, position: Any, journal: Any, state: Any) -> None:
     """Reverse the shorter of the two stretches of the tour that end at p and q."""
     n = len(order)
-    if (position[q] - position[p]) % n <= (position[p] - position[q]) % n:
+    if on_ring(position[q] - position[p], n) <= on_ring(position[p] - position[q], n):
         reverse(position[p], position[q], order, position, journal, state)
     else:
         reverse(position[q], position[p], order, position, journal, state)
@@ -294,9 +301,9 @@ def undo(order: Any, position: Any, journal: Any, state: Any) -> None:
 def swap_ends(i: int, j: int, order: Any, position: Any) -> None:
     """Reverse indices i to j, or the rest of the tour if that is shorter: the cycle is the same."""
     n = len(order)
-    count = (j - i) % n + 1
+    count = on_ring(j - i, n) + 1
     if 2 * count > n:
-        i, j = (j + 1) % n, (i - 1) % n
+        i, j = on_ring(j + 1, n), on_ring(i - 1, n)
         count = n - count
     for _ in range(count // 2):
         p, q = order[i], order[j]

@@ -11,6 +11,8 @@ cpdef whole iterated_search(
     whole[::1] best, whole[::1] queue, whole[::1] waiting, whole[::1] journal, whole[::1] state
 ) noexcept nogil
 
+cdef whole on_ring(whole index, whole n) noexcept nogil
+
 @cython.locals(k=whole)
 cdef void copy_tour(whole[::1] order, whole[::1] best) noexcept nogil
 

@@ -102,7 +102,7 @@ class ModelScene:
 def sloped(strips: Strips, scene: ModelScene, height: float) -> tuple[Strips, BoolArray]:
     """The strips with those of sloping surfaces laid on them, and True for the units of these (units,).
 
-    A plan draws a sloping wall or a roof as its section at the scanner's height. An upright strip meets the
+    A plan draws a sloping wall or a roof as its section at this height. An upright strip meets the
     surface there alone; laid on the slope it is what the scanner sees of that unit.
     """
     first = strips.first_cell[:-1]

@@ -13,7 +13,7 @@ import shapely
 from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.document.limits import limits_of
+from stopgo.mission.document.limits import limits_of, section_height
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage
 from stopgo.mission.floor import FloorPlan
@@ -165,7 +165,7 @@ class _ScanSite:
         if model is None:
             return cls(space, simulation, doors, solids, strips)
         scene = ModelScene(model, solids.origin)
-        strips, sloping = sloped(strips, scene, simulation.height_m)
+        strips, sloping = sloped(strips, scene, section_height(space.settings))
         return cls(space, simulation, doors, solids, strips, scene, sloping)
 
     def scanned(self, pose: ScannerPose) -> ScanCount:

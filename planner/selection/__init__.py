@@ -23,7 +23,7 @@ from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.exact_cover import exact
 from stopgo.planner.selection.greedy import greedy, in_greedy_order
-from stopgo.planner.selection.improve import improved
+from stopgo.planner.selection.improve import EntriesLeft, improved, improved_otherwise, repaired_again
 from stopgo.planner.selection.separators import Conditions
 
 Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
@@ -36,6 +36,7 @@ def _greedy(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
 
 def _default(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
     rows, bound = _draft(cover, settings)
+    rows = improved_otherwise(cover, rows, at_least=bound, work=EntriesLeft())
     return rows, bound if len(rows) <= bound else max(bound, lower_bound(cover, found=len(rows)))
 
 
@@ -60,8 +61,6 @@ ROUNDS = 6
 """Rounds in which the default method adds cuts to connect its selection."""
 EXACT_ROUNDS = 60
 """The same for the exact method."""
-SWAPS_BETWEEN = 120
-"""Swaps in each of those rounds before the search for a smaller selection ends."""
 METHODS: dict[str, Selector] = {"default": _default, "greedy": _greedy, "exact": _exact, "anywhere": _default}
 NAMES = {
     "default": "greedy, drop-and-repair",
@@ -133,7 +132,7 @@ def _connected(
     if method.name == "exact":
         rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
     elif method.name == "default":
-        rows, bound = connected(task, Searches.default(settings), rounds=ROUNDS)
+        rows, bound = connected(task, Searches.default(task), rounds=ROUNDS)
     else:
         rows, bound = connected(task, lambda cover, *_: _solved(method, cover, settings), rounds=1)
     if method.ours and bound < len(rows):
@@ -147,19 +146,24 @@ class Searches:
     """Searches of our own methods for fewer rows, from a known solution and under conditions."""
 
     @staticmethod
-    def default(settings: Settings) -> Search:
-        """Drop-and-repair; it ignores the conditions, and its caller connects the components.
+    def default(task: ConnectedCover) -> Search:
+        """Drop-and-repair, under the conditions too, though not all of them are necessary.
 
-        It is for one task: the first bound holds for later problems too, which only have more demands.
+        The first bound holds for later problems too, which only have more demands. The rows found last are
+        repaired first, since they miss little but the newest demands.
         """
-        bound = 0
-        settled: set[int] = set()
+        bound, last, settled, work = 0, np.empty(0, np.int64), set[int](), EntriesLeft()
 
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
-            nonlocal bound
+            nonlocal bound, last
             bound = bound or lower_bound(cover, found=len(start), quickly=True)
-            better = improved(cover, start, at_least=bound, swaps=SWAPS_BETWEEN, settled=settled)
-            return better, bound
+            asked = cover.with_one_of_each(conditions.sets)
+            again = repaired_again(asked, last) if 0 < len(last) < len(start) else None
+            first = start if again is None else again
+            last = improved(asked, first, at_least=bound, settled=settled)
+            if not task.parts(last):
+                last = improved_otherwise(asked, last, at_least=bound, work=work)
+            return last, bound
 
         return search
 

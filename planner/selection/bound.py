@@ -13,9 +13,11 @@ from stopgo.planner.selection.linear_programme import minimised
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
 QUICK = 100_000
-"""Entries above which the relaxation takes up to seconds, and a first bound comes from the multipliers."""
+"""Entries above which the relaxation takes up to seconds, and a first bound comes from a coarse one."""
+COARSE = 30_000
+"""Entries of a coarse relaxation, about."""
 FIRST_STEPS = 100
-"""Steps of such a first bound."""
+"""Steps of a first bound by the multipliers, for problems that are too large for a relaxation."""
 FIRST_WORK = 40_000_000
 """Entries evaluated in all of them together."""
 STEPS = 1000
@@ -45,13 +47,13 @@ def lower_bound(cover: Cover, *, found: int, quickly: bool = False) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
     Small problems use the linear relaxation, large ones the multiplier bound; `quickly`, problems of more
-    than `QUICK` entries a few of its steps.
+    than `QUICK` entries a coarse relaxation, or a few steps of the multiplier bound.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
         return simple
     if quickly and entries > QUICK:
-        return first_bound(cover, found=found)
+        return max(simple, coarse_bound(cover)) if entries <= LARGEST else first_bound(cover, found=found)
     return max(
         simple, relaxation_bound(cover) if entries <= LARGEST else multiplier_bound(cover, found=found)
     )
@@ -133,6 +135,41 @@ def relaxation_bound(cover: Cover) -> int:
     """
     prices = _relaxation_prices(cover) if cover.needed.any() else None
     return 0 if prices is None else int(np.ceil(_dual_value(cover, *prices) - 1e-6))
+
+
+@instance_cached
+def coarse_bound(cover: Cover) -> int:
+    """Rounded-up bound at the prices of a relaxation in which neighbouring columns are one.
+
+    A group may be seen in part, and its columns have prices by their weight. By weak duality these too
+    prove a bound of the whole problem. It is a little weaker than the relaxation's, at a tenth of the time.
+    """
+    fraction = _group_fractions(cover, -(-cover.sees.nnz // COARSE))
+    of_group = csr_array((np.ones(cover.columns), fraction.indices, fraction.indptr), shape=fraction.shape)
+    asks = np.zeros(fraction.shape[1], dtype=np.int64)
+    asks[fraction.indices] = cover.asks
+    coarse = Cover(csr_array(cover.sees @ fraction), csr_array(cover.worth @ of_group), cover.needed, asks)
+    prices = _relaxation_prices(coarse)
+    if prices is None:
+        return 0
+    return int(np.ceil(_dual_value(cover, fraction @ prices[0], prices[1]) - 1e-6))
+
+
+def _group_fractions(cover: Cover, size: int) -> csr_array:
+    """Fraction of its group that each column is by weight (columns, groups).
+
+    Groups are up to `size` consecutive columns that add to the same demands and need as many views.
+    """
+    demands = np.split(cover.adds_to.indices, cover.adds_to.indptr[1:-1])
+    alike = [(*of.tolist(), -views) for of, views in zip(demands, cover.asks.tolist(), strict=True)]
+    group = np.zeros(cover.columns, dtype=np.int64)
+    members = 1
+    for k in range(1, cover.columns):
+        members = members + 1 if alike[k] == alike[k - 1] and members < size else 1
+        group[k] = group[k - 1] + (members == 1)
+    weight = np.maximum(cover.weight, 1).astype(float)
+    fraction = weight / np.bincount(group, weight)[group]
+    return csr_array((fraction, group, np.arange(cover.columns + 1)))
 
 
 def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:

@@ -178,6 +178,11 @@ class Conditions:
         return len(self._known) > before
 
     @property
+    def sets(self) -> list[IntArray]:
+        """The sets of rows, without their ends."""
+        return [np.frombuffer(between, np.int64) for between, _ in self._known]
+
+    @property
     def matrix(self) -> csr_array:
         entries = np.zeros((len(self._known), self.columns))
         for k, (between, ends) in enumerate(self._known):

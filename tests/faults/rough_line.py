@@ -18,12 +18,13 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.station.station import Station, connect
-from stopgo.mission.document import Mission
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.run.events import PoseReport, StateReport
 from tests.bridge.world import corridor
@@ -109,10 +110,10 @@ def whole_mission(station: Station, stops: int) -> dict[str, object]:
     """A document, then a run, watched to its end."""
     large = corridor(stops=stops)
     began = time.monotonic()
-    push(station, large)
+    answered(lambda: station.push(large))
     took_s = time.monotonic() - began
-    same = station.mission(large.id, 1) == large
-    push(station, corridor(stops=3, revision=2))
+    same = answered(lambda: station.mission(large.id, 1)) == large
+    answered(lambda: station.push(corridor(stops=3, revision=2)))
     station.command("start")
     reports = list(station.reports())
     events = [
@@ -125,18 +126,17 @@ def whole_mission(station: Station, stops: int) -> dict[str, object]:
         "numbers": [event.number for event in events],
         "told": [f"{type(event).__name__} {getattr(event, 'stop', '')}".strip() for event in events],
         "state": states[-1],
-        "journal": len(station.log()),
+        "journal": len(answered(station.log)),
     }
 
 
-def push(station: Station, mission: Mission) -> None:
-    """Push until the outcome is known: on such a line an answer may take longer than a station waits."""
+def answered(question: Callable[[], Any]) -> Any:
+    """The answer of the robot, asked until it is known: it may take longer than a station waits."""
     while True:
         try:
-            station.push(mission)
+            return question()
         except OutcomeUnknown:
             continue
-        return
 
 
 def tun(name: str, address: str) -> int:

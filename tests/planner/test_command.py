@@ -583,7 +583,8 @@ def test_ctrl_c_leaves_nothing_half_written(floor: Path, tmp_path: Path) -> None
     )  # fmt: skip
     assert done.returncode == 130
     assert "Traceback" not in done.stderr
-    assert len(done.stderr.splitlines()) <= 1
+    told = [line for line in done.stderr.splitlines() if not line.endswith(": running")]
+    assert told == ["stopgo: stopped by Ctrl-C"]  # a step that takes long is named before
     assert left_in(tmp_path / "out") == set()
 
 

@@ -96,7 +96,7 @@ def _dated_2x3(task: Any) -> Task | None:
 
 def _of_properties(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
     """Products whose own properties hold a day of start or finish."""
-    dated = _sets_with(model, (START_NAMES.search, FINISH_NAMES.search))
+    dated = _sets_with(model, (START_NAMES.search, FINISH_NAMES.search), holds=_day_in)
     for relation in model.by_type("IfcRelDefinesByProperties") if dated else ():
         properties = relation.RelatingPropertyDefinition
         if properties is None or properties.id() not in dated:
@@ -108,8 +108,13 @@ def _of_properties(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
                     yield item, Task(name, start, finish, source=f"property {name}")
 
 
-def _sets_with(model: ifcopenshell.file, patterns: tuple[Callable[[str], Any], ...]) -> dict[int, Any]:
-    """Property sets, by their numbers, with a property of which the name fits one of some patterns.
+def _sets_with(
+    model: ifcopenshell.file,
+    patterns: tuple[Callable[[str], Any], ...],
+    *,
+    holds: Callable[[Any], Any] = bool,
+) -> dict[int, Any]:
+    """Property sets, by their numbers, with a property that holds something and is named by a pattern.
 
     Few properties of a model do. So the names of all are looked at, and then only these sets are read.
     """
@@ -118,7 +123,7 @@ def _sets_with(model: ifcopenshell.file, patterns: tuple[Callable[[str], Any], .
     def fits(name: str) -> bool:
         return any(pattern(name) for pattern in patterns)
 
-    wanted = [item for item in model.by_type("IfcProperty") if fits(item[0] or "")]
+    wanted = [item for item in model.by_type("IfcProperty") if fits(item[0] or "") and holds(item)]
     holders = (holder for item in wanted for holder in model.get_inverse(item))
     return {holder.id(): holder for holder in holders if holder.is_a("IfcPropertySet")}
 
@@ -127,9 +132,7 @@ def _days_in(properties: Any) -> tuple[str | None, str | None, str]:
     start = finish = None
     said_by = ""
     for item in properties.HasProperties or ():
-        if not item.is_a("IfcPropertySingleValue") or item.NominalValue is None:
-            continue
-        day = _day(item.NominalValue.wrappedValue)
+        day = _day_in(item)
         if day is None:
             continue
         if START_NAMES.search(item.Name or ""):
@@ -140,6 +143,13 @@ def _days_in(properties: Any) -> tuple[str | None, str | None, str]:
             continue
         said_by = f"{properties.Name}.{item.Name}"
     return start, finish, said_by
+
+
+def _day_in(item: Any) -> str | None:
+    """The day that a property holds, as YYYY-MM-DD."""
+    if not item.is_a("IfcPropertySingleValue") or item.NominalValue is None:
+        return None
+    return _day(item.NominalValue.wrappedValue)
 
 
 def phases_by_product(model: ifcopenshell.file) -> dict[int, tuple[str, str]]:

@@ -22,15 +22,14 @@ import numpy as np
 
 from stopgo.planner.floors.ifc.construction_dates import phases_by_product, tasks_by_product
 from stopgo.planner.floors.ifc.earth_placement import place_of
+from stopgo.planner.floors.ifc.kernel_shapes import Made, is_sound
 from stopgo.planner.floors.ifc.model import Described, Model, Product, Storey, packed
 from stopgo.planner.floors.ifc.product_shapes import (
     BOX,
     UNCUT,
-    Made,
     all_at_once,
     has_body,
     is_a,
-    is_sound,
     one_by_one,
     placement_of,
 )

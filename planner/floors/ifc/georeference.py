@@ -10,8 +10,8 @@ import pyproj
 from pyproj.exceptions import CRSError, ProjError
 
 from stopgo.mission.floor import Finding, Georeference
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.model import OnEarth, Placement
+from stopgo.planner.floors.legible_text import legible
 
 DEFAULTS = {
     "Boston, as Revit sets it": (42.358, -71.06),

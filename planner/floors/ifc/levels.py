@@ -11,9 +11,9 @@ import numpy as np
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.model import Model, Storey, Surface
 from stopgo.planner.floors.ifc.section import upward
+from stopgo.planner.floors.legible_text import legible
 
 NEAR = 0.6
 """A storey's slab lies at most so far above or below the level that the model gives it, in metres."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, cast
 
 import ifcopenshell
 import ifcopenshell.geom
@@ -15,14 +14,19 @@ import ifcopenshell.util.placement
 import ifcopenshell.util.unit
 import numpy as np
 
+from stopgo.planner.floors.ifc.kernel_shapes import (
+    KERNEL,
+    Kernel,
+    Made,
+    is_sound,
+    iterated,
+    made_of,
+    settings_of,
+    show_progress,
+)
 from stopgo.planner.floors.ifc.model import Placement
+from stopgo.planner.floors.ifc.opening_cuts import cut_bodies
 
-Kernel = Literal["hybrid-cgal-simple-opencascade", "opencascade"]
-KERNEL: Final = "hybrid-cgal-simple-opencascade"
-CLEAR = 0.3
-"""A style that lets more than this share of light through is glass."""
-LARGEST = 1e7
-"""Metres from the origin beyond which nothing is built."""
 BODIES = ("Body", "Facetation", None, "")
 """Identifiers of the representations that are bodies."""
 WAYS: Final[dict[str, tuple[Kernel, dict[str, bool]]]] = {
@@ -49,37 +53,21 @@ BOX_FACES = (
 """Triangles of a box by its CORNERS; they look outwards."""
 
 
-@dataclass(frozen=True, eq=False)
-class Made:
-    """The shape of one entity, in the world, metres."""
-
-    number: int
-    """The entity's number in the file."""
-    points: np.ndarray
-    corners: np.ndarray
-    transparent: bool = False
-    way: str = ""
-    """Empty if the kernel made it at once, else a key of WAYS or BOX."""
-
-
-def _settings(*, with_openings: bool = True, with_cuts: bool = True, in_world: bool = True) -> Any:
-    settings = ifcopenshell.geom.settings()
-    settings.set("use-world-coords", in_world)
-    settings.set("disable-opening-subtractions", not with_openings)
-    settings.set("disable-boolean-result", not with_cuts)
-    return settings
-
-
 def all_at_once(model: ifcopenshell.file, entities: list[Any]) -> Iterator[Made]:
     """Every shape by the fast kernel; the few that it cannot make, one by one in other ways.
 
-    Products of one type have one shape. The kernel makes it once, where it need not place it in the world.
+    Most bodies with openings are cut by another kernel, at a tenth of the time. Products of one type have one
+    shape. The kernel makes it once, where it need not place it in the world.
     """
     typed = _with_shared_shapes(entities)
     shared = {entity.id() for entity in typed}
     done = set()
-    for in_world, chosen in ((True, [item for item in entities if item.id() not in shared]), (False, typed)):
-        for made in _iterated(model, chosen, _settings(in_world=in_world)):
+    for made in cut_bodies(model, [item for item in entities if item.id() not in shared]):
+        done.add(made.number)
+        yield made
+    alone = [item for item in entities if item.id() not in shared | done]
+    for in_world, chosen in ((True, alone), (False, typed)):
+        for made in iterated(model, chosen, settings_of(in_world=in_world)):
             done.add(made.number)
             yield made
     for entity in entities:
@@ -98,21 +86,6 @@ def _with_shared_shapes(entities: list[Any]) -> list[Any]:
     return [entity for entity in entities if any(counts[source] > 1 for source in sources[entity.id()])]
 
 
-def _iterated(model: ifcopenshell.file, entities: list[Any], settings: Any) -> Iterator[Made]:
-    """The sound shapes of entities by the fast kernel."""
-    if not entities:
-        return
-    iterator = ifcopenshell.geom.iterator(settings, model, 1, include=entities, geometry_library=KERNEL)
-    there = bool(iterator.initialize())
-    while there:
-        _show_progress(iterator.progress())
-        shape = iterator.get()
-        made = _made(shape.id, shape)
-        if is_sound(made):
-            yield made
-        there = bool(iterator.next())
-
-
 def one_by_one(
     model: ifcopenshell.file, entities: list[Any], without: frozenset[str], at: Path
 ) -> Iterator[Made]:
@@ -120,9 +93,9 @@ def one_by_one(
     for number, entity in enumerate(entities):
         if entity.GlobalId in without:
             continue
-        _show_progress(100 * number // len(entities))
+        show_progress(100 * number // len(entities))
         at.write_text(entity.GlobalId)
-        made = _created(entity, _settings(), KERNEL)
+        made = _created(entity, settings_of(), KERNEL)
         if made is None:
             made = _in_another_way(model, entity)
         if made is not None:
@@ -134,7 +107,7 @@ def _in_another_way(model: ifcopenshell.file, entity: Any) -> Made | None:
     if not has_body(entity):
         return None
     for way, (kernel, said) in WAYS.items():
-        made = _created(entity, _settings(**said), kernel)
+        made = _created(entity, settings_of(**said), kernel)
         if made is not None:
             return replace(made, way=way)
     return _as_box(model, entity)
@@ -145,18 +118,8 @@ def _created(entity: Any, settings: Any, kernel: Kernel) -> Made | None:
         shape = ifcopenshell.geom.create_shape(settings, entity, geometry_library=kernel)
     except RuntimeError:
         return None
-    made = _made(entity.id(), cast(Any, shape))
+    made = made_of(entity.id(), cast(Any, shape))
     return made if is_sound(made) else None
-
-
-def _made(number: int, shape: Any) -> Made:
-    geometry = shape.geometry
-    local = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3)
-    placement = np.array(shape.transformation.matrix).reshape(4, 4).T  # the identity for shapes in the world
-    points = np.einsum("ij,nj->ni", placement[:3, :3], local) + placement[:3, 3]
-    corners = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3).astype(np.int64)
-    clear = bool(geometry.materials) and all(item.transparency > CLEAR for item in geometry.materials)
-    return Made(number, points, corners, transparent=clear)
 
 
 def _as_box(model: ifcopenshell.file, entity: Any) -> Made | None:
@@ -193,17 +156,6 @@ def _points(item: Any, model: ifcopenshell.file) -> Iterator[tuple[float, ...]]:
                 yield part.Coordinates
             elif is_a(part, "IfcCartesianPointList3D"):
                 yield from part.CoordList
-
-
-def _show_progress(percent: int) -> None:
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r\033[Kmodel {percent} %" if percent < 100 else "\r\033[K")
-        sys.stderr.flush()
-
-
-def is_sound(made: Made) -> bool:
-    points = made.points
-    return bool(len(made.corners)) and bool(np.isfinite(points).all()) and np.abs(points).max() <= LARGEST
 
 
 def has_body(entity: Any) -> bool:

@@ -11,11 +11,11 @@ import numpy as np
 import shapely
 
 from stopgo.mission.geometry import FloatArray
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.class_kinds import IGNORED
 from stopgo.planner.floors.ifc.levels import Level
 from stopgo.planner.floors.ifc.model import Model, Product
 from stopgo.planner.floors.ifc.solids import KERB, OBJECTS, ON_FLOOR, TREADS, Heights
+from stopgo.planner.floors.legible_text import legible
 from stopgo.planner.floors.standing_body import StandingBody
 
 PASSABLE = ("doors", "spaces", "openings", IGNORED)

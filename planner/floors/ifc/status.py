@@ -11,10 +11,10 @@ from msgspec.structs import replace
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.levels import Level
 from stopgo.planner.floors.ifc.model import Model, Product, Task
 from stopgo.planner.floors.ifc.solids import AT_SCANNER, KERB
+from stopgo.planner.floors.legible_text import legible
 
 Status = Literal["built", "in_progress", "not_started", "removed"]
 THINGS = (*AT_SCANNER, "stairs", "railings", "doors")

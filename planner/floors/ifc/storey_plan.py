@@ -13,7 +13,6 @@ import shapely
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Element, Finding, FloorPlan
 from stopgo.mission.geometry import frozen
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
 from stopgo.planner.floors.ifc.ceilings import without_hidden_beams
 from stopgo.planner.floors.ifc.class_kinds import furniture_findings
@@ -25,10 +24,11 @@ from stopgo.planner.floors.ifc.passages import passages
 from stopgo.planner.floors.ifc.solids import Heights, Solid, solids_on
 from stopgo.planner.floors.ifc.status import Statuses, on_day, statuses
 from stopgo.planner.floors.ifc.timetable import read_timetable
+from stopgo.planner.floors.legible_text import legible
+from stopgo.planner.floors.lines_and_texts import Stroke, Word
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
 from stopgo.planner.floors.rings import Region
-from stopgo.planner.floors.strokes import Stroke, Word
 
 MOST_NAMED = 20
 """Products that one finding names."""
@@ -84,7 +84,7 @@ def _with_heights(item: Element, model: Model, level: Level) -> Element:
     mesh = model.meshes.get(item.global_id or "")
     if mesh is None:
         return item
-    low, high = (round(z - level.z, 4) for z in mesh.z)
+    low, high = (round(z - level.z, 4) + 0.0 for z in mesh.z)  # no minus zero
     return replace(item, heights=(low, high))
 
 

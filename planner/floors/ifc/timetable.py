@@ -12,8 +12,8 @@ from pathlib import Path
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import bytes_of, rows_of
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.ifc.model import Task
+from stopgo.planner.floors.legible_text import legible
 
 KNOWN = {
     "guid": ("guid", "globalid", "global id", "ifcguid", "ifc guid", "element guid", "id"),

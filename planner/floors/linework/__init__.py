@@ -15,6 +15,7 @@ import shapely
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.planner.floors.drawn import drawn
+from stopgo.planner.floors.lines_and_texts import Stroke, Word
 from stopgo.planner.floors.linework.groups import outlines_of
 from stopgo.planner.floors.linework.labels import parted_by_labels
 from stopgo.planner.floors.linework.spaces import (
@@ -29,7 +30,6 @@ from stopgo.planner.floors.linework.wall_gaps import WallGap, gaps_of, passages_
 from stopgo.planner.floors.linework.walls import SolidWalls, walls_of
 from stopgo.planner.floors.parts import outline_of
 from stopgo.planner.floors.rings import GAP, Region, canonical_region, polygons_of
-from stopgo.planner.floors.strokes import Stroke, Word
 from stopgo.planner.floors.written_measures import is_only_area
 
 _COVERS = 0.6

@@ -19,6 +19,7 @@ from scipy import ndimage
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import bounds, frozen
+from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.linework import completed
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
@@ -31,7 +32,6 @@ from stopgo.planner.floors.robot_map.description import (
     read_description,
 )
 from stopgo.planner.floors.robot_map.grey_picture import read_picture
-from stopgo.planner.floors.strokes import Stroke
 from stopgo.planner.floors.survey import FloorChoice, Survey
 
 LEAST_WALL = 0.5

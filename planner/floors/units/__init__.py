@@ -12,8 +12,8 @@ from ezdxf.document import Drawing
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray
-from stopgo.planner.floors.drawing import legible
 from stopgo.planner.floors.drawn_shapes import Shape
+from stopgo.planner.floors.legible_text import legible
 from stopgo.planner.floors.units.unit_evidence import UnitEvidence, evidence_in, extent_of
 from stopgo.planner.floors.units.unit_lengths import CODES, METRES, SHORT
 from stopgo.planner.floors.units.unit_probability import measured, probabilities

@@ -76,6 +76,19 @@ def test_a_long_tours_bound_is_near_the_tour() -> None:
     assert best * 0.98 < one_tree_bound(cost, best=best).value <= best
 
 
+@pytest.mark.parametrize("n", [125, 200])
+def test_the_bound_of_rooms_along_dead_ends_is_near_their_shortest_tour(n: int) -> None:
+    """Which is known: into every room and to the end of every corridor, and back."""
+    random = np.random.default_rng(1)
+    corridor, along, deep = random.integers(0, 6, n) * 20.0, random.uniform(1, 60, n), random.uniform(1, 4, n)
+    around = np.abs(corridor[:, None] - corridor) + along[:, None] + along
+    beside = np.where(corridor[:, None] == corridor, np.abs(along[:, None] - along), around)
+    lengths = (beside + deep[:, None] + deep) * ~np.eye(n, dtype=bool)
+    ends = sum(along[corridor == x].max() for x in set(corridor.tolist()))
+    best = int(nanometres(np.array([[2 * (deep.sum() + np.ptp(corridor) + ends)]]))[0, 0])
+    assert best * 0.99 < one_tree_bound(nanometres(lengths), best=best).value <= best
+
+
 @pytest.mark.parametrize("n", [10, 17, 30, 45])
 @pytest.mark.parametrize("lengths", [scattered, any_lengths])
 def test_compiled_and_interpreted_search_find_the_same_tour(n: int, lengths) -> None:

@@ -51,15 +51,26 @@ def fewest(task: ConnectedCover) -> int:
 @pytest.mark.parametrize("seed", range(size(short=6, full=200)))
 def test_no_subset_is_smaller_than_the_bound_and_exact_finds_the_smallest(seed: int) -> None:
     best = fewest(task_of(seed))
-    for searches, rounds in ((Searches.default, ROUNDS), (Searches.exact, EXACT_ROUNDS)):
+    for is_exact in (False, True):
         task = task_of(seed)
-        rows, bound = connected(task, searches(EXACT), rounds=rounds)
+        search = Searches.exact(EXACT) if is_exact else Searches.default(task)
+        rows, bound = connected(task, search, rounds=EXACT_ROUNDS if is_exact else ROUNDS)
         bound = max(bound, lower_bound(task.problem, found=len(rows)))
         assert meets(task.cover, rows)
         assert not task.parts(rows)
         assert bound <= best <= len(rows)
-        if searches is Searches.exact:
+        if is_exact:
             assert bound == best == len(rows)
+
+
+@pytest.mark.parametrize("seed", [40, 57])
+def test_the_default_search_finds_the_fewest_connected_rows_where_a_component_sees_enough(seed: int) -> None:
+    """Separators of such a component are conditions only, and need not hold for every selection."""
+    task = task_of(seed, rows=12, columns=24, near=0.35)
+    rows, _ = connected(task, Searches.default(task), rounds=ROUNDS)
+    assert meets(task.cover, rows)
+    assert not task.parts(rows)
+    assert len(rows) == fewest(task)
 
 
 def test_two_rooms_take_the_row_between_them() -> None:
@@ -67,7 +78,7 @@ def test_two_rooms_take_the_row_between_them() -> None:
     sees = csr_array(np.array([[1, 1, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1]]))
     links = csr_array(np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]]))
     task = ConnectedCover(Cover.of_whole(sees, np.ones(4, np.int64), 4), links, np.arange(3))
-    rows, _ = connected(task, Searches.default(Settings()), rounds=ROUNDS)
+    rows, _ = connected(task, Searches.default(task), rounds=ROUNDS)
     assert rows.tolist() == [0, 1, 2]
     assert lower_bound(task.problem, found=3) == 3
 
@@ -78,7 +89,7 @@ def test_rows_without_links_stay_in_as_few_components_as_needed() -> None:
     links = np.zeros((4, 4), np.int64)
     links[[0, 1, 1, 2], [1, 0, 2, 1]] = 1
     task = ConnectedCover(Cover.of_whole(sees, np.ones(3, np.int64), 3), csr_array(links), np.arange(4))
-    rows, _ = connected(task, Searches.default(Settings()), rounds=ROUNDS)
+    rows, _ = connected(task, Searches.default(task), rounds=ROUNDS)
     assert rows.tolist() == [0, 1, 2]
     assert len(components_of(task.links, rows)) == 1
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from stopgo.mission.geometry import IntArray
-from stopgo.mission.settings import Settings
 from stopgo.planner.selection import Searches, districts, improve
 from stopgo.planner.selection.connected_selection import ConnectedCover, connected, connected_rows
 from stopgo.planner.selection.districts import improved_by_districts
@@ -76,7 +75,7 @@ def test_rows_searched_in_vain_are_not_searched_again_by_themselves() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_row_of_a_connected_selection_by_districts_is_idle(seed: int) -> None:
     task = task_of(seed, rows=40, columns=90, near=0.25)
-    rows, _ = connected(task, Searches.default(Settings()), rounds=2)
+    rows, _ = connected(task, Searches.default(task), rounds=2)
     assert len(rows) > improve.LARGE
     _assert_whole_and_without_idle(task, rows)
 

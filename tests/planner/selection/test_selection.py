@@ -13,12 +13,20 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, weights_of
-from stopgo.planner.selection import METHODS
-from stopgo.planner.selection.bound import counting_bound, multiplier_bound, relaxation_bound
+from stopgo.planner.selection import METHODS, bound
+from stopgo.planner.selection.bound import (
+    coarse_bound,
+    counting_bound,
+    first_bound,
+    lower_bound,
+    multiplier_bound,
+    relaxation_bound,
+)
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of, needed_of
 from stopgo.planner.selection.greedy import greedy
 from tests.faults.sizes import size
+from tests.planner.selection.test_swaps import cover_of_rooms
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms
 
 
@@ -89,11 +97,25 @@ def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
             assert len(rows) <= optimum + 1, seed
 
 
-def test_no_bound_is_above_the_optimum() -> None:
+def test_no_bound_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bound, "COARSE", 20)
     for _, cover, optimum in small_covers(range(size(short=5, full=300))):
         assert counting_bound(cover) <= optimum
-        assert relaxation_bound(cover) <= optimum
+        assert coarse_bound(cover) <= relaxation_bound(cover) <= optimum
         assert multiplier_bound(cover, found=len(greedy(cover))) <= optimum
+
+
+def test_the_first_bound_of_a_large_problem_is_nearly_that_of_its_relaxation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Some 800 entries are large here, and groups of three columns are solved as one."""
+    monkeypatch.setattr(bound, "QUICK", 500)
+    monkeypatch.setattr(bound, "COARSE", 300)
+    covers = [cover_of_rooms(seed, rows=60, columns=200, rooms=12) for seed in range(4)]
+    for cover in covers:
+        found = len(greedy(cover))
+        quick = lower_bound(cover, found=found, quickly=True)
+        assert first_bound(cover, found=found) < quick <= relaxation_bound(cover) <= quick + 1
 
 
 def test_the_default_selector_finds_nearly_every_optimum() -> None:

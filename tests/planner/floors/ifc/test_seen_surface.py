@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -135,15 +136,17 @@ def test_a_plan_that_claims_more_than_the_model_shows_is_not_met(
     assert "area of walls: 100.0 % claimed, the model's solids show" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("scanner", [[], ["--scanner-height", "1.6"]])
 def test_a_leaning_wall_is_acquired_where_the_plan_promises_it(
-    read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    scanner: list[str], read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """The floor is cut at 1.3 m, wherever the scanner is."""
     pytest.importorskip("embreex")
     house = two_rooms()
-    bare = planned_walls(read, house, tmp_path)
+    bare = planned_walls(read, house, tmp_path, scanner)
     storey = house.model.by_type("IfcBuildingStorey")[0]
     house.box("IfcWall", "leaning", (0.6, 0.2, 0, 0.8, 4.2, 2.8), storey, aside=0.8)
-    walls = planned_walls(read, house, tmp_path)
+    walls = planned_walls(read, house, tmp_path, scanner)
     assert walls["total_m2"] < bare["total_m2"] - 8, "the slope hides the west wall and has no upright area"
     capsys.readouterr()
     mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
@@ -159,9 +162,9 @@ def test_a_leaning_wall_is_acquired_where_the_plan_promises_it(
     assert promised["kept"] == pytest.approx(promised["promised"], abs=0.1)
 
 
-def planned_walls(read: Read, house: House, tmp_path: Path) -> dict:
+def planned_walls(read: Read, house: House, tmp_path: Path, scanner: Sequence[str] = ()) -> dict:
     read(house)
-    return planned(tmp_path / "house.ifc", "--coverage", "1")["kinds"]["walls"]
+    return planned(tmp_path / "house.ifc", "--coverage", "1", *scanner)["kinds"]["walls"]
 
 
 @pytest.mark.usefixtures("no_pairs")
