@@ -37,6 +37,8 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 COMMANDS = re.findall(r"^```sh\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 
 FLOOR = two_rooms(0.9)
+QUICK = {"register": False, "refine": False}
+"""Settings of a plan that calls every plug-in, and does no more."""
 Write = Callable[[str, str], None]
 
 
@@ -137,7 +139,7 @@ WRONG: dict[str, tuple[str, str, str]] = {
 def test_a_plug_in_that_misbehaves_is_named_in_one_line(case: str, module: Write) -> None:
     stage, code, said = WRONG[case]
     module("bad", code)
-    settings = Settings(**{stage: "bad:f"}, range=2.0, room_coverage=0.9)  # type: ignore[arg-type]
+    settings = Settings(**{stage: "bad:f"}, range=2.0, room_coverage=0.9, **QUICK)  # type: ignore[arg-type]
     with pytest.raises(StopgoError, match=f"^--{stage} bad:f: .*(?:{said})") as caught:
         plan(FLOOR, settings)
     assert "\n" not in str(caught.value)
@@ -148,7 +150,7 @@ def test_a_plug_in_that_misbehaves_is_named_in_one_line(case: str, module: Write
 @pytest.mark.parametrize("name", ["luck", "no.such.module:f", ":f", "x:"])
 def test_a_variant_that_is_not_there_is_named(stage: str, name: str) -> None:
     with pytest.raises(InputError, match=f"^--{stage} {name}: "):
-        plan(FLOOR, Settings(**{stage: name}))  # type: ignore[arg-type]
+        plan(FLOOR, Settings(**{stage: name}, **QUICK))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

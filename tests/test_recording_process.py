@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 
@@ -36,27 +37,41 @@ def results() -> tuple[object, ...]:
     return (*part.stage_results(), part.mission, schedule(part.mission), sight)
 
 
-@pytest.fixture
-def process(monkeypatch: pytest.MonkeyPatch) -> Iterator[RecordingProcess]:
+@contextmanager
+def started() -> Iterator[RecordingProcess]:
     """A process that was started, as if this one had not loaded Rerun."""
     with recording_process() as made:
-        with monkeypatch.context() as patch:
+        with pytest.MonkeyPatch.context() as patch:
             patch.delitem(sys.modules, "rerun", raising=False)
             made.start()
         assert made.is_running
         yield made
 
 
+@pytest.fixture
+def process() -> Iterator[RecordingProcess]:
+    """A process for a test that ends it."""
+    with started() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def lasting() -> Iterator[RecordingProcess]:
+    """A process for the tests after which it still runs."""
+    with started() as made:
+        yield made
+
+
 def test_the_process_writes_what_would_be_written_here(
-    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path
+    lasting: RecordingProcess, results: tuple[object, ...], tmp_path: Path
 ) -> None:
     here, there = tmp_path / "here.rrd", tmp_path / "there.rrd"
     RecordingProcess().draw("same", results).write(here)
-    process.draw("same", results).write(there)
-    assert process.is_running, "the process has drawn it"
+    lasting.draw("same", results).write(there)
+    assert lasting.is_running, "the process has drawn it"
     assert check(there) == check(here)
-    process.draw("next", results).write(there)
-    assert process.is_running
+    lasting.draw("next", results).write(there)
+    assert lasting.is_running
     assert check(there).recording_id == "next"
 
 
@@ -89,25 +104,20 @@ def test_results_that_cannot_be_sent_are_drawn_here(
     assert check(tmp_path / "plan.rrd").recording_id == "own"
 
 
-def test_a_full_disk_is_reported_as_here(
-    monkeypatch: pytest.MonkeyPatch, results: tuple[object, ...], tmp_path: Path
-) -> None:
-    with small_disk(10_000), recording_process() as process:
-        with monkeypatch.context() as patch:
-            patch.delitem(sys.modules, "rerun", raising=False)
-            process.start()
+def test_a_full_disk_is_reported_as_here(results: tuple[object, ...], tmp_path: Path) -> None:
+    with small_disk(10_000), started() as process:
         drawing = process.draw("full", results)
         with pytest.raises(OSError, match="File too large"):
             drawing.write(tmp_path / "plan.rrd")
 
 
 def test_a_file_that_does_not_hold_the_recording_is_an_error(
-    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path
+    lasting: RecordingProcess, results: tuple[object, ...], tmp_path: Path
 ) -> None:
-    drawing = process.draw("lost", results)
+    drawing = lasting.draw("lost", results)
     with pytest.raises((OSError, InputError)):
         drawing.write(tmp_path / "no folder" / "plan.rrd")
-    assert process.is_running
+    assert lasting.is_running
 
 
 def test_derived_values_stay_here_and_read_only_ones_stay_read_only(results: tuple[object, ...]) -> None:

@@ -22,7 +22,7 @@ from tests.batches.inline_engine import InlineEngine
 from tests.bridge.guarded import keys_of_site
 from tests.called import stopgo
 from tests.journeys.guides import PAGES, ROOT, VEHICLE, GuideFolder, blocks_of, commands_of, place
-from tests.planner.floors.ifc.conftest import _in_process
+from tests.planner.floors.ifc.conftest import in_process
 from tests.planner.floors.ifc.house import House
 from tests.planner.floors.ifc.house import two_rooms as house_of_two_rooms
 from tests.planner.floors.ifc.test_status import WORK, scheduled
@@ -84,7 +84,7 @@ def guide(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
     (tmp_path / "recordings").mkdir()
     (tmp_path / "recordings" / "samples").symlink_to(ROOT / "recordings" / "samples")
     monkeypatch.setattr(engine, "LocalEngine", lambda workers: InlineEngine(workers, work))
-    monkeypatch.setattr(loading, "_run", _in_process)
+    monkeypatch.setattr(loading, "_run", in_process)
     with place(tmp_path) as made:
         yield made
 

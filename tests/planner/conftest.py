@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from stopgo.planner.scan_simulation import verification
 from tests.faults.sizes import FULL
 from tests.planner.kernels import interpret
 
@@ -17,3 +18,9 @@ def _speed() -> Iterator[None]:
         if FULL:
             interpret(patch)
         yield
+
+
+@pytest.fixture
+def no_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Register no scans: the test asks what each one acquires, and registration takes most of the time."""
+    monkeypatch.setattr(verification, "registered", lambda *given: ())

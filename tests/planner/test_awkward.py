@@ -15,7 +15,7 @@ from stopgo.mission.errors import InputError, NegativeResult, StopgoError
 from stopgo.mission.floor import Element, FloorPlan, Opening
 from stopgo.mission.geometry import Polygon, frozen
 from stopgo.mission.settings import Settings
-from tests.faults.sizes import size
+from tests.faults.sizes import size, some
 from tests.planner.checks import check_plan
 from tests.planner.worlds import (
     box,
@@ -91,7 +91,7 @@ ODD_ELEMENTS: dict[str, Element] = {
 }
 
 
-@pytest.mark.parametrize("name", ODD_ELEMENTS)
+@pytest.mark.parametrize("name", some(list(ODD_ELEMENTS), every=2))
 def test_an_anomalous_element_is_planned_around(name: str) -> None:
     well_planned(hall(8, 5, ODD_ELEMENTS[name]))
 
@@ -109,14 +109,14 @@ ODD_OPENINGS: dict[str, Opening] = {
 }
 
 
-@pytest.mark.parametrize("name", ODD_OPENINGS)
+@pytest.mark.parametrize("name", some(list(ODD_OPENINGS), every=2))
 def test_an_anomalous_opening_is_planned_around(name: str) -> None:
     floor = two_rooms(1.0)
     floor = replace(floor, openings=(*floor.openings, ODD_OPENINGS[name]))
     assert len(well_planned(floor).stops) >= 1
 
 
-@pytest.mark.parametrize("name", ODD_OPENINGS)
+@pytest.mark.parametrize("name", some([*ODD_OPENINGS][1:] + [*ODD_OPENINGS][:1], every=2))
 def test_an_anomalous_opening_alone_is_planned_around(name: str) -> None:
     well_planned(replace(two_rooms(1.0), openings=(ODD_OPENINGS[name],)))
 
@@ -132,14 +132,14 @@ ODD_ROOMS: dict[str, tuple[Polygon, ...]] = {
 }
 
 
-@pytest.mark.parametrize("name", ODD_ROOMS)
+@pytest.mark.parametrize("name", some(list(ODD_ROOMS), every=2))
 def test_an_anomalous_room_is_planned_around(name: str) -> None:
     floor = two_rooms(1.0)
     rooms = (*floor.rooms, *(room(f"odd {k}", shape) for k, shape in enumerate(ODD_ROOMS[name])))
     well_planned(replace(floor, rooms=rooms))
 
 
-@pytest.mark.parametrize("name", ODD_ROOMS)
+@pytest.mark.parametrize("name", some([*ODD_ROOMS][1:] + [*ODD_ROOMS][:1], every=2))
 def test_anomalous_rooms_alone_are_planned_or_refused(name: str) -> None:
     rooms = tuple(room(f"odd {k}", shape) for k, shape in enumerate(ODD_ROOMS[name]))
     try:
@@ -161,7 +161,7 @@ ODD_OUTLINES: dict[str, tuple[Polygon, ...]] = {
 }
 
 
-@pytest.mark.parametrize("name", ODD_OUTLINES)
+@pytest.mark.parametrize("name", some(list(ODD_OUTLINES), every=2))
 def test_an_anomalous_outline_is_planned_around(name: str) -> None:
     well_planned(replace(two_rooms(1.0), outline=ODD_OUTLINES[name]))
 
@@ -195,7 +195,7 @@ def test_only_beams_can_be_scanned() -> None:
 # ---- places and sizes ----
 
 
-@pytest.mark.parametrize("by", [(1e6, 1e6), (-1e6, 5e5), (500000.123, 4649776.22)])
+@pytest.mark.parametrize("by", some([(1e6, 1e6), (-1e6, 5e5), (500000.123, 4649776.22)], every=2))
 def test_a_floor_far_from_the_origin_is_planned_as_here(by: tuple[float, float]) -> None:
     here, there = well_planned(two_rooms(0.7)), well_planned(moved(two_rooms(0.7), shifted(*by)))
     assert len(here.stops) == len(there.stops)

@@ -25,7 +25,6 @@ from stopgo.planner.checking.claims import Recount, overclaims, recount
 from stopgo.planner.visibility.sight.sight import sight
 from tests.faults.sizes import some
 from tests.journeys.test_base import without_extras
-from tests.planner.test_command import drawn
 from tests.planner.worlds import (
     column,
     hall,
@@ -140,14 +139,6 @@ def test_candidates_of_another_program_are_not_loaded() -> None:
 
 
 # ---- the command ----
-
-
-@pytest.fixture
-def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
-    """A planned mission; its floor and its coverage lie next to it."""
-    assert main(["plan", str(drawn(tmp_path / "floor.dxf")), "-o", str(tmp_path)]) == 0
-    capsys.readouterr()
-    return tmp_path / "mission.json"
 
 
 def check(mission: Path, *options: str) -> int:

@@ -16,6 +16,7 @@ from stopgo.mission.files.mission_json import read, write
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.planner.checking.fit import misfits_on
+from tests.faults.sizes import some
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (
     box,
@@ -60,11 +61,13 @@ PLANNED = {
 }
 
 
-@pytest.mark.parametrize("move", [shifted(0, 0), turned(17), shifted(5e5, 5.4e6)])
-@pytest.mark.parametrize("name", PLANNED)
-def test_what_is_planned_fits(name: str, move: Any) -> None:
+MOVES = {"as drawn": shifted(0, 0), "turned": turned(17), "far off": shifted(5e5, 5.4e6)}
+
+
+@pytest.mark.parametrize(("name", "by"), some([(name, by) for name in PLANNED for by in MOVES], every=2))
+def test_what_is_planned_fits(name: str, by: str) -> None:
     floor, settings = PLANNED[name]
-    there = moved(floor, move)
+    there = moved(floor, MOVES[by])
     assert told(there, planned(there, settings)[0], settings) == []
 
 
@@ -147,14 +150,6 @@ def test_the_return_is_checked_too() -> None:
 
 
 # ---- the command ----
-
-
-@pytest.fixture
-def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
-    """A planned mission; its floor lies next to it."""
-    assert main(["plan", str(drawn(tmp_path / "floor.dxf")), "-o", str(tmp_path)]) == 0
-    capsys.readouterr()
-    return tmp_path / "mission.json"
 
 
 def problems(mission: Path, floor: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, str]]:

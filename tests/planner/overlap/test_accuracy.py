@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -31,6 +32,7 @@ ONE = np.diag([1e6, 1e6, 1e6])
 """A pair with 1 mm in x and y, and 1 mrad."""
 
 
+@cache
 def made(**more: Any) -> PartPlan:
     return plan(three_rooms(), replace(ASKED, **more)).first
 

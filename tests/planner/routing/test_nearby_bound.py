@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 
 import numpy as np
@@ -27,10 +28,19 @@ def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bounding, "STEPS", 150)
 
 
+@cache
 def paths_and_lengths(seed: int) -> tuple[NearbyPaths, np.ndarray]:
     xy, edges = network(seed)
     lengths = shortest_paths(xy, edges, POINTS).lengths
     return NearbyPaths(xy, edges, POINTS), (lengths + lengths.T) / 2
+
+
+@cache
+def tour_and_its_bound(seed: int) -> tuple[list[int], float]:
+    """A short tour of all points, and the bound of closed tours from all pairs."""
+    _, lengths = paths_and_lengths(seed)
+    tour = shortest_tour(lengths, seed=1).tolist()
+    return tour, tour_bound(lengths, tour, Ends(None, None, True, ""))
 
 
 @pytest.mark.parametrize("seed", range(size(short=3, full=30)))
@@ -45,10 +55,9 @@ def paths_and_lengths(seed: int) -> tuple[NearbyPaths, np.ndarray]:
 )
 def test_no_route_is_shorter_and_the_bound_is_near_that_of_all_pairs(seed: int, ends: Ends) -> None:
     paths, lengths = paths_and_lengths(seed)
-    tour = shortest_tour(lengths, seed=1).tolist()
+    tour, every = tour_and_its_bound(seed)
     longest = float(lengths[tour, np.roll(tour, -1)].sum())
     found = bound_over_nearby(paths, longest, ends)
-    every = tour_bound(lengths, tour, Ends(None, None, True, ""))
     assert 0 < found <= longest
     if ends.closed:
         assert found >= 0.97 * every

@@ -17,7 +17,7 @@ from stopgo.mission.stages.network import CONTROL_FRAME
 from stopgo.planner.scan_simulation.registration import Registered
 from stopgo.planner.scan_simulation.scan_network import scan_network
 from tests.mission.worlds import mission_of, stop
-from tests.planner.scan_simulation.test_verification import verified
+from tests.planner.scan_simulation.test_verification import COARSEST, verified
 from tests.planner.worlds import two_rooms
 
 FIRM = np.diag([500.0, 500.0, 5000.0])
@@ -115,7 +115,7 @@ def test_scans_turn_onto_the_control_points_that_several_of_them_see() -> None:
 
 @pytest.fixture(scope="module")
 def proof() -> PlanProof:
-    return verified(two_rooms(0.9), Settings(range=4.0))
+    return verified(two_rooms(0.9), Settings(range=4.0), COARSEST)
 
 
 def test_an_accuracy_that_the_scans_miss_is_not_met(proof: PlanProof) -> None:

@@ -105,6 +105,7 @@ def test_every_target_of_a_hall_is_acquired_from_its_middle() -> None:
     assert proof.quality.by_stops[1] == 1.0
 
 
+@pytest.mark.usefixtures("no_pairs")
 def test_what_stops_claim_is_in_sight_one_by_one() -> None:
     """By another program's rays: the plan's own sight has no part in it."""
     floor = two_rooms(0.9, more=[column("c1", 2.2, 1.0), column("c2", 6.1, 2.9)])
@@ -113,8 +114,9 @@ def test_what_stops_claim_is_in_sight_one_by_one() -> None:
         assert abs(stop.sighted - stop.claimed) <= 1, "at most one sight line that touches a corner"
 
 
+@pytest.mark.usefixtures("no_pairs")
 def test_a_stop_that_was_moved_is_caught() -> None:
-    made = plan(two_rooms(0.9), Settings(range=3.0))
+    made = plan(two_rooms(0.9), Settings(range=3.0, register=False))
     first, *others = made.mission.stops
     lying = changed(made.mission, stops=(changed(first, x=0.8, y=0.8), *others))
     proof = verify(lying, made.space, replace(COARSEST, range_m=3.0), None)
@@ -122,9 +124,10 @@ def test_a_stop_that_was_moved_is_caught() -> None:
     assert any(first.id in line for line in proof.unmet)
 
 
+@pytest.mark.usefixtures("no_pairs")
 def test_a_stop_that_was_removed_is_caught() -> None:
     floor = two_rooms(0.9)
-    made = plan(floor, Settings(range=4.0))
+    made = plan(floor, Settings(range=4.0, register=False))
     told = coverage_of(made)
     lying = changed(made.mission, stops=made.mission.stops[:-1])
     proof = verify(lying, made.space, replace(COARSEST, range_m=4.0), told)
@@ -148,6 +151,7 @@ def test_a_mission_without_stops_is_no() -> None:
         verify(changed(made.mission, stops=()), made.space, COARSE, None)
 
 
+@pytest.mark.usefixtures("no_pairs")
 def test_beams_are_seen_from_below_and_windows_seen_through() -> None:
     beam = element("beam", "beams", box(2.0, 0.0, 2.3, 4.0))
     pane = element("pane", "windows", box(4.0, 1.0, 4.05, 3.0))
@@ -160,6 +164,7 @@ def test_beams_are_seen_from_below_and_windows_seen_through() -> None:
     assert by_kind["walls"].acquired > 0.95 * by_kind["walls"].promised, "behind the pane too"
 
 
+@pytest.mark.usefixtures("no_pairs")
 def test_closed_doors_stop_rays_except_from_the_doorway() -> None:
     settings = Settings(range=10.0, doors="closed", door_scan=True)
     proof = verified(two_rooms(0.9), settings, COARSEST)

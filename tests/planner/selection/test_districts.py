@@ -16,7 +16,7 @@ from tests.planner.checks import meets
 from tests.planner.selection.test_connected_selection import task_of
 from tests.planner.selection.test_swaps import cover_of_rooms
 
-SEEDS = range(size(short=6, full=40))
+SEEDS = range(size(short=4, full=40))
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ def by_each_kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("views", [1, 3])
-@pytest.mark.parametrize("seed", range(size(short=8, full=100)))
+@pytest.mark.parametrize("seed", range(size(short=4, full=100)))
 def test_rows_and_their_order_are_the_same_in_numpy_as_written_and_compiled(
     seed: int, views: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,7 +16,7 @@ from tests.planner.selection.test_swaps import cover_of_rooms
 
 
 @pytest.mark.parametrize("views", [1, 3])
-@pytest.mark.parametrize("seed", range(size(short=8, full=100)))
+@pytest.mark.parametrize("seed", range(size(short=4, full=100)))
 def test_the_search_is_the_same_in_numpy_as_written_and_compiled(
     seed: int, views: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,6 +16,7 @@ from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.document import Mission
+from stopgo.mission.files import mission_json
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.read_back import upload_of
@@ -119,11 +120,21 @@ def _said(message: Any, vehicle: Vehicle, rows: list[Row], now_ns: int) -> None:
     vehicle.receive(packed.decode(bytearray(message.pack(packed))))
 
 
+_UNDISTURBED: dict[tuple[Any, ...], list[Row]] = {}
+"""What a station hears of drives that nobody disturbs, by all that they depend on."""
+
+
 def logged(
     path: Path, plan: Mission, *, kept: Callable[[int, str], bool] = lambda ns, name: True, **given: Any
 ) -> Path:
     """A station's log of that. `kept` decides which of the vehicle's messages it hears, by time and name."""
-    rows = heard(path.parent, plan, **given)
+    if {"orders", "witness"}.isdisjoint(given):
+        key = (mission_json.encode(plan), *sorted(given.items()))
+        if key not in _UNDISTURBED:
+            _UNDISTURBED[key] = heard(path.parent, plan, **given)
+        rows = _UNDISTURBED[key]
+    else:
+        rows = heard(path.parent, plan, **given)
     return write_telemetry_log(
         path, [row for row in rows if row[1] != ROVER or kept(row[0], row[2].get_type())]
     )

@@ -20,11 +20,13 @@ from stopgo.mission.files.exports import FORMATS, exported
 from stopgo.mission.files.exports.format import FloorDrawing, Supplements
 from stopgo.mission.files.exports.stops_dxf import LAYERS
 from stopgo.mission.files.exports.stretches import Stretches
+from tests.faults.sizes import some
 from tests.mission.files.exports.worlds import laboratory, surveyed
 from tests.mission.worlds import square_tour
 
 UNITS = {4: 0.001, 5: 0.01, 6: 1.0, 1: 0.0254}
 """$INSUNITS and metres."""
+VERSIONS = ("R12", "R2000", "R2004", "R2018")
 COVERAGE = Stretches(np.array([[[0.0, 5], [1, 5]]]), np.array([[[1.0, 5], [2, 5]], [[2, 5], [2, 6.0]]]))
 
 
@@ -89,8 +91,9 @@ def test_a_polyline_per_leg_and_the_return_dashed() -> None:
     assert [line.dxf.linetype for line in lines] == ["BYLAYER", "BYLAYER", "SCAN_BACK"]
 
 
-@pytest.mark.parametrize("code", UNITS)
-@pytest.mark.parametrize("version", ["R12", "R2000", "R2004", "R2018"])
+@pytest.mark.parametrize(
+    ("code", "version"), some([(code, version) for code in UNITS for version in VERSIONS], every=5)
+)
 def test_layers_lie_on_a_drawing_in_any_unit_and_version(code: int, version: str) -> None:
     unit = UNITS[code]
     supplements = Supplements(floor=floor(unit, code, version), coverage=COVERAGE)

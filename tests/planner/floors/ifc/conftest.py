@@ -28,7 +28,7 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 @pytest.fixture
 def read(models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
     """Reads a house's storey; the model is made in this process."""
-    monkeypatch.setattr(loading, "_run", _in_process)
+    monkeypatch.setattr(loading, "_run", in_process)
 
     def reading(house: House, **options: object) -> FloorPlan:
         path = house.write(tmp_path / "house.ifc")
@@ -37,7 +37,8 @@ def read(models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
     return reading
 
 
-def _in_process(source: Path, out: Path, rest: list[str]) -> int:
+def in_process(source: Path, out: Path, rest: list[str]) -> int:
+    """Extraction of a model in this process."""
     from stopgo.planner.floors.ifc.extract import main
 
     return main([str(source), str(out), *rest])

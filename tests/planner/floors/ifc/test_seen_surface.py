@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.planner.floors import FloorOptions, read_floor
-from tests.planner.floors.ifc.conftest import Read
+from stopgo.planner.floors.ifc import loading
+from tests.planner.floors.ifc.conftest import Read, in_process
 from tests.planner.floors.ifc.house import House, two_rooms
 
 
@@ -31,14 +33,24 @@ def with_box(house: House, name: str, box: tuple[float, ...], ifc_class: str = "
     return house
 
 
+@pytest.fixture(scope="module")
+def boarded(models: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """Model of two rooms with a low board before a wall, and the surface of its plan; they are only read."""
+    path = with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)).write(
+        tmp_path_factory.mktemp("boarded") / "house.ifc"
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loading, "_run", in_process)
+        return path, planned(path, "--no-register")
+
+
 def test_bare_rooms_are_seen_over_their_whole_height(read: Read, tmp_path: Path) -> None:
     read(two_rooms())
     assert share(planned(tmp_path / "house.ifc")) > 0.97
 
 
-def test_a_low_board_before_a_wall_hides_its_foot(read: Read, tmp_path: Path) -> None:
-    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
-    covered = share(planned(tmp_path / "house.ifc"))
+def test_a_low_board_before_a_wall_hides_its_foot(boarded: tuple[Path, dict]) -> None:
+    covered = share(boarded[1])
     assert 0.80 < covered < 0.97
 
 
@@ -63,9 +75,8 @@ def test_beams_above_a_ceiling_are_no_targets(read: Read, tmp_path: Path) -> Non
     assert "of beams: they are no targets" in told
 
 
-def test_elements_have_the_heights_of_their_bodies(read: Read, tmp_path: Path) -> None:
-    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
-    floor = read_floor(tmp_path / "house.ifc", FloorOptions(storey="EG"))
+def test_elements_have_the_heights_of_their_bodies(boarded: tuple[Path, dict]) -> None:
+    floor = read_floor(boarded[0], FloorOptions(storey="EG"))
     heights = {item.heights for item in floor.elements if item.kind == "other"}
     assert heights == {(0.0, 1.0)}
 
@@ -87,14 +98,12 @@ def test_a_drawing_has_no_solids(tmp_path: Path) -> None:
     assert read_floor(tmp_path / "plan.dxf").solids is None
 
 
+@pytest.mark.usefixtures("no_pairs")
 def test_a_proof_at_the_models_solids_agrees_with_the_plan(
-    read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    boarded: tuple[Path, dict], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("embreex")
-    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
-    planned(tmp_path / "house.ifc")
-    capsys.readouterr()
-    mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
+    mission, floor = copied(boarded[0], tmp_path)
     step = ["--angular-step", "0.5", "--json"]
     main(["prove", mission, "--floor", floor, "--solids", "model", *step])
     proof = json.loads(capsys.readouterr().out)
@@ -103,12 +112,19 @@ def test_a_proof_at_the_models_solids_agrees_with_the_plan(
     assert proof["simulation"]["solids"] == "model"
 
 
+def copied(model: Path, into: Path) -> tuple[str, str]:
+    """A copy of a model's plan, for a proof to write beside it; the mission's path and the model's."""
+    shutil.copytree(model.parent / "plan", into / "plan")
+    return str(into / "plan" / "mission.json"), str(model)
+
+
+@pytest.mark.usefixtures("no_pairs")
 def test_a_plan_that_claims_more_than_the_model_shows_is_not_met(
-    read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    boarded: tuple[Path, dict], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("embreex")
-    read(with_box(two_rooms(), "board", (4.2, 3.3, 0, 9.5, 3.5, 1.0)))
-    surface = planned(tmp_path / "house.ifc")
+    mission, floor = copied(boarded[0], tmp_path)
+    surface = boarded[1]
     seen = surface["kinds"]["walls"]["seen_m2"]
     coverage = tmp_path / "plan" / "coverage.json"
     text = coverage.read_text().replace(
@@ -116,7 +132,6 @@ def test_a_plan_that_claims_more_than_the_model_shows_is_not_met(
     )
     coverage.write_text(text)
     capsys.readouterr()
-    mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
     assert main(["prove", mission, "--floor", floor, "--solids", "model", "--angular-step", "0.5"]) == 1
     assert "area of walls: 100.0 % claimed, the model's solids show" in capsys.readouterr().out
 
@@ -152,6 +167,7 @@ def planned_walls(read: Read, house: House, tmp_path: Path, scanner: Sequence[st
     return planned(tmp_path / "house.ifc", "--coverage", "1", *scanner)["kinds"]["walls"]
 
 
+@pytest.mark.usefixtures("no_pairs")
 def test_what_lies_between_two_rays_is_not_acquired_and_not_claimed(
     read: Read, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
