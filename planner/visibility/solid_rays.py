@@ -22,6 +22,7 @@ from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace, Visibility
 from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.visibility.covered_faces import covered_faces
 from stopgo.planner.visibility.unit_ranges import ranges, visibility_of
 
 COLUMN_M = 0.05
@@ -67,10 +68,12 @@ class SolidRays:
         self.cells = UnitCells.of(space, solids)
         self._along = _along(space)
         self._outward = _outward(space, self._along)
+        covered = covered_faces(self._targets, solids.triangles, self._outward, self.cells.z)
+        self._open = self.cells.there & ~covered
 
     def reached(self, xy: FloatArray, units: IntArray) -> BoolArray:
         """True for the heights (n, k) of units (n,) that rays from above `xy`, (2,) or (n, 2), reach."""
-        return self._followed(xy, units, self.cells.z[units]) & self.cells.there[units]
+        return self._followed(xy, units, self.cells.z[units]) & self._open[units]
 
     def clear(self, xy: FloatArray, units: IntArray) -> BoolArray:
         """True for units (n,) of which rays from scanners above `xy` (n, 2) reach any height."""
@@ -79,6 +82,7 @@ class SolidRays:
         found = np.ones(len(units), dtype=bool)
         for part in _parts(len(units), MOST_PAIRS):
             found[part] = self._followed(xy[part], units[part], nearest[part, None])[:, 0]
+        found &= ~(self.cells.there & ~self._open)[units].any(axis=1)
         rest = np.flatnonzero(~found)
         for part in _parts(len(rest), MOST_PAIRS // max(1, self.cells.z.shape[1])):
             found[rest[part]] = self.reached(xy[rest[part]], units[rest[part]]).any(axis=1)

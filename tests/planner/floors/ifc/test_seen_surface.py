@@ -63,6 +63,18 @@ def test_a_hung_ceiling_hides_the_walls_above_it(read: Read, tmp_path: Path) -> 
     assert share(bare) - share(hung) > 0.15
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.03])
+def test_the_sides_between_two_beams_are_not_seen(read: Read, tmp_path: Path, gap: float) -> None:
+    def surface(between: float) -> dict:
+        house = with_box(two_rooms(), "beam", (1.0, 1.0, 2.3, 3.0, 1.2, 2.5), "IfcBeam")
+        beside = (1.0, 1.2 + between, 2.3, 3.0, 1.4 + between, 2.5)
+        read(with_box(house, "beside", beside, "IfcBeam"))
+        return planned(tmp_path / "house.ifc", "--no-register", "--coverage", "1")
+
+    apart, side_by_side = (surface(between)["kinds"]["beams"] for between in (0.6, gap))
+    assert side_by_side["seen_m2"] < apart["seen_m2"] - 0.9 * 2 * 0.2 * 2.0 + 0.01
+
+
 def test_beams_above_a_ceiling_are_no_targets(read: Read, tmp_path: Path) -> None:
     house = with_box(two_rooms(), "beam", (1.0, 1.0, 2.3, 3.0, 1.2, 2.5), "IfcBeam")
     read(house)
