@@ -34,7 +34,17 @@ OTHER_AREA = 1e-4
 
 
 def cut_bodies(model: ifcopenshell.file, entities: list[Any]) -> Iterator[Made]:
-    """Bodies minus their openings of those entities that the cutter can be trusted with."""
+    """Bodies minus their openings of those entities that the cutter can be trusted with.
+
+    None where IfcOpenShell was built without this kernel: versions before 0.9 were.
+    """
+    try:
+        yield from _cut(model, entities)
+    except RuntimeError:
+        return
+
+
+def _cut(model: ifcopenshell.file, entities: list[Any]) -> Iterator[Made]:
     found = {entity.id(): _openings(entity) for entity in entities}
     openings = {number: own for number, own in found.items() if own}
     exact = _made_alike(model, sorted({*openings, *(number for own in openings.values() for number in own)}))

@@ -52,6 +52,13 @@ def test_an_open_surface_is_left_to_the_usual_kernel() -> None:
     assert set(cut_walls(house)) == {"middle"}
 
 
+def test_all_walls_are_left_to_the_usual_kernel_where_the_fast_one_is_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(opening_cuts, "CUTTER", "no such kernel")
+    assert cut_walls(two_rooms()) == {}
+
+
 @pytest.mark.parametrize("fault", ["another body", "beyond the body", "cut too much"])
 def test_a_wrong_cut_is_left_to_the_usual_kernel(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The fast kernel makes the south wall 1 mm longer, cut 1 cm too long, or cut 1 m too low."""
