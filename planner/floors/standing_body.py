@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -25,12 +26,23 @@ class StandingBody:
     height: float
     """Height in the middle of the robot, metres."""
 
+    @cached_property
+    def _box(self) -> tuple[float, float, float, float]:
+        """Least and greatest x and y of the body, metres: x0, y0, x1, y1."""
+        low, high = self.triangles[..., :2].min(axis=(0, 1)), self.triangles[..., :2].max(axis=(0, 1))
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
     def encloses(self, x: float, y: float) -> bool:
         """True if the point at the robot's middle lies in the body: a ray upwards leaves it.
 
         The ray is moved by micrometres, so that it meets no edge of two triangles: it would count neither.
         """
         at = (x + _ASIDE[0], y + _ASIDE[1], self.height)
+        if not len(self.triangles):
+            return False
+        x0, y0, x1, y1 = self._box
+        if not (x0 <= at[0] <= x1 and y0 <= at[1] <= y1):
+            return False
         a, b, c = (self.triangles[:, corner] - at for corner in range(3))
         ab, bc, ca = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a)))
         met = ((ab > 0) & (bc > 0) & (ca > 0)) | ((ab < 0) & (bc < 0) & (ca < 0))

@@ -9,6 +9,7 @@ the plan's own exact visibility has decided.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -327,13 +328,29 @@ class _MarkedColumns:
 
 
 def _samples(triangles: FloatArray) -> Iterator[FloatArray]:
-    """Points (n, 3) on triangles, at most SAMPLE_M apart."""
-    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    count = np.maximum(1, np.ceil(longest / SAMPLE_M)).astype(np.int64)
-    for many in np.unique(count).tolist():
-        own = triangles[count == many]
-        i, j = np.triu_indices(many + 1)
-        weights = np.column_stack([i, j - i, many - j]) / many
+    """Points (n, 3) on triangles: on lines along the longest side, both at most SAMPLE_M apart."""
+    if not len(triangles):
+        return
+    sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    turned = (np.argmax(sides, axis=1)[:, None] + np.arange(3)) % 3
+    triangles, longest = np.take_along_axis(triangles, turned[..., None], axis=1), sides.max(axis=1)
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    height = np.linalg.norm(across, axis=1) / np.maximum(longest, 1e-12)
+    counts = np.maximum(1, np.ceil(np.column_stack([longest, height]) / SAMPLE_M)).astype(np.int64)
+    found, group = np.unique(counts, axis=0, return_inverse=True)
+    for number, (along, up) in enumerate(found.tolist()):
+        own = triangles[group.ravel() == number]
+        weights = _weights(along, up)
         for part in np.array_split(own, max(1, -(-len(own) * len(weights) // MOST_SAMPLES))):
             if len(part):
                 yield np.einsum("wk,nkd->nwd", weights, part).reshape(-1, 3)
+
+
+def _weights(along: int, up: int) -> FloatArray:
+    """Weights of a triangle's corners (n, 3) on `up` lines along its first side, `along` steps on that."""
+    lines = []
+    for k in range(up + 1):
+        share = 1 - k / up
+        at = np.linspace(0.0, share, 1 + math.ceil(along * share))
+        lines.append(np.column_stack([share - at, at, np.full(len(at), 1 - share)]))
+    return np.concatenate(lines)

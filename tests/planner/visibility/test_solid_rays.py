@@ -11,7 +11,7 @@ from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import Settings
 from stopgo.planner.space.navigable import navigable
-from stopgo.planner.visibility.solid_rays import UnitCells
+from stopgo.planner.visibility.solid_rays import SAMPLE_M, UnitCells, _samples
 from tests.planner.worlds import hall
 
 
@@ -38,3 +38,20 @@ def test_the_end_of_a_wall_across_is_no_face_of_a_unit(x: float) -> None:
     cells, xy = cells_of([(0, 0, 0), (6, 0, 0), (6, 0, 1)], [(0, 0, 0), (6, 0, 1), (0, 0, 1)], across)
     south = np.isclose(xy[:, 1], 0)
     assert np.array_equal(cells.there[south], cells.z[south] <= 1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_point_of_a_triangle_is_near_a_sample_and_slivers_have_few(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    shapes = random.uniform(0, 0.8, (20, 3, 3))
+    sliver = np.array([[0, 0, 0], [6.0, 0.1, 0], [2.0, 0.05, 0.02]]) + random.uniform(0, 1, 3)
+    for triangle in (*shapes, sliver):
+        samples = np.concatenate(list(_samples(triangle[None])))
+        weights = random.dirichlet((1, 1, 1), 200)
+        away = np.linalg.norm((weights @ triangle)[:, None] - samples, axis=2).min(axis=1)
+        assert away.max() <= SAMPLE_M
+    assert len(np.concatenate(list(_samples(sliver[None])))) < 2 * 6.1 / SAMPLE_M * 3
+
+
+def test_no_triangles_have_no_samples() -> None:
+    assert list(_samples(np.empty((0, 3, 3)))) == []
