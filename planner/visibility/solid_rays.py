@@ -31,7 +31,7 @@ COLUMN_M = 0.05
 MOST_COLUMNS = 20_000_000
 LEVELS = 64
 """Heights of a column: the bits of its pattern."""
-SAMPLE_M = 0.03
+SAMPLE_M = 0.02
 """Distance of the points by which a surface is marked."""
 MOST_SAMPLES = 2_000_000
 """Points marked at a time."""
