@@ -83,7 +83,7 @@ def blind_cone_deg(settings: Settings) -> float:
 
 def scanner_height(settings: Settings) -> float:
     """Return the metres from the floor to the scanner."""
-    return settings.scanner_height or settings.scan_height or SCANNER_HEIGHT_M
+    return settings.scanner_height or section_height(settings)
 
 
 def section_height(settings: Settings) -> float:

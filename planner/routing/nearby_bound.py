@@ -26,7 +26,10 @@ STEPS = 1_000
 WORK = 30_000_000
 """Edges sorted in all one-trees together, so that those of long tours are fewer."""
 FIRST_STEP = 1.0
-"""First change of a weight, in lengths of half a mean edge; twice as long ones never reach a higher bound."""
+"""First change of a weight, in lengths of half a mean edge.
+
+Of 4 649 stops of an office twice as long a step never reached a higher bound than none.
+"""
 
 
 def nearby_bound(paths: NearbyPaths, last: FloatArray | None, *, best: int) -> int:

@@ -23,7 +23,11 @@ COMPARE_ALL_UP_TO = 9
 ROUNDS = 100
 """Perturbations per point that are tried; a count, so that plans do not depend on speed."""
 MOST_TRIALS = 100_000
-"""Perturbations of a long tour: of rooms along corridors ten per point find the tour of a hundred."""
+"""Perturbations of a long tour.
+
+Of 4 649 stops in rooms along corridors ten per point find the tour of a hundred. Of as many points scattered
+in an open square twenty per point find one 0.24 % longer.
+"""
 SHORT = 30
 """Points of a short tour, which is mostly found in the first search."""
 ROUNDS_OF_SHORT = 20

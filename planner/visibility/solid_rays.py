@@ -69,12 +69,18 @@ class SolidRays:
         self.cells = UnitCells.of(space, solids)
         self._along = _along(space)
         self._outward = _outward(space, self._along)
-        covered = covered_faces(self._targets, solids.triangles, self._outward, self.cells.z)
-        self._open = self.cells.there & ~covered
+        self._covered = self.cells.there & covered_faces(
+            space.targets,
+            solids.triangles[~_is_upright(solids.triangles)],
+            self._outward,
+            self.cells.z,
+            before_m=(ASIDE_M, AT_TARGET_M / 2, AT_TARGET_M),
+        )
 
     def reached(self, xy: FloatArray, units: IntArray) -> BoolArray:
         """True for the heights (n, k) of units (n,) that rays from above `xy`, (2,) or (n, 2), reach."""
-        return self._followed(xy, units, self.cells.z[units]) & self._open[units]
+        open_ = self.cells.there[units] & ~self._covered[units]
+        return self._followed(xy, units, self.cells.z[units]) & open_
 
     def clear(self, xy: FloatArray, units: IntArray) -> BoolArray:
         """True for units (n,) of which rays from scanners above `xy` (n, 2) reach any height."""
@@ -83,7 +89,7 @@ class SolidRays:
         found = np.ones(len(units), dtype=bool)
         for part in _parts(len(units), MOST_PAIRS):
             found[part] = self._followed(xy[part], units[part], nearest[part, None])[:, 0]
-        found &= ~(self.cells.there & ~self._open)[units].any(axis=1)
+        found &= ~self._covered[units].any(axis=1)
         rest = np.flatnonzero(~found)
         for part in _parts(len(rest), MOST_PAIRS // max(1, self.cells.z.shape[1])):
             found[rest[part]] = self.reached(xy[rest[part]], units[rest[part]]).any(axis=1)
