@@ -40,7 +40,7 @@ from functools import cached_property
 
 import numpy as np
 
-from stopgo.mission.document.schedule import straight_times
+from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
