@@ -99,7 +99,8 @@ for line in sys.argv[1:]:
     lines = [
         "--version", "status --help", "plan nothere.dxf --range 8 --robots 2 --start 2.5,3,90",
         "pause --robot r1 --connect nowhere", "review a.rrd b.rrd --json", "keys issue --help-all",
-        "robot --name r1 --state nothere --listen nowhere", "watch --mavlink nowhere:1", "export nothere.json -o x.plan", "plan --help-all",
+        "robot --name r1 --state nothere --listen nowhere",
+        "watch --mavlink nowhere:1", "export nothere.json -o x.plan", "plan --help-all",
     ]  # fmt: skip
     done = subprocess.run([sys.executable, "-c", code, *lines], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-600:]
