@@ -83,6 +83,7 @@ def reach_of(space: NavigableSpace) -> Reach:
     return Reach(space)
 
 
+@instance_cached
 def walls_of(space: NavigableSpace) -> Walls:
     """Everything that a robot's centre keeps clear of: obstacles, closed openings, floor edges."""
     origin = local_origin(space.floor)
