@@ -15,7 +15,7 @@ import pytest
 
 import stopgo
 from stopgo.mission.errors import InputError
-from tests.test_house import MODULES
+from tests.sources import MODULES
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -90,6 +90,7 @@ def room_areas_by_part(space: NavigableSpace) -> tuple[dict[int, float], ...]:
     return tuple(parts.area_by_part(to_shape(room.area, origin)) for room in space.rooms)
 
 
+@instance_cached
 def walls_of(space: NavigableSpace) -> Walls:
     """Everything that a robot's centre keeps clear of: obstacles, closed openings, floor edges."""
     origin = local_origin(space.floor)
