@@ -68,7 +68,9 @@ def _converted(value: Any, kind: Any, info: Any) -> Any:
         return _path(value)
     if kind not in (int, float):
         return NOT_PLAIN
-    if type(value) is not kind:
+    if kind is float and type(value) is int:  # a default
+        value = float(value)
+    elif type(value) is not kind:
         if type(value) is not str or not (WHOLE if kind is int else DECIMAL).fullmatch(value):
             return NOT_PLAIN
         value = kind(value)

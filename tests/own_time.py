@@ -51,10 +51,11 @@ class _Waiting:
 
     __slots__ = ("gate", "gone_on")
 
-    def __init__(self) -> None:
-        self.gate = threading.Lock()
-        self.gate.acquire()
+    def __init__(self, gate: Any) -> None:
+        self.gate = gate
+        """A lock that is held until the thread goes on."""
         self.gone_on = False
+        """True once it goes on, or does not wait after all."""
 
 
 class World:
@@ -71,6 +72,8 @@ class World:
         """How often any thread did."""
         self._timers: list[tuple[int, int, _Waiting]] = []
         self._parked: set[_Waiting] = set()
+        self._gates: list[Any] = []
+        """Gates that nobody waits at."""
         self._over = False
         self.ports: dict[tuple[str, int], UdpIn] = {}
         world = self
@@ -92,12 +95,13 @@ class World:
     @property
     def shims(self) -> dict[object, object]:
         """Stand-ins for the imports of a module in the world."""
+        looks = self._looks
         of_threads = _Instead(
             threading, Lock=self.Lock, RLock=self.RLock, Condition=self.Condition, Event=self.Event,
             Thread=self.Thread,
         )  # fmt: skip
         of_time = _Instead(
-            time, monotonic=lambda: self.monotonic_ns() / 1e9, monotonic_ns=self.monotonic_ns,
+            time, monotonic=lambda: (self._now_ns + next(looks)) / 1e9, monotonic_ns=self.monotonic_ns,
             time=lambda: self.time_ns() / 1e9, time_ns=self.time_ns, sleep=self.sleep,
         )  # fmt: skip
         of_queues = _Instead(queue, Queue=self.Queue, SimpleQueue=self.Queue)
@@ -130,22 +134,43 @@ class World:
 
     # How threads wait, with the monitor held
 
-    def _park(self, line: deque[_Waiting] | None, due_ns: int | None) -> None:
-        """Wait until `_let_on` or until the time is up."""
-        me = _Waiting()
-        self._parked.add(me)
+    def _line_up(self, line: deque[_Waiting] | None) -> _Waiting:
+        """Stand in line for what another thread may give from now on, without the monitor too."""
+        if self._gates:
+            gate = self._gates.pop()
+        else:
+            gate = threading.Lock()
+            gate.acquire()
+        me = _Waiting(gate)
         if line is not None:
             line.append(me)
+        return me
+
+    def _leave(self, me: _Waiting) -> None:
+        """Wait for nothing after all."""
+        me.gone_on = True
+        self._gates.append(me.gate)
+
+    def _park(self, line: deque[_Waiting] | None, due_ns: int | None) -> None:
+        """Wait until `_let_on` or until the time is up."""
+        self._park_as(self._line_up(line), due_ns)
+
+    def _park_as(self, me: _Waiting, due_ns: int | None) -> None:
+        self._parked.add(me)
         if due_ns is not None:
             heapq.heappush(self._timers, (due_ns, next(self._count), me))
         self._rest()
-        self._monitor.release()
-        try:
-            self._wait_at(me.gate)
-        finally:
-            self._monitor.acquire()
+        if me.gone_on:  # the time has jumped to the end of this very wait
+            me.gate.acquire()
+        else:
+            self._monitor.release()
+            try:
+                self._wait_at(me.gate)
+            finally:
+                self._monitor.acquire()
         if self._over:
             raise _Over
+        self._gates.append(me.gate)
 
     def _wait_at(self, gate: Any) -> None:
         """Until it opens, however long that takes, as long as some thread of the world goes on meanwhile."""
@@ -198,61 +223,47 @@ class _Instead(SimpleNamespace):
 
 
 class _Lock:
+    """A lock of Python's that is never waited at: who finds it held stands in line."""
+
     _world: World
+    _made = staticmethod(threading.Lock)
 
     def __init__(self) -> None:
-        self._held = False
+        self._held: Any = self._made()
         self._line: deque[_Waiting] = deque()
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        return self._held.acquire(False) or (blocking and self._wait(timeout))
+
+    def _wait(self, timeout: float) -> bool:
         world = self._world
         with world._monitor:
             due_ns = world._due_ns(None if timeout < 0 else timeout)
-            while self._held:
-                if not blocking or world._is_past(due_ns):
-                    return False
-                world._park(self._line, due_ns)
-            self._held = True
-            return True
+            while True:
+                me = world._line_up(self._line)
+                if (is_mine := self._held.acquire(False)) or world._is_past(due_ns):
+                    world._leave(me)
+                    return is_mine
+                world._park_as(me, due_ns)
 
     def release(self) -> None:
-        with self._world._monitor:
-            self._set_free()
-
-    def _set_free(self) -> None:
-        self._held = False
-        self._world._let_on_first(self._line)
+        self._held.release()
+        if self._line:
+            with self._world._monitor:
+                self._world._let_on_first(self._line)
 
     def locked(self) -> bool:
-        return self._held
+        return self._held.locked()
 
     def __enter__(self) -> bool:
-        return self.acquire()
+        return self._held.acquire(False) or self._wait(-1)
 
     def __exit__(self, *exception: object) -> None:
         self.release()
 
 
 class _RLock(_Lock):
-    def __init__(self) -> None:
-        super().__init__()
-        self._owner = 0
-        self._times = 0
-
-    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        me = threading.get_ident()
-        if self._owner != me:
-            if not super().acquire(blocking, timeout):
-                return False
-            self._owner = me
-        self._times += 1
-        return True
-
-    def release(self) -> None:
-        self._times -= 1
-        if self._times == 0:
-            self._owner = 0
-            super().release()
+    _made = staticmethod(threading.RLock)
 
 
 class _Condition:
@@ -274,8 +285,10 @@ class _Condition:
     def _wait(self, due_ns: int | None) -> bool:
         world = self._world
         with world._monitor:
-            self._lock._set_free()
-            world._park(self._line, due_ns)
+            me = world._line_up(self._line)
+            self._lock._held.release()
+            world._let_on_first(self._lock._line)
+            world._park_as(me, due_ns)
             in_time = not world._is_past(due_ns)
         self._lock.acquire()
         return in_time
@@ -289,8 +302,9 @@ class _Condition:
         return True
 
     def notify(self, count: int = 1) -> None:
-        with self._world._monitor:
-            self._world._let_on_first(self._line, count)
+        if self._line:
+            with self._world._monitor:
+                self._world._let_on_first(self._line, count)
 
     def notify_all(self) -> None:
         self.notify(len(self._line))
@@ -315,6 +329,8 @@ class _Event:
         self._is_set = False
 
     def wait(self, timeout: float | None = None) -> bool:
+        if self._is_set:
+            return True
         with self._world._monitor:
             if not self._is_set:
                 self._world._park(self._line, self._world._due_ns(timeout))
@@ -331,23 +347,39 @@ class _Queue:
 
     def put(self, item: Any) -> None:
         """As of a queue without end: nobody here waits for room."""
-        with self._world._monitor:
-            if self._most and len(self._items) >= self._most:
-                raise queue.Full
-            self._items.append(item)
-            self._world._let_on_first(self._line)
+        if self._most and len(self._items) >= self._most:
+            raise queue.Full
+        self._items.append(item)
+        if self._line:
+            with self._world._monitor:
+                self._world._let_on_first(self._line)
 
     put_nowait = put
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
+        try:
+            return self._items.popleft()
+        except IndexError:
+            if not block:
+                raise queue.Empty from None
+        return self._wait_for_one(timeout)
+
+    def _wait_for_one(self, timeout: float | None) -> Any:
         world = self._world
         with world._monitor:
             due_ns = world._due_ns(timeout)
-            while not self._items:
-                if not block or world._is_past(due_ns):
-                    raise queue.Empty
-                world._park(self._line, due_ns)
-            return self._items.popleft()
+            while True:
+                me = world._line_up(self._line)
+                try:
+                    item = self._items.popleft()
+                except IndexError:
+                    if world._is_past(due_ns):
+                        world._leave(me)
+                        raise queue.Empty from None
+                    world._park_as(me, due_ns)
+                else:
+                    world._leave(me)
+                    return item
 
     def get_nowait(self) -> Any:
         return self.get(block=False)

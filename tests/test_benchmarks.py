@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,18 @@ from benchmarks import ages
 from benchmarks.ages import Section, digest, marked, sections, stamp
 
 pytestmark = pytest.mark.together("sources")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _imports_are_read_once() -> Iterator[None]:
+    """Read the imports of each module once, for all benchmarks that load it."""
+    names = cache(lambda module: tuple(_names(module)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ages, "_names", names)
+        yield
+
+
+_names = ages._names
 
 BLOCKS = """
 ## Growth

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.test_house import MODULES, tree_of
+from tests.sources import MODULES, ROOT, source_of
 
 pytestmark = pytest.mark.together("sources")
 
-ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md")])
 GUIDES = [ROOT / "README.md", ROOT / "SECURITY.md", *sorted(ROOT.glob("docs/**/*.md"))]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -80,12 +78,7 @@ def paragraphs(page: Path) -> Iterator[str]:
 
 def messages(name: str) -> Iterator[str]:
     """Texts in a module's code that a user may read: constants of several words that are no docstrings."""
-    comments = set()
-    for node in ast.walk(tree_of(name)):
-        if isinstance(node, ast.Expr):
-            comments.add(id(node.value))  # before the walk comes to it
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in comments:
-            yield from [node.value] * (" " in node.value.strip())
+    return (text for text in source_of(name).texts if " " in text.strip())
 
 
 def test_retired_words_are_found_where_they_are_words() -> None:
@@ -114,13 +107,11 @@ def test_messages_and_help_use_no_retired_word() -> None:
 
 
 def test_docstrings_use_no_retired_word() -> None:
-    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
     found = [
         f"{name}: {one[0]!r} in: {text}"
         for name in MODULES
-        for node in ast.walk(tree_of(name))
-        if isinstance(node, kinds)
-        for text in [re.sub(r"`[^`]*`|^\w+$", "", ast.get_docstring(node) or "", flags=re.MULTILINE)]
+        for docstring in source_of(name).docstrings
+        for text in [re.sub(r"`[^`]*`|^\w+$", "", docstring, flags=re.MULTILINE)]
         for one in ANY_RETIRED.finditer(text)
     ]
     assert not found, "\n".join(found)

@@ -7,36 +7,15 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 import pytest
 
 from stopgo.command_line import COMMANDS, front_door, main
+from tests.sources import FOLDERS, MODULES, ROOT, source_of
 
 pytestmark = pytest.mark.together("sources")
 
-ROOT = Path(__file__).parents[1]
-FOLDERS = ("mission", "planner", "bridge", "recordings")
 FRONT_DOOR = "stopgo.command_line"
-
-
-def modules() -> dict[str, Path]:
-    """Every module of the front door and of the four folders, by its dotted name."""
-    found = {}
-    for folder in ("stopgo", *FOLDERS):
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            parts = path.relative_to(ROOT).with_suffix("").parts
-            whole = parts if folder == "stopgo" else ("stopgo", *parts)
-            found[".".join(whole[:-1] if whole[-1] == "__init__" else whole)] = path
-    return found
-
-
-MODULES = modules()
-
-
-@cache
-def tree_of(name: str) -> ast.Module:
-    return ast.parse(MODULES[name].read_text(encoding="utf-8"))
 
 
 @cache
@@ -46,10 +25,10 @@ def imported(name: str) -> tuple[str, ...]:
 
 
 def _imported(name: str) -> Iterator[str]:
-    for node in ast.walk(tree_of(name)):
+    for node in source_of(name).imports:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in MODULES)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert node.level == 0, f"{name}: a relative import; write the whole name"
             if str(node.module) in MODULES:
                 yield from _from(node)
@@ -174,15 +153,6 @@ SAME_NAME = {
 """Why modules of one name may stand beside each other."""
 
 
-def _public_types(name: str) -> Iterator[str]:
-    """Classes of a module, and types to which it gives a name."""
-    for node in tree_of(name).body:
-        if isinstance(node, ast.ClassDef):
-            yield node.name
-        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-            yield node.targets[0].id
-
-
 def _is_type(name: str) -> bool:
     bare = name.lstrip("_")
     return len(bare) > 1 and bare[0].isupper() and not bare.isupper()
@@ -191,7 +161,7 @@ def _is_type(name: str) -> bool:
 def test_a_class_name_stands_for_one_thing() -> None:
     homes: dict[str, set[str]] = {}
     for name in MODULES:
-        for item in filter(_is_type, _public_types(name)):
+        for item in filter(_is_type, source_of(name).types):
             homes.setdefault(item, set()).add(name)
     assert not {item: found for item, found in homes.items() if len(found) > 1}
 
@@ -233,7 +203,7 @@ def test_what_a_run_is_knows_no_clock_no_disk_and_no_line() -> None:
 
 
 def _packages_imported_by(name: str) -> set[str]:
-    nodes = list(ast.walk(tree_of(name)))
+    nodes = source_of(name).imports
     named = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     named |= {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)}
     return {one.partition(".")[0] for one in named}
@@ -282,12 +252,7 @@ KERNELS = {"grow", "look", "look_all", "look_from_cell", "look_from_all_cells", 
 
 def test_no_function_is_longer_than_forty_lines() -> None:
     found = {
-        name: {
-            node.name
-            for node in ast.walk(tree_of(name))
-            if isinstance(node, ast.FunctionDef) and (node.end_lineno or 0) - node.lineno >= 40
-        }
-        for name in MODULES
+        name: {function for function, lines in source_of(name).functions if lines >= 40} for name in MODULES
     }
     assert not _filled({name: long - KERNELS for name, long in found.items()})
 
@@ -296,13 +261,11 @@ QUESTIONS = ("What", "Whether", "How", "Who", "Whose", "Where", "Which", "When",
 
 
 def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
-    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    found = {
-        name: {ast.get_docstring(node) or "" for node in ast.walk(tree_of(name)) if isinstance(node, kinds)}
-        for name in MODULES
-    }
     assert not _filled(
-        {name: {one for one in texts if one.split(" ")[0] in QUESTIONS} for name, texts in found.items()}
+        {
+            name: {one for one in source_of(name).docstrings if one.split(" ")[0] in QUESTIONS}
+            for name in MODULES
+        }
     )
 
 
@@ -315,7 +278,7 @@ def test_the_first_line_of_a_test_module_is_no_question() -> None:
 
 def test_every_module_says_what_it_is_for() -> None:
     for name in MODULES:
-        assert ast.get_docstring(tree_of(name)), f"{name} has no first sentence"
+        assert source_of(name).docstrings[0], f"{name} has no first sentence"
 
 
 def commands() -> list[str]:

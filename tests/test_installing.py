@@ -15,7 +15,8 @@ import pytest
 
 import stopgo
 from stopgo.mission.errors import InputError
-from tests.test_house import MODULES
+from tests.faults.sizes import FULL
+from tests.sources import MODULES
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -23,15 +24,21 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A site-packages that holds what the wheel brings, and a user's packages of our folders' names."""
+    """A site-packages that holds what the wheel brings, and a user's packages of our folders' names.
+
+    The short form leaves out pip, and with it the wheel around the same files.
+    """
     folder = tmp_path_factory.mktemp("installed")
     tree, site = folder / "tree", folder / "site"
     shutil.copytree(
         ROOT, tree, ignore=shutil.ignore_patterns(".*", "tests", "docs", "build", "demo"), symlinks=True
     )
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
+    pip = ["-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile", "--no-deps"]
+    by_pip = [*pip, "--no-build-isolation", "--target", str(site), "."]
+    built = ["setup.py", "--quiet", "build", "--build-lib", str(site)]
     subprocess.run(
-        [*pip, "--no-deps", "--no-build-isolation", "--target", str(site), str(tree)],
+        [sys.executable, *(by_pip if FULL else built)],
+        cwd=tree,
         env={**os.environ, "STOPGO_PURE": "yes"},
         check=True,
         capture_output=True,

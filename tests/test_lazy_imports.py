@@ -9,7 +9,7 @@ from functools import cache
 
 import pytest
 
-from tests.test_house import MODULES, tree_of
+from tests.sources import MODULES, source_of
 
 pytestmark = pytest.mark.together("sources")
 
@@ -38,20 +38,9 @@ REASONS = {
 @cache
 def _imports(name: str) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
     """Names that a module imports when it is loaded, and those of each import inside a function."""
-    loaded: list[str] = []
-    lazy: list[tuple[str, ...]] = []
-
-    def walk(node: ast.AST, *, inside: bool) -> None:
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.Import | ast.ImportFrom):
-                names = tuple(_names(child))
-                lazy.append(names) if inside else loaded.extend(names)
-            elif not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test)):
-                function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-                walk(child, inside=inside or function)
-
-    walk(tree_of(name), inside=False)
-    return tuple(loaded), tuple(lazy)
+    source = source_of(name)
+    loaded = tuple(one for node in source.loaded for one in _names(node))
+    return loaded, tuple(tuple(_names(node)) for node in source.lazy)
 
 
 def _names(node: ast.Import | ast.ImportFrom) -> Iterator[str]:
@@ -89,6 +78,10 @@ def test_an_import_inside_a_function_spares_a_library_or_has_a_reason() -> None:
 @pytest.mark.parametrize("name", ["stopgo.batches", "stopgo.planning_modules"])
 def test_a_batch_and_the_process_that_forks_its_workers_load_no_rerun(name: str) -> None:
     assert "rerun" not in _libraries(name), "its threads would not outlive a fork"
+
+
+def test_a_robot_starts_without_numpy() -> None:
+    assert "numpy" not in _libraries("stopgo.bridge.robot.program"), "it takes a third of the time to start"
 
 
 def _sparing_nothing(name: str) -> list[tuple[str, ...]]:

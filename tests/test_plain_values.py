@@ -30,10 +30,11 @@ KINDS: dict[str, Any] = {
     "paths": list[Path] | None,
     "share": Annotated[float, typer.Option(min=0.0, max=1.0)],
     "count": Annotated[int, typer.Option(min=1)],
+    "megabytes": float,
     "unusual": Annotated[Path | None, typer.Option(exists=True, dir_okay=False)],
     "toggle": bool,
 }
-DEFAULTS = {"share": 0.5, "count": 2, "toggle": False}
+DEFAULTS = {"share": 0.5, "count": 2, "megabytes": 512, "toggle": False}
 
 
 def command(cls: Any = None) -> Any:
@@ -98,6 +99,7 @@ for line in sys.argv[1:]:
     lines = [
         "--version", "status --help", "plan nothere.dxf --range 8 --robots 2 --start 2.5,3,90",
         "pause --robot r1 --connect nowhere", "review a.rrd b.rrd --json", "keys issue --help-all",
+        "robot --name r1 --state nothere --listen nowhere",
         "watch --mavlink nowhere:1", "export nothere.json -o x.plan", "plan --help-all",
     ]  # fmt: skip
     done = subprocess.run([sys.executable, "-c", code, *lines], capture_output=True, text=True, check=False)

@@ -20,19 +20,17 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages.sight import sight_of
 from stopgo.planner import plan
-from stopgo.planner.floors import read_floor
 from stopgo.recording_process import RecordingProcess, recording_process
 from stopgo.recordings.rrd.read import check
 from tests.disk import small_disk
+from tests.planner.worlds import two_rooms
 from tests.waiting import wait_until
-
-SAMPLE = Path(__file__).parents[1] / "recordings" / "samples" / "office.dxf"
 
 
 @pytest.fixture(scope="module")
 def results() -> tuple[object, ...]:
-    """Stage results of the sample office."""
-    part = plan(read_floor(SAMPLE), Settings()).parts[0]
+    """Stage results of a small floor."""
+    part = plan(two_rooms(0.9), Settings(range=4.0)).parts[0]
     sight = sight_of(part.route, part.mission, part.figures)
     return (*part.stage_results(), part.mission, schedule(part.mission), sight)
 

@@ -34,6 +34,10 @@ class JournalRows:
         """Sections of the journal's lock; a controller adds those of its own."""
         self._lock = WatchedLock(self.waits)
         self._writing = False
+        self._facts: dict[str, str | bytes | None] = {}
+        """Values of facts as they were read since the last transaction of any process."""
+        self._facts_of = 0
+        """The number that SQLite gave to the last transaction of another process."""
         self._behind: int | None = None
         """Number that the second file could not take; the next transaction tries again first."""
         self.commit_hook: Callable[[str], None] = lambda moment: None
@@ -71,6 +75,7 @@ class JournalRows:
                 yield
                 return
             self._writing = True
+            self._facts.clear()
             try:
                 with storage_errors():
                     self._begin()
@@ -86,6 +91,7 @@ class JournalRows:
                 raise
             finally:
                 self._writing = False
+                self._facts.clear()
             self.commit_hook("committed")
             self._number(number)
 
@@ -140,6 +146,27 @@ class JournalRows:
         """
         with self._lock:
             return read_rows(self.connection, table, clause, *values)
+
+    def fact(self, name: str) -> str | bytes | None:
+        """Return the value of a fact as it was written, `None` if there is none.
+
+        Outside transactions a row is read and checked once, until some process has written: who follows an
+        autopilot asks for several facts at each message, and few of them change.
+        """
+        with self._lock:
+            if self._writing:
+                return self._read_fact(name)
+            ((others,),) = self.connection.execute("PRAGMA data_version").fetchall()
+            if others != self._facts_of:
+                self._facts.clear()
+                self._facts_of = others
+            if name not in self._facts:
+                self._facts[name] = self._read_fact(name)
+            return self._facts[name]
+
+    def _read_fact(self, name: str) -> str | bytes | None:
+        rows = read_rows(self.connection, "facts", "WHERE name = ?", name)
+        return rows[0][1] if rows else None
 
     def write(self, table: str, *values: object) -> None:
         """Write a row; it replaces a row with the same key."""

@@ -299,7 +299,7 @@ def remaining_s(
         began_s = 0.0
     else:
         last = mission.stops[behind - 1]
-        began_s = float(plan.arrival_s[behind - 1]) + last.settle_s + last.scan.duration_s
+        began_s = plan.arrival_s[behind - 1] + last.settle_s + last.scan.duration_s
     since = max((event.mission_time_s for event in events if isinstance(event, Scanned)), default=0.0)
     worked_s = elapsed_s - since - paused_s(events, since_s=since, until_s=elapsed_s)
     return max(0.0, plan.total_s - began_s - max(0.0, worked_s))

@@ -102,7 +102,7 @@ class _Planned:
     def __init__(self, mission: Mission) -> None:
         self.revision = mission.revision
         self.stops = {stop.id: stop for stop in mission.stops}
-        arrivals = schedule(mission).arrival_s.tolist()
+        arrivals = schedule(mission).arrival_s
         self.arrival_s = {stop.id: s for stop, s in zip(mission.stops, arrivals, strict=True)}
 
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
 from stopgo.mission.document import Mission, Point, RobotSpec
-from stopgo.mission.geometry import FloatArray, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +18,8 @@ class Schedule:
     turn_s: float
     settle_s: float
     scan_s: float
-    arrival_s: FloatArray = field(default_factory=lambda: frozen([]))
-    """Planned time of arrival at each stop, from the mission's start (k,)."""
+    arrival_s: tuple[float, ...] = ()
+    """Planned time of arrival at each stop, from the mission's start."""
 
     @property
     def total_s(self) -> float:
@@ -48,7 +45,7 @@ def schedule(mission: Mission) -> Schedule:
         settle_s += stop.settle_s
         scan_s += stop.scan.duration_s
     drive, turn, _ = leg_times(mission.return_ or (), heading=heading, robot=mission.robot)
-    return Schedule(drive_s + drive, turn_s + turn, settle_s, scan_s, frozen(arrivals))
+    return Schedule(drive_s + drive, turn_s + turn, settle_s, scan_s, tuple(arrivals))
 
 
 def leg_times(leg: Sequence[Point], *, heading: float, robot: RobotSpec) -> tuple[float, float, float]:
@@ -75,9 +72,3 @@ def straight_time(length: float, *, speed: float, acceleration: float) -> float:
     if length >= speed**2 / acceleration:
         return length / speed + speed / acceleration
     return 2 * math.sqrt(length / acceleration)
-
-
-def straight_times(lengths: FloatArray, *, speed: float, acceleration: float) -> FloatArray:
-    """Return `straight_time` of many lengths at once, to the same last digit."""
-    short: FloatArray = 2 * np.sqrt(lengths / acceleration)
-    return np.where(lengths >= speed**2 / acceleration, lengths / speed + speed / acceleration, short)

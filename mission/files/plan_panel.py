@@ -32,8 +32,10 @@ LINE = 4.2
 """Height of a line of the title block and of the legend."""
 TITLE_HEAD = 15.0
 SCALE_AND_AXES = 25.0
-MOST_ROWS = 1500
-"""Stops listed; beyond, the table says how many more there are."""
+MOST_ROWS = (1500, 500, 200, 80, 30, 10)
+"""Rows of each list in the table; beyond, it says how many more there are.
+
+The lower ones are for floors whose drawing would else be smaller."""
 
 
 def title_height(facts: list[tuple[str, str]]) -> float:
@@ -299,42 +301,48 @@ STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 COVERAGE_HEAD = Row(("coverage", "all", "visible", "covered", "%"), COVERAGE_EDGES, bold=True, to_left=True)
 
 
-def shared_rows(missions: Sequence[Mission]) -> list[Row]:
+def shared_rows(missions: Sequence[Mission], most: int) -> list[Row]:
     """The stops of every mission, below a line that says whose they are."""
     rows: list[Row] = []
     for k, mission in enumerate(missions):
         taken = duration(schedule(mission).total_s)
         told = f"{letter(k)}: {allocation_in_words(mission)}, {len(mission.stops)} stops, {taken}"
-        rows += [_words(told, bold=True), *stop_rows(mission, before=letter(k))]
+        rows += [_words(told, bold=True), *stop_rows(mission, most, before=letter(k))]
     return rows
 
 
-def stop_rows(mission: Mission, *, before: str = "") -> list[Row]:
-    """A row per stop, as the robot meets them; a doorway stop has a `d` after its number."""
+def stop_rows(mission: Mission, most: int, *, before: str = "") -> list[Row]:
+    """A row per stop, `most` of them, as the robot meets them; a doorway stop has a `d` after its number."""
     cells: list[tuple[str, ...]] = [
         (f"{before}{row['no']}{row['doorway'] and 'd'}", *(row[name] for name in STOP_COLUMNS))
         for row in (stop.cells for stop in stop_list(mission))
     ]
-    more = len(cells) - MOST_ROWS
-    if more > 0:
-        cells = [*cells[:MOST_ROWS], ("", "", "", "", "", "", f"and {more} more")]
-    return [Row(row, STOP_EDGES) for row in cells]
+    rows = [Row(row, STOP_EDGES) for row in cells[:most]]
+    return [*rows, *_more(len(cells) - most)]
 
 
-def figure_rows(figures: Figures) -> list[Row]:
-    """Yield the coverage of the whole, of every kind and every room; the unreached rooms; the findings."""
+def figure_rows(figures: Figures, most: int) -> list[Row]:
+    """Coverage of the whole, every kind and every room; unreached rooms; findings; `most` rows of each."""
     groups = [figures.whole, *figures.kinds, *figures.rooms]
     rows = [
         replace(COVERAGE_HEAD, cells=("coverage", f"all {figures.unit}", *COVERAGE_HEAD.cells[2:])),
-        *(_coverage_row(group) for group in groups[:MOST_ROWS]),
+        *(_coverage_row(group) for group in groups[:most]),
+        *_more(len(groups) - most),
     ]
-    if figures.unreached:
-        rows.append(_words("not reached", bold=True))
-        rows += [_words(item.text) for item in figures.unreached]
-    if figures.grave:
-        rows.append(_words("to be checked before driving", bold=True))
-        rows += [_words(item.message) for item in figures.grave]
+    lists = {
+        "not reached": [item.text for item in figures.unreached],
+        "to be checked before driving": [item.message for item in figures.grave],
+    }
+    for head, lines in lists.items():
+        if lines:
+            rows += [_words(head, bold=True), *(_words(line) for line in lines[:most])]
+            rows += _more(len(lines) - most)
     return rows
+
+
+def _more(many: int) -> list[Row]:
+    """A row that says how many rows a list has beyond those shown; none if it is whole."""
+    return [_words(f"and {many} more")] if many > 0 else []
 
 
 def _coverage_row(group: GroupCoverage) -> Row:

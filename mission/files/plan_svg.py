@@ -20,6 +20,8 @@ from stopgo.mission.geometry import FloatArray, bounds
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures
 
+HANDY = 200
+"""Scale 1:N up to which a long table may make the drawing smaller."""
 PADDING = 8.0
 """Millimetres kept free round the floor, for coordinates and symbols on its edge."""
 
@@ -56,8 +58,7 @@ def overview(
     with_table: bool = True,
 ) -> tuple[str, PaperSheet]:
     """Return the blocks of the one sheet that shows everything, and the sheet."""
-    stops = panel.shared_rows(shared) if shared else panel.stop_rows(mission)
-    rows = [*stops, *(panel.figure_rows(figures) if figures else [])] if with_table else []
+    rows = _table_rows(made, mission, figures, shared) if with_table else []
     facts = panel.facts_of(made, mission, shared, date=date)
     sheet = whole_sheet(made, mission, shared, rows=len(rows))
     inside = "\n".join(drawing_of(made, mission, sheet, shared, with_range=with_range))
@@ -70,6 +71,20 @@ def overview(
         panel.table(rows, sheet.table),
     )
     return "\n".join(item for item in drawn if item), sheet
+
+
+def _table_rows(
+    made: Route, mission: Mission, figures: Figures | None, shared: Sequence[Mission]
+) -> list[panel.Row]:
+    """Rows of the table: fewer of each list on a floor whose drawing would else be smaller."""
+    scale = max(HANDY, whole_sheet(made, mission, shared).scale)
+    rows: list[panel.Row] = []
+    for most in panel.MOST_ROWS:
+        rows = panel.shared_rows(shared, most) if shared else panel.stop_rows(mission, most)
+        rows += panel.figure_rows(figures, most) if figures else []
+        if whole_sheet(made, mission, shared, rows=len(rows)).scale <= scale:
+            break
+    return rows
 
 
 def whole_sheet(

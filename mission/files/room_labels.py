@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -20,12 +21,16 @@ LEAST = 9.0
 """Millimetres that a name may take even in a narrower room."""
 AROUND = 0.4
 """Millimetres kept free round a label."""
-STOPS, WAY, WALLS = 6.0, 1.0, 0.7
-"""Cost of each point of a stop, of the route (which a label may cross) and of an element."""
-OUTSIDE = 6.0
+STOPS, WAY, WALLS = 60, 10, 7
+"""Cost of each point of a stop, of the route (which a label may cross) and of an element.
+
+Costs are whole numbers: their sums are equal on every machine."""
+OUTSIDE = 60
 """Cost of each of nine points of a label that lies outside its room."""
-LABEL = 2.0
+LABEL = 20
 """Cost of each of 28 points of another label."""
+STRIP = 10.0
+"""Height in millimetres of the strips by which points are found."""
 _TRIES = 28
 """Positions tried along each side of a room's bounding box."""
 
@@ -35,35 +40,46 @@ class Busy:
     """Points on paper (n, 2) that labels should not cover, and how much each matters (n,)."""
 
     xy: FloatArray
-    weight: FloatArray
+    weight: IntArray
 
     @classmethod
-    def of(cls, *layers: tuple[float, list[FloatArray]]) -> Busy:
+    def of(cls, *layers: tuple[int, list[FloatArray]]) -> Busy:
         """From (weight, points) of each layer."""
         kept = [(weight, np.concatenate(points)) for weight, points in layers if points]
         weights = [np.full(len(points), weight) for weight, points in kept]
         return cls(np.concatenate([points for _, points in kept]), np.concatenate(weights))
 
-    def and_also(self, weight: float, points: FloatArray) -> Busy:
+    def and_also(self, weight: int, points: FloatArray) -> Busy:
         weights = np.full(len(points), weight)
         return Busy(np.concatenate([self.xy, points]), np.concatenate([self.weight, weights]))
 
     def near(self, low: FloatArray, high: FloatArray) -> Busy:
-        """Those between two corners, in their order."""
-        begin = np.searchsorted(self._sorted_x, low[0], side="right")
-        end = np.searchsorted(self._sorted_x, high[0], side="left")
-        between = self._by_x[begin:end]
-        y = self.xy[between, 1]
-        there = np.sort(between[(y > low[1]) & (y < high[1])])
-        return Busy(self.xy[there], self.weight[there])
+        """Those between two corners, in any order."""
+        order, x, first = self._strips
+        begin, end = (
+            np.clip(np.floor(y / STRIP) - self._lowest, 0, len(first) - 1) for y in (low[1], high[1])
+        )
+        found = [np.empty(0, dtype=np.int64)]
+        for strip in range(int(begin), min(int(end) + 1, len(first) - 1)):
+            there = slice(first[strip], first[strip + 1])
+            within = np.searchsorted(x[there], [low[0], high[0]])
+            found.append(order[there][within[0] : within[1]])
+        index = np.concatenate(found)
+        y = self.xy[index, 1]
+        index = index[(y > low[1]) & (y < high[1])]
+        return Busy(self.xy[index], self.weight[index])
 
     @cached_property
-    def _by_x(self) -> IntArray:
-        return np.argsort(self.xy[:, 0], kind="stable")
+    def _lowest(self) -> float:
+        return math.floor(self.xy[:, 1].min() / STRIP) if len(self.xy) else 0.0
 
     @cached_property
-    def _sorted_x(self) -> FloatArray:
-        return np.asarray(self.xy[self._by_x, 0])
+    def _strips(self) -> tuple[IntArray, FloatArray, IntArray]:
+        """Points by strips STRIP high and by x in each: their order, x, and where each strip begins."""
+        strip = (np.floor(self.xy[:, 1] / STRIP) - self._lowest).astype(np.int64)
+        order = np.lexsort((self.xy[:, 0], strip))
+        many = int(strip.max(initial=-1)) + 1
+        return order, self.xy[order, 0], np.searchsorted(strip[order], np.arange(many + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +189,7 @@ def _best_place(
     close = around[((around > low - half) & (around < high + half)).all(axis=1)]
     busy = avoid.near(low - half, high + half).and_also(LABEL, close)
     outside = OUTSIDE * _outside(x, y, half, rings)
-    cost = _covered(x, y, half + AROUND, busy) + outside
+    cost = covered_weight(x, y, half + AROUND, busy) + outside
     far: FloatArray = np.hypot(*((tried - (low + high) / 2) / (high - low + 1e-9)).T)
     order = np.lexsort((np.arange(len(tried)), np.round(far, 6), cost))
     best = order[0]
@@ -182,12 +198,25 @@ def _best_place(
     return float(cost[best]), float(cost[best] - on_way), np.asarray(tried[best])
 
 
-def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:
-    """Return the weight of the points under a label at each position of the grid x by y, row by row."""
-    near_x = np.abs(avoid.xy[:, 0] - x[:, None]) < half[0]
-    near_y = np.abs(avoid.xy[:, 1] - y[:, None]) < half[1]
-    # einsum, not @: so small a product loses more time to BLAS's threads than it takes.
-    return np.asarray(np.einsum("yn,xn->yx", near_y * avoid.weight, near_x.astype(np.float64)).ravel())
+def covered_weight(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:
+    """Return the weight of the points under a label at each position of the grid x by y, row by row.
+
+    A point lies under a block of neighbouring positions. Its weight is added where a block begins and taken
+    away where it ends; the running sums along both sides of the grid are the weights.
+    """
+    sides = zip((y, x), avoid.xy.T[::-1], half[::-1], strict=True)
+    rows, columns = (
+        (np.searchsorted(at + reach, of, side="right"), np.searchsorted(at - reach, of, side="left"))
+        for at, of, reach in sides
+    )
+    shape = (len(y) + 1, len(x) + 1)
+    change = np.zeros(shape)
+    for (row, add), (column, more) in product(
+        zip(rows, (1, -1), strict=True), zip(columns, (1, -1), strict=True)
+    ):
+        place = np.ravel_multi_index((row, column), shape)
+        change += np.bincount(place, add * more * avoid.weight, change.size).reshape(shape)
+    return np.asarray(change.cumsum(axis=0).cumsum(axis=1)[:-1, :-1].ravel())
 
 
 def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatArray]) -> FloatArray:

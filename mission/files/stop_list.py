@@ -53,7 +53,7 @@ class ListedStop:
 
 def stop_list(mission: Mission, times: Schedule | None = None) -> list[ListedStop]:
     """Return the stops in the order of driving."""
-    arrivals = (times or schedule(mission)).arrival_s.tolist()
+    arrivals = (times or schedule(mission)).arrival_s
     return [
         ListedStop(number, stop, arrival)
         for number, (stop, arrival) in enumerate(zip(mission.stops, arrivals, strict=True), 1)

@@ -33,4 +33,4 @@ def time_left(mission: Mission, first: int) -> float:
     if first >= len(mission.stops):
         return 0.0
     before = mission.stops[first - 1]
-    return plan.total_s - float(plan.arrival_s[first - 1]) - before.settle_s - before.scan.duration_s
+    return plan.total_s - plan.arrival_s[first - 1] - before.settle_s - before.scan.duration_s

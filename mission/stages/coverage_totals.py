@@ -91,8 +91,14 @@ class CoverageTotals:
 
     def rooms_seen(self, seen: BoolArray) -> tuple[GroupCoverage, ...]:
         """Return the coverage of every room, in order, and last of the units that face none."""
-        rooms = [self.coverage_of(group, self.room == k, seen) for k, group in enumerate(self.rooms)]
-        return (*rooms, self.coverage_of(Group(OUTSIDE), self.room < 0, seen))
+        groups = (*self.rooms, Group(OUTSIDE))
+        of_group = np.where(self.room < 0, len(self.rooms), self.room)
+        return tuple(
+            GroupCoverage(group.name, total, could, did, required=group.required, why=group.why)
+            for group, (total, could, did) in zip(
+                groups, self._sums(of_group, len(groups), seen).tolist(), strict=True
+            )
+        )
 
     def kinds_seen(self, seen: BoolArray) -> tuple[GroupCoverage, ...]:
         """Return the coverage of every kind of element, by name."""
@@ -103,13 +109,11 @@ class CoverageTotals:
 
     def by_element(self, seen: BoolArray) -> tuple[GroupCoverage, ...]:
         """Return the coverage of every element with targets, in the floor's order."""
-        size = len(self.elements)
-        masks = (None, self.visible, self.visible & seen)
-        sums = [np.bincount(self.element, self._counted(mask), minlength=size) * self.scale for mask in masks]
+        sums = self._sums(self.element, len(self.elements), seen).tolist()
         return tuple(
-            GroupCoverage(item.id, total=float(sums[0][k]), visible=float(sums[1][k]), seen=float(sums[2][k]))
-            for k, item in enumerate(self.elements)
-            if sums[0][k]
+            GroupCoverage(item.id, total=total, visible=could, seen=did)
+            for item, (total, could, did) in zip(self.elements, sums, strict=True)
+            if total
         )
 
     def coverage_of(self, group: Group, member: BoolArray, seen: BoolArray) -> GroupCoverage:
@@ -126,6 +130,12 @@ class CoverageTotals:
     def scale(self) -> float:
         """Metres, or units, of a weight of 1."""
         return 1.0 if self.rule == "paper" else 1e-6
+
+    def _sums(self, group: IntArray, many: int, seen: BoolArray) -> FloatArray:
+        """Amount of all, of the visible and of the seen units (n,) in each of so many groups (many, 3)."""
+        masks = (None, self.visible, self.visible & seen)
+        sums = [np.bincount(group, self._counted(mask), minlength=many) for mask in masks]
+        return np.asarray(np.stack(sums, axis=1) * self.scale, dtype=np.float64)
 
     def _counted(self, mask: BoolArray | None) -> FloatArray:
         return np.asarray(self.weight if mask is None else np.where(mask, self.weight, 0), dtype=np.float64)

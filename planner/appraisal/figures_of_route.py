@@ -13,9 +13,8 @@ from stopgo.mission.stages.figures import CoverageByGroup, Figures
 from stopgo.planner.appraisal.plausibility import floor_of_rooms, near_legs, plausibility_findings
 from stopgo.planner.appraisal.quality import FEWER_VIEWS, NOT_MET, fewer_views, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
-from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.overlap.registered import SCANS_APART, inaccurate, scans_apart
-from stopgo.planner.space.reach import reach_of
+from stopgo.planner.space.reach import room_areas_by_part
 
 
 def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figures:
@@ -81,11 +80,8 @@ def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]
 def _reached_m2(candidates: Candidates, parts: frozenset[int]) -> float:
     """Reached area of rooms: each room's floor times the fraction of its drive area in these parts."""
     space = candidates.space
-    origin = local_origin(space.floor)
-    found = reach_of(space).parts
     reached = 0.0
-    for room, floor in zip(space.rooms, floor_of_rooms(space), strict=True):
-        areas = found.area_by_part(to_shape(room.area, origin))
+    for areas, floor in zip(room_areas_by_part(space), floor_of_rooms(space), strict=True):
         free = sum(areas.values())
         if free > 0:
             reached += floor * sum(areas.get(part, 0.0) for part in parts) / free

@@ -12,7 +12,7 @@ from stopgo.mission.stages import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREA
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.floor_gaps import gap_before
 from stopgo.planner.space.opening_joins import PROBES
-from stopgo.planner.space.reach import reach_of
+from stopgo.planner.space.reach import reach_of, room_areas_by_part
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 LEAST_AREA = 0.01
@@ -42,10 +42,9 @@ def unreached(candidates: Candidates, planned: frozenset[int] | None = None) -> 
 def _cut_off(candidates: Candidates, index: int, parts: frozenset[int]) -> Iterator[Unreached]:
     """Areas of an entered room where the robot could drive but that it cannot reach."""
     space = candidates.space
-    found = reach_of(space).parts
-    shape = to_shape(space.rooms[index].area, local_origin(space.floor))
-    for part, area in sorted(found.area_by_part(shape).items()):
+    for part, area in sorted(room_areas_by_part(space)[index].items()):
         if part not in parts and area >= LEAST_CUT_OFF:
+            shape = to_shape(space.rooms[index].area, local_origin(space.floor))
             x, y = _middle(candidates, part, shape)
             gap = gap_before(space, shape, parts)
             beyond = f" ({gap})" if gap else ""

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.document import RobotSpec
-from stopgo.mission.document.schedule import straight_times, turn_time
+from stopgo.mission.document.schedule import turn_time
+from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.routing.legs import Legs

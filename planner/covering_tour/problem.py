@@ -40,8 +40,8 @@ from functools import cached_property
 
 import numpy as np
 
-from stopgo.mission.document.schedule import straight_times
 from stopgo.mission.document.specs import robot_of
+from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Route, Visibility

@@ -80,19 +80,21 @@ def triangles_of(shape: BaseGeometry) -> NDArray[np.object_]:
 
 def areas_within(cells: NDArray[np.object_], shape: BaseGeometry) -> FloatArray:
     """Area of the part of each small shape (n,) that lies in a large one."""
-    sizes = np.zeros(len(cells))
     if not len(cells) or shapely.get_num_coordinates(shape) <= FEW:
-        shapely.prepare(shape)
-        touched = np.flatnonzero(shapely.intersects(shape, cells))
-        sizes[touched] = shapely.area(shapely.intersection(cells[touched], shape))
-        return sizes
-    index, bounds = RingIndex(shape), shapely.bounds(cells)
+        return _areas_within(cells, shape)
+    sizes, index, bounds = np.zeros(len(cells)), RingIndex(shape), shapely.bounds(cells)
     _, tile = np.unique(np.floor(bounds[:, :2] / TILE), axis=0, return_inverse=True)
     order = np.argsort(tile.reshape(-1), kind="stable")
     for group in np.split(order, np.cumsum(np.bincount(tile.reshape(-1)))[:-1]):
         low, high = bounds[group, :2].min(axis=0), bounds[group, 2:].max(axis=0)
-        near = index.within((*low.tolist(), *high.tolist()))
-        shapely.prepare(near)
-        touched = group[shapely.intersects(near, cells[group])]
-        sizes[touched] = shapely.area(shapely.intersection(cells[touched], near))
+        sizes[group] = _areas_within(cells[group], index.within((*low.tolist(), *high.tolist())))
+    return sizes
+
+
+def _areas_within(cells: NDArray[np.object_], shape: BaseGeometry) -> FloatArray:
+    """The same, where the shape has few vertices; only what crosses its edge is intersected with it."""
+    shapely.prepare(shape)
+    sizes = np.where(shapely.contains_properly(shape, cells), shapely.area(cells), 0.0)
+    crossing = np.flatnonzero((sizes == 0) & shapely.intersects(shape, cells))
+    sizes[crossing] = shapely.area(shapely.intersection(cells[crossing], shape))
     return sizes

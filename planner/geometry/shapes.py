@@ -119,6 +119,8 @@ def to_polygons(shape: BaseGeometry, origin: FloatArray) -> tuple[Polygon, ...]:
 
 def polygon_parts(shape: BaseGeometry) -> list[shapely.Polygon]:
     """The polygons of a geometry of any type, empty ones left out."""
+    if shape.geom_type == "Polygon":
+        return [] if shape.is_empty else [shape]
     parts = shapely.get_parts(shapely.get_parts(shape))
     return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]
 

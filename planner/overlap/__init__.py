@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import Candidates
 from stopgo.mission.stages.network import CONFIDENCE
+from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.overlap.boundary import shown
-from stopgo.planner.overlap.pairs import FLOOR_M, NOISE_M, Overlaps, Pairs
+from stopgo.planner.overlap.pair_kernel import firm_pairs
+from stopgo.planner.overlap.pairs import DIGITS, FLOOR_M, NOISE_M, Overlaps, Pairs
 
 ACCURACY_M = 0.01
 """Error that a registered pair may have, also at LEVER_M from the scanner."""
@@ -18,6 +22,8 @@ LEAST_HOLD_M = round((CONFIDENCE * NOISE_M) ** 2 / (ACCURACY_M**2 - (CONFIDENCE 
 """Least registration strength of a pair: metres of wall that face its weakest direction."""
 LEAST_COMMON_M = 1.0
 """Least length of boundary in metres that both must see."""
+ROUNDING = 0.5 * 10.0**-DIGITS
+"""Error of a pair's rounded figures."""
 
 
 @instance_cached
@@ -35,14 +41,28 @@ def registers(pairs: Pairs, *, share: float) -> IntArray:
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
     overlaps, share = overlaps_of(candidates), candidates.settings.least_overlap
-    rows, others = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
-    for pairs in overlaps.later(least_m=LEAST_COMMON_M):
-        good = registers(pairs, share=share)
-        rows.append(pairs.row[good])
-        others.append(pairs.other[good])
-    ends = np.concatenate(rows), np.concatenate(others)
+    kernel = compiled(firm_pairs, large=False)
+    pairs = _links(overlaps, share) if kernel is None else links_by_kernel(kernel, overlaps, share)
+    ends = tuple(np.concatenate([np.empty(0, np.int64), *ends]) for ends in zip(*pairs, strict=True))
     later = csr_array((np.ones(len(ends[0]), np.int64), ends), shape=(overlaps.rows,) * 2)
     return (later + later.T).tocsr()
+
+
+def _links(overlaps: Overlaps, share: float) -> Iterator[tuple[IntArray, IntArray]]:
+    """Rows that register with later rows, and these, in numpy."""
+    for pairs in overlaps.later(least_m=LEAST_COMMON_M):
+        good = registers(pairs, share=share)
+        yield pairs.row[good], pairs.other[good]
+
+
+def links_by_kernel(
+    kernel: Callable[..., int], overlaps: Overlaps, share: float
+) -> Iterator[tuple[IntArray, IntArray]]:
+    """The same by the kernel, compiled or as written, with the rounding of the figures of a pair."""
+    least = (LEAST_COMMON_M - ROUNDING, LEAST_HOLD_M - ROUNDING)
+    for row, other, common in overlaps.firm(kernel, *least):
+        found = np.round(common / np.minimum(overlaps.shown_m[row], overlaps.shown_m[other]), DIGITS) >= share
+        yield row[found], other[found]
 
 
 __all__ = [

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -44,6 +45,16 @@ class Boundary:
     b: FloatArray
     pieces: IntArray
     """Equal pieces of each face (m,)."""
+
+    @cached_property
+    def normals(self) -> tuple[FloatArray, FloatArray]:
+        """Unit normal of each face (m, 2), and the lever arm of its start about the origin (m,).
+
+        The arm of the point s metres from a face's start is longer by s.
+        """
+        along = (self.b - self.a) / np.hypot(*(self.b - self.a).T)[:, None]
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        return normal, self.a[:, 0] * normal[:, 1] - self.a[:, 1] * normal[:, 0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -120,10 +120,13 @@ def normal_matrix(
 ) -> FloatArray:
     """Return the normal matrix of the free scans, whose first rows these are."""
     normal = np.zeros((3 * len(row), 3 * len(row)))
-    for (a, b), block in zip(ends, information, strict=True):
-        for i, j, sign in ((a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)):
-            if i in row and j in row:
-                normal[row[i] : row[i] + 3, row[j] : row[j] + 3] += sign * block
+    if len(ends):
+        pair = np.array([(row.get(a, -1), row.get(b, -1)) for a, b in ends])
+        first, second = pair[:, [0, 1, 0, 1]].ravel(), pair[:, [0, 1, 1, 0]].ravel()
+        blocks = np.array(information)[:, None] * np.array([1.0, 1.0, -1.0, -1.0])[:, None, None]
+        free = (first >= 0) & (second >= 0)
+        at = first[free, None, None] + np.arange(3)[:, None], second[free, None, None] + np.arange(3)
+        np.add.at(normal, at, blocks.reshape(-1, 3, 3)[free])
     for k, point in seen:
         if k in row:
             move = shift_at(point) / TARGET_M

@@ -11,7 +11,7 @@ weakest direction is NOISE_M / √hold_m, by independent errors along the walls,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -90,6 +90,24 @@ class Overlaps:
             rows = np.arange(begin, min(begin + BLOCK, self.rows))
             yield self._pairs(rows, rows + 1, least_m=least_m)
 
+    def firm(
+        self, kernel: Callable[..., int], least_m: float, hold_m: float
+    ) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
+        """Pairs with so much boundary in common and more strength: rows, later rows, and metres in common."""
+        seen, rows = self._seen, self.rows
+        normal, arm = seen.boundary.normals
+        first = np.searchsorted(seen.face[self._order], np.arange(len(arm) + 1))
+        shown = (seen.pointer, seen.face, seen.begin, seen.end, first, self._order, self._row)
+        scratch = np.zeros(rows), np.zeros(6 * rows), np.zeros(rows, np.int64)
+        data = (*shown, *normal.T.copy(), arm, np.ascontiguousarray(seen.xy).ravel(), *scratch)
+        limits = (EDGE_M, LEAST_STRETCH_M - EPSILON_M, least_m, hold_m, LEVER_M)
+        for low in range(0, rows, BLOCK):
+            high = min(low + BLOCK, rows)
+            size = (high - low) * (rows - low)
+            row, other, common = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
+            many = kernel(low, high, *limits, *data, row, other, common)
+            yield row[:many].copy(), other[:many].copy(), common[:many].copy()
+
     def middle_of_common(self, row: int, other: int) -> FloatArray:
         """The middle of the longest stretch of boundary that two rows see, local metres (2,)."""
         seen = self._seen
@@ -153,10 +171,8 @@ class Overlaps:
         self, face: IntArray, begin: FloatArray, end: FloatArray, index: IntArray, many: int
     ) -> FloatArray:
         """N about the local origin (many, 3, 3), the sum over each pair's stretches, without the lever."""
-        a, b = self._seen.boundary.a[face], self._seen.boundary.b[face]
-        along = (b - a) / np.hypot(*(b - a).T)[:, None]
-        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        arm = a[:, 0] * normal[:, 1] - a[:, 1] * normal[:, 0]  # (a + s along) × normal = arm + s
+        normals, arms = self._seen.boundary.normals
+        normal, arm = normals[face], arms[face]
         s1, s2, s3 = ((end**k - begin**k) / k for k in (1, 2, 3))
         turn = (arm * s1 + s2, arm * arm * s1 + 2 * arm * s2 + s3)
         entries = {

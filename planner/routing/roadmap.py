@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import (
     GRID,
     local_origin,
@@ -27,7 +28,7 @@ from stopgo.planner.geometry.shapes import (
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths, shortest_paths
 from stopgo.planner.space.reach import reach_of
-from stopgo.planner.visibility.sight.mesh import mesh_of
+from stopgo.planner.visibility.sight.mesh import Mesh, mesh_of
 from stopgo.planner.visibility.sight.sight import scene_of, sight
 
 PAIRS = 1_000_000
@@ -83,6 +84,7 @@ class Corners:
     """Vectors to the previous and to the next corner (n, 2, 2); zero where rings touch."""
 
 
+@instance_cached
 def outward_corners(space: NavigableSpace) -> Corners:
     """Every corner once, in a canonical order."""
     found, sides = [np.empty((0, 2))], [np.empty((0, 2, 2))]
@@ -107,8 +109,14 @@ def _oriented_rings(piece: shapely.Polygon) -> list[FloatArray]:
     return [shapely.get_coordinates(ring)[:-1] for ring in (turned.exterior, *turned.interiors)]
 
 
+@instance_cached
 def _drive_area(space: NavigableSpace) -> BaseGeometry:
     return snapped(to_shape(space.drive_area, local_origin(space.floor)))
+
+
+@instance_cached
+def _mesh(space: NavigableSpace) -> Mesh:
+    return mesh_of(whole_steps(_drive_area(space)))
 
 
 def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntArray:
@@ -131,8 +139,7 @@ def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first
     sides = np.zeros((len(nodes), 2, 2))
     sides[first : first + len(corners.xy)] = corners.sides
     ones = np.ones(len(nodes), dtype=np.int64)
-    mesh = mesh_of(whole_steps(_drive_area(space)))
-    scene = scene_of(mesh, nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
+    scene = scene_of(_mesh(space), nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
     node, between = views_of(to_grid(nodes), to_grid(sides))
     fewest, done, found = 1 + PAIRS // len(nodes), 0, []
     rows = fewest

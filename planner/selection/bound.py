@@ -101,13 +101,14 @@ class _Priced:
         self._weight = cover.weight / scale
         self._needed = cover.needed / scale
         self._rest = cover.worth[1:].astype(float) / scale
+        self._rest_of_column = self._rest.T
 
     def value(self, prices: FloatArray) -> tuple[float, FloatArray]:
         """The lower bound at prices of columns, then demands; and its subgradient."""
         cover = self._cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
         spare = 1.0 - cover.sees @ column
-        cost = cover.asks * column - self._rest.T @ demand
+        cost = cover.asks * column - self._rest_of_column @ demand
         bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self._needed[1:])
         value = whole + float((cost * bought).sum())

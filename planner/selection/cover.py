@@ -59,7 +59,9 @@ class Cover:
     @cached_property
     def weight(self) -> IntArray:
         """Weight that each column adds to the whole (columns,)."""
-        return self.worth[[0]].toarray()[0].astype(np.int64)
+        weight, end = np.zeros(self.columns, dtype=np.int64), self.worth.indptr[1]
+        weight[self.worth.indices[:end]] = self.worth.data[:end]
+        return weight
 
     @property
     def total(self) -> int:
@@ -102,7 +104,9 @@ class Cover:
 
     def covered_by(self, rows: IntArray) -> IntArray:
         """Number of `rows` that see each column (columns,)."""
-        return np.asarray(self.sees[rows].sum(axis=0)).ravel().astype(np.int64)
+        begin = self.sees.indptr[rows]
+        entries = ranges(begin, self.sees.indptr[np.asarray(rows) + 1] - begin)
+        return np.bincount(self._seen[entries], minlength=self.columns)
 
     def seen_weight(self, covered: IntArray) -> int:
         """Weight of the columns that have all views they need."""
@@ -206,11 +210,12 @@ def _worth(demands: Demands, column: IntArray) -> csr_array:
 
 def _without(sees: csr_array, rows: IntArray) -> csr_array:
     """The matrix in which these rows see nothing."""
-    factor = np.ones(sees.shape[0])
-    factor[rows] = 0
-    left = _sorted((diags_array(factor) @ sees).tocsr().astype(np.int64))
-    left.eliminate_zeros()
-    return left
+    many = np.diff(sees.indptr)
+    stays = np.ones(sees.shape[0], dtype=bool)
+    stays[rows] = False
+    entries = np.repeat(stays, many)
+    pointer = np.concatenate([[0], np.cumsum(np.where(stays, many, 0))])
+    return _sorted(csr_array((sees.data[entries], sees.indices[entries], pointer), shape=sees.shape))
 
 
 def _pattern(matrix: csr_array) -> csr_array:

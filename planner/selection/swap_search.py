@@ -26,9 +26,12 @@ LARGEST = 40_000_000
 
 def repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
     """Swap rows until every demand is met; None if not before the last swap."""
+    if len(rows) in (0, cover.rows):  # there is nothing to swap
+        chosen = np.array(sorted(rows), dtype=np.int64)
+        return None if cover.missing(cover.covered_by(chosen)).any() else chosen
     kernel = compiled(repair, large=False)
     size = len(rows) * cover.rows * cover.most_demands
-    if kernel is None or size > LARGEST or len(rows) in (0, cover.rows):
+    if kernel is None or size > LARGEST:
         return _by_board(cover, rows, swaps)
     return by_kernel(kernel, cover, rows, swaps)
 
@@ -60,8 +63,6 @@ def _by_board(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
     for _ in range(swaps):
         if not board.missing.any():
             return np.array(sorted(rows), dtype=np.int64)
-        if len(rows) in (0, cover.rows):
-            return None
         if len(set(rows) | set(tabu)) == cover.rows:
             tabu.clear()  # no other row is left to add
         out, into = board.best_swap(rows, [*rows, *tabu])

@@ -83,6 +83,14 @@ def reach_of(space: NavigableSpace) -> Reach:
     return Reach(space)
 
 
+@instance_cached
+def room_areas_by_part(space: NavigableSpace) -> tuple[dict[int, float], ...]:
+    """Return the drive area of every room, by part."""
+    parts, origin = reach_of(space).parts, local_origin(space.floor)
+    return tuple(parts.area_by_part(to_shape(room.area, origin)) for room in space.rooms)
+
+
+@instance_cached
 def walls_of(space: NavigableSpace) -> Walls:
     """Everything that a robot's centre keeps clear of: obstacles, closed openings, floor edges."""
     origin = local_origin(space.floor)

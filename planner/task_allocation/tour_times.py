@@ -13,8 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from stopgo.mission.document import RobotSpec
-from stopgo.mission.document.schedule import leg_times, straight_times, turn_time
+from stopgo.mission.document.schedule import leg_times, turn_time
 from stopgo.mission.document.specs import robot_of
+from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.stages import Selection
 from stopgo.planner.routing import legs_between

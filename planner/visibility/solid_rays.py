@@ -37,6 +37,8 @@ MOST_SAMPLES = 2_000_000
 """Points marked at a time."""
 STEP_M = 0.04
 """Steps along a ray."""
+SORTED_OUT = 8
+"""Steps after which rays that reach no height any more are left out."""
 AT_TARGET_M = 0.08
 """Columns this near to a target's line are the target's own."""
 GRAZING = 0.05
@@ -316,21 +318,67 @@ class _MarkedColumns:
         sine = np.abs(rays[:, 0] * along[:, 1] - rays[:, 1] * along[:, 0]) / np.maximum(away, 1e-9)
         before = away - AT_TARGET_M / np.maximum(sine, GRAZING)
         clear = np.ones(z.shape, dtype=bool)
-        for step in np.arange(STEP_M, float(before.max(initial=0.0)), STEP_M):
-            on = np.flatnonzero(before > step)
-            fraction = step / away[on]
-            at = np.floor((starts[on] + fraction[:, None] * rays[on] - self._low) / self._side).astype(
-                np.int64
-            )
-            at = np.clip(at, 0, np.array(self._shape) - 1)
-            pattern = self._bits[at[:, 0] * self._shape[1] + at[:, 1]]
+        left = _Rays.longest_first(starts, rays, away, before)
+        for number, step in enumerate(np.arange(STEP_M, float(before.max(initial=0.0)), STEP_M)):
+            left = left.longer_than(step)
+            if number % SORTED_OUT == 0:
+                left = left.among(np.flatnonzero(clear[left.row].any(axis=1)))
+            fraction = step / left.away
+            pattern = self._bits[self._column(left, fraction)]
             met = np.flatnonzero(pattern)
             if len(met):
-                rows = on[met]
+                rows = left.row[met]
                 level = np.floor((height + (z[rows] - height) * fraction[met, None]) / self._tall)
                 level = np.clip(level, 0, LEVELS - 1).astype(np.uint64)
                 clear[rows] &= (pattern[met, None] >> level) & np.uint64(1) == 0
         return clear
+
+    def _column(self, rays: _Rays, fraction: FloatArray) -> IntArray:
+        """Column (n,) in which each ray is after a fraction (n,) of it; at the grid's edge beyond that."""
+        x = ((rays.x + fraction * rays.dx - self._low[0]) / self._side).astype(np.int64)
+        y = ((rays.y + fraction * rays.dy - self._low[1]) / self._side).astype(np.int64)
+        column: IntArray = np.clip(x, 0, self._shape[0] - 1) * self._shape[1]
+        return column + np.clip(y, 0, self._shape[1] - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Rays that are followed together, the longest first."""
+
+    row: IntArray
+    """Number of each ray among all (n,)."""
+    x: FloatArray
+    y: FloatArray
+    """Where they start (n,)."""
+    dx: FloatArray
+    dy: FloatArray
+    """The whole way to their ends (n,)."""
+    away: FloatArray
+    """Its length (n,)."""
+    shorter: FloatArray
+    """Minus the length that is followed (n,), ascending."""
+
+    @classmethod
+    def longest_first(
+        cls, starts: FloatArray, rays: FloatArray, away: FloatArray, before: FloatArray
+    ) -> _Rays:
+        row = np.argsort(-before, kind="stable")
+        (x, y), (dx, dy) = starts[row].T.copy(), rays[row].T.copy()
+        return cls(row, x, y, dx, dy, away[row], -before[row])
+
+    def longer_than(self, step: float) -> _Rays:
+        """Those that are followed for more than this length."""
+        count = int(np.searchsorted(self.shorter, -step))
+        return self if count == len(self.row) else self.among(slice(count))
+
+    def among(self, chosen: IntArray | slice) -> _Rays:
+        """Some of the rays."""
+        return _Rays(
+            self.row[chosen],
+            *(self.x[chosen], self.y[chosen]),
+            *(self.dx[chosen], self.dy[chosen]),
+            *(self.away[chosen], self.shorter[chosen]),
+        )
 
 
 def _samples(triangles: FloatArray) -> Iterator[FloatArray]:

@@ -238,7 +238,7 @@ def _lost(story: Story, stop: Stop) -> float | None:
 
 def _plans_of(story: Story, stop: Stop) -> list[float]:
     return [
-        float(schedule(mission).arrival_s[[item.id for item in mission.stops].index(stop.id)])
+        schedule(mission).arrival_s[[item.id for item in mission.stops].index(stop.id)]
         for mission in story.missions
         if stop.id in {item.id for item in mission.stops}
     ]

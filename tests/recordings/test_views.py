@@ -35,21 +35,29 @@ pytestmark = [
 WINDOW = "1200x750"
 SMALL = "800x500"
 """Where no picture is compared with a kept one: what is drawn in software takes its time by the pixel."""
-END = ("mission_time", {"duration": 100.0})
+Moment = tuple[str, dict[str, Any]]
+END: Moment = ("mission_time", {"play_state": "following"})
+"""The end of the mission, where a recording opens."""
+AFTER: Moment = ("mission_time", {"play_state": "paused", "duration": 100.0})
 
-VIEWS: dict[str, dict[str, tuple[tuple[str, dict[str, Any]], dict[str, palette.Colour | None]]]] = {
+
+def step(timeline: str, number: int) -> Moment:
+    return timeline, {"play_state": "paused", "sequence": number}
+
+
+VIEWS: dict[str, dict[str, tuple[Moment, dict[str, palette.Colour | None]]]] = {
     "plan": {
         "Mission": (END, {"Plan and run": palette.ROUTE, "3D": palette.ROUTE, "Report": None}),
-        "Planning": (("stage_step", {"sequence": 4}), {
+        "Planning": (step("stage_step", 4), {
             "Step by step (timeline: stage_step)": palette.NEW.colour,
             "This step (timeline: stage_step)": None,
             "Coverage, % (timeline: stage_step)": palette.GREEN,
         }),
-        "Stops": (("stop", {"sequence": 2}), {
+        "Stops": (step("stop", 2), {
             "Why this stop (timeline: stop)": palette.LOST,
             "In words (timeline: stop)": None,
         }),
-        "Candidates": (("candidate", {"sequence": 1}), {
+        "Candidates": (step("candidate", 1), {
             "Navigable space and candidates": palette.STOP_AREA,
             "What a candidate sees (timeline: candidate)": palette.SEEN.colour,
         }),
@@ -62,14 +70,14 @@ VIEWS: dict[str, dict[str, tuple[tuple[str, dict[str, Any]], dict[str, palette.C
         "Log": (END, {"Log": None}),
     },
     "field": {
-        "Mission": (END, {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Report": None}),
-        "Run": (END, {
+        "Mission": (AFTER, {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Report": None}),
+        "Run": (AFTER, {
             "States": None,
             "Distance from the route, mm (left positive)": palette.DRIVEN,
             "Deviation at each stop, mm": palette.FAILED.colour,
             "Battery, %": palette.DRIVEN,
         }),
-        "Log": (END, {"Log": None}),
+        "Log": (AFTER, {"Log": None}),
     },
 }  # fmt: skip
 """Views by tab, when they are looked at, and a colour that each must show."""
@@ -91,16 +99,22 @@ def test_every_view_of_a_run_shows_its_subject(field: Path, tmp_path: Path) -> N
 
 
 def test_no_view_of_a_plan_opens_empty(plan_viewer: ViewerClient, tmp_path: Path) -> None:
-    """It opens at the mission's time, whichever timeline a view is best looked at on."""
-    plan_viewer.set_time("mission_time", play_state="following")
-    for tab, (_, colours) in VIEWS["plan"].items():
-        assert_shown(plan_viewer, tab, dict.fromkeys(colours), tmp_path)
+    """It opens at the mission's end, whichever timeline a view is best looked at on; the others are shown."""
+    set_time(plan_viewer, END)
+    for tab, (moment, colours) in VIEWS["plan"].items():
+        if moment != END:
+            assert_shown(plan_viewer, tab, dict.fromkeys(colours), tmp_path)
+
+
+def set_time(client: ViewerClient, moment: Moment) -> None:
+    timeline, of_it = moment
+    client.set_time(timeline, **of_it)
 
 
 def assert_every_view_shown(client: ViewerClient, which: str, into: Path) -> None:
     """Each looks as it did when somebody looked at it; emptied, turned over or recoloured it would not."""
-    for tab, ((timeline, time_), colours) in VIEWS[which].items():
-        client.set_time(timeline, play_state="paused", **time_)
+    for tab, (moment, colours) in VIEWS[which].items():
+        set_time(client, moment)
         views = assert_shown(client, tab, colours, into, which)
         for name, colour in colours.items():
             found, expected = fields(views[name][1]), fields(kept(picture_name(which, name)))
@@ -116,8 +130,8 @@ def drawn_views(into: Path) -> Iterator[tuple[str, Path]]:
     for which, path in files.items():
         with viewer([path], size=WINDOW) as client:
             time.sleep(10.0)  # what the viewer first tells of itself is gone
-            for tab, ((timeline, time_), colours) in VIEWS[which].items():
-                client.set_time(timeline, play_state="paused", **time_)
+            for tab, (moment, colours) in VIEWS[which].items():
+                set_time(client, moment)
                 views = assert_shown(client, tab, colours, into)
                 yield from ((picture_name(which, name), views[name][1]) for name in colours)
 

@@ -206,9 +206,7 @@ def nouns_at(x: float = 0.0, y: float = 0.0) -> list[object]:
     visibility = visibility_of(candidates)
     selection = selection_of(visibility)
     route = route_of(selection)
-    schedule = Schedule(
-        drive_s=4.4, turn_s=0.0, settle_s=4.0, scan_s=120.0, arrival_s=frozen([0.0, 62.0 + 4.4])
-    )
+    schedule = Schedule(drive_s=4.4, turn_s=0.0, settle_s=4.0, scan_s=120.0, arrival_s=(0.0, 62.0 + 4.4))
     return [floor, space, candidates, visibility, selection, route, schedule, mission_of(route)]
 
 

@@ -25,6 +25,8 @@ CATCHES_UP_NS = 10**9
 """A clock that gained more than this meanwhile was delivered late."""
 STORE_NS = 10 * 10**9
 """Interval at which the newest report is stored."""
+EARLIER_NS = 10**9
+"""A report that shows a begin earlier by more than this is stored at once; one a bit earlier is not."""
 DRIFT = 1e-4
 """Largest difference in rate between the clocks of vehicle and station."""
 
@@ -91,7 +93,7 @@ class VehicleBoots:
             self._note(now, began_ns)
             return verdict
         now = msgspec.structs.replace(now, boot_id=boot.boot_id)
-        if began_ns < boot.began_ns or now_ns > boot.seen_ns + STORE_NS:
+        if began_ns < boot.began_ns - EARLIER_NS or now_ns > boot.seen_ns + STORE_NS:
             self._store(msgspec.structs.replace(now, began_ns=min(began_ns, boot.began_ns)))
         self._note(now, began_ns)
         return verdict

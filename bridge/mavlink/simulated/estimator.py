@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass
+from functools import lru_cache
 
 from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
@@ -59,8 +60,7 @@ class Estimator:
     def look(self, dt: float) -> None:
         """Estimate the pose a moment later."""
         tuning, chance, body = self._tuning, self._chance, self._chassis
-        keep = math.exp(-dt / WANDERS_S)
-        fresh = math.sqrt(1.0 - keep * keep)
+        keep, fresh = _wandering(dt)
         self._off = [keep * off + fresh * chance.gauss(0.0, 1.0) for off in self._off]
         noise, drift, late = tuning["SIM_POS_NOISE"], tuning["SIM_POS_DRIFT"], tuning["SIM_EST_LAG"]
         back, shake = body.speed * late, tuning["SIM_VEL_NOISE"]
@@ -75,3 +75,10 @@ class Estimator:
             speed_y=body.speed * sin + chance.gauss(0.0, shake),
             turning=body.turning + chance.gauss(0.0, shake),
         )
+
+
+@lru_cache(maxsize=4)
+def _wandering(dt: float) -> tuple[float, float]:
+    """Parts of the old drift and of a new one, after a moment."""
+    keep = math.exp(-dt / WANDERS_S)
+    return keep, math.sqrt(1.0 - keep * keep)

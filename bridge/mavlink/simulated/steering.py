@@ -21,6 +21,7 @@ REACHED_M = 0.01
 """Distance to its end at which ArduPilot's running target counts as arrived."""
 PARTS = 8
 """Parts of a mean over time."""
+MIDDLES = tuple((part + 0.5) / PARTS for part in range(PARTS))
 STARTS_M_S = 0.05
 """PX4's speed at the very beginning of a straight."""
 
@@ -237,25 +238,26 @@ def _smooth(length: float, speed: float, accel: float, smooth_s: float, run_s: f
 
     It is the mean over `smooth_s` of a motion whose acceleration begins at once.
     """
-    parts = [
-        _run_after(length, speed, accel, run_s - (part + 0.5) / PARTS * smooth_s) for part in range(PARTS)
-    ]
-    return sum(run for run, _ in parts) / PARTS, sum(fast for _, fast in parts) / PARTS
-
-
-def _run_after(length: float, speed: float, accel: float, seconds: float) -> tuple[float, float]:
     top = min(speed, math.sqrt(length * accel))
-    if seconds <= 0 or top <= 0:
+    if top <= 0:
         return 0.0, 0.0
     ramp_s, whole_s = top / accel, length / top + top / accel
-    left_s = whole_s - seconds
-    if left_s <= 0:
-        return length, 0.0
-    if seconds <= ramp_s:
-        return accel * seconds * seconds / 2, accel * seconds
-    if left_s <= ramp_s:
-        return length - accel * left_s * left_s / 2, accel * left_s
-    return top * (seconds - ramp_s / 2), top
+    run_m = fast = 0.0
+    for middle in MIDDLES:
+        seconds = run_s - middle * smooth_s
+        left_s = whole_s - seconds
+        if left_s <= 0:
+            run_m += length
+        elif seconds > ramp_s and left_s > ramp_s:
+            run_m += top * (seconds - ramp_s / 2)
+            fast += top
+        elif 0 < seconds <= ramp_s:
+            run_m += accel * seconds * seconds / 2
+            fast += accel * seconds
+        elif seconds > 0:
+            run_m += length - accel * left_s * left_s / 2
+            fast += accel * left_s
+    return run_m / PARTS, fast / PARTS
 
 
 def _bearing(here: Estimate, to: Point) -> float:

@@ -53,6 +53,10 @@ class Streams:
             self._due_ns[number] = self._clock.now_ns()
         return True
 
+    def wait_s(self) -> float:
+        """Seconds until the next message is due; endless if none is sent."""
+        return (min(self._due_ns.values(), default=math.inf) - self._clock.now_ns()) / 1e9
+
     def due(self) -> list[int]:
         """The messages that are due, each next time an interval from now."""
         now = self._clock.now_ns()

@@ -106,6 +106,11 @@ class Transfers:
         """Forget transfers in progress, as a reboot does."""
         self._upload = self._download = self._done = None
 
+    @property
+    def running(self) -> bool:
+        """True while a list is sent or received."""
+        return self._upload is not None or self._download is not None
+
     def tick(self) -> None:
         """Request again, or give up."""
         now, up, down, habits = self._clock.now_ns(), self._upload, self._download, self._habits

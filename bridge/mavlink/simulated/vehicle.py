@@ -36,6 +36,8 @@ from stopgo.mission.run.events import Pose
 
 SAVE_NS = 1_000_000_000
 FOREVER_NS = 2**63
+STEP_S, LONGEST_STEP_S = 0.02, 0.1
+"""Shortest and longest time for which it waits for a message before it looks after its own affairs."""
 PATIENCE_S = 1.0
 BATTERY_NS = 6 * 3600 * 10**9
 """A full battery lasts six hours."""
@@ -164,6 +166,13 @@ class Vehicle:
         self.transfers.tick()
         for number in self.streams.due():
             self.report(number)
+
+    @property
+    def wait_s(self) -> float:
+        """Time for which it has nothing to do but to wait for messages."""
+        if self._next_ns() is not None or self.transfers.running:
+            return STEP_S
+        return min(max(STEP_S, self.streams.wait_s()), LONGEST_STEP_S)
 
     def _check_setpoints(self) -> None:
         """Hold if an autopilot that needs setpoints has none, and go on once they come again."""

@@ -30,8 +30,6 @@ from stopgo.mission.run.events import Pose
 OF_CAMERA = ("CAMERA_IMAGE_CAPTURED", "CAMERA_INFORMATION")
 OPTION = "--mavlink"
 VEHICLE = Who(1, 1)
-STEP_S = 0.02
-"""Interval at which time passes while no message comes in."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: Stopped)
     try:
         with wire.filling(ForVehicle()) as waiting:
             while not stop.is_set():
-                message = waiting.get(STEP_S)
+                message = waiting.get(vehicle.wait_s)
                 if message is None:
                     vehicle.advance()
                 else:

@@ -15,9 +15,8 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from stopgo.bridge.console import say
 from stopgo.bridge.mavlink.vehicle_link.frames import UNREADABLE, Frames, dialect
@@ -47,8 +46,7 @@ READ_BY_OTHERS = 0o044
 """Read permissions of the group and of all users."""
 
 
-@dataclass(frozen=True)
-class Who:
+class Who(NamedTuple):
     """System and component of a sender or receiver."""
 
     system: int
@@ -74,7 +72,8 @@ class MessageQueue:
         self._queue: queue.Queue[Message] = queue.Queue(QUEUE_SIZE)
 
     def wants(self, message: Message) -> bool:
-        return (not self.types or message.get_type() in self.types) and self.of in (None, sender(message))
+        of_type = not self.types or message.get_type() in self.types
+        return of_type and (self.of is None or self.of == sender(message))
 
     def put(self, message: Message) -> None:
         with suppress(queue.Full):  # too many are dropped, as on any lossy link
@@ -220,8 +219,9 @@ class Wire:
             return
         self._routes[message.get_srcSystem(), message.get_srcComponent()] = address
         for_us = self._for_us(message)
-        self.dropped["for others"] += not for_us
-        for waiting in list(self._queues):
+        if not for_us:
+            self.dropped["for others"] += 1
+        for waiting in self._queues.copy():
             if (for_us or waiting.overhears) and waiting.wants(message):
                 waiting.put(message)
 

@@ -26,7 +26,7 @@ from stopgo.planner.visibility.solid_rays import solid_rays
 
 SPLIT = 27
 LOW = (1 << SPLIT) - 1
-PAIRS = 250_000
+PAIRS = 50_000
 """Lines times edges tested at a time, the nearest edges first, because they block most lines."""
 CLOSE = 1e-9
 """Relative difference of squared distances below which they are compared in whole numbers."""

@@ -14,6 +14,7 @@ import pytest
 
 from stopgo.bridge.link.protocol import Manifest
 from stopgo.bridge.robot.hashed_rows import HASHED_TABLES, write_row
+from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import LOCKED_S, Owner, memory_journal, open_journal, shared_journal
 from stopgo.bridge.robot.journal_format import FORMAT, TABLES
 from stopgo.bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
@@ -273,3 +274,29 @@ def test_space_that_is_not_kept_yet_counts_as_needed(tmp_path: Path, monkeypatch
 
 class NewerRun(msgspec.Struct):
     state: str
+
+
+def test_a_fact_is_the_one_that_any_process_wrote_last(tmp_path: Path) -> None:
+    def robot(journal: Journal) -> str | None:
+        owner = journal.fact("owner", Owner)
+        return owner and owner.robot
+
+    with shared_journal(tmp_path, "r1") as one, shared_journal(tmp_path, "r1") as other:
+        assert robot(one) == robot(other) == "r1"
+        other.store_fact("owner", Owner("r2"))
+        assert robot(one) == robot(other) == "r2"
+        with pytest.raises(RuntimeError), one.transaction():
+            one.store_fact("owner", Owner("r3"))
+            assert robot(one) == "r3"
+            raise RuntimeError
+        assert robot(one) == robot(other) == "r2"
+        one.forget_fact("owner")
+        assert robot(one) is robot(other) is None
+
+
+def test_a_fact_that_was_not_changed_is_read_once(tmp_path: Path) -> None:
+    with open_journal(tmp_path, "r1") as journal:
+        first = journal.fact("owner", Owner)
+        assert journal.fact("owner", Owner) is first
+        with journal.transaction():
+            assert journal.fact("owner", Owner) is not first

@@ -17,7 +17,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.files import plan_panel
 from stopgo.mission.files.plan_panel import coordinate_ticks
 from stopgo.mission.files.plan_svg import plan_svg
-from stopgo.mission.files.room_labels import Busy, inside, room_labels, wrapped
+from stopgo.mission.files.room_labels import Busy, covered_weight, inside, room_labels, wrapped
 from stopgo.mission.files.sheet import MARGIN, PAPERS, PaperBox, PaperSheet, SheetContents, fit
 from stopgo.mission.files.svg import SMALLEST_TEXT, shortened, text_width
 from stopgo.mission.floor import Room
@@ -133,6 +133,18 @@ def test_a_mission_of_hundreds_of_stops_continues_its_table_in_columns() -> None
     assert "400" in words(layer(root, "table"))
 
 
+def test_a_long_table_is_cut_before_the_drawing_becomes_too_small() -> None:
+    """All rows of a plan of 156 m by 120 m left its drawing so little room that it was at 1:500."""
+    legs = [(4.0 * (number % 40), 4.0 * (number // 40)) for number in range(1201)]
+    mission = mission_of(*(stop(f"S{n}", *leg) for n, leg in enumerate(pairwise(legs), 1)), begin=legs[0])
+    root = ET.fromstring(plan_svg(room_route(), mission, date="2026-11-21"))
+    scale = words(root)[words(root).index("Scale") + 1]
+    assert scale.startswith("1:200 on"), scale
+    table = words(layer(root, "table"))
+    more = next(found for word in table if (found := re.fullmatch(r"and (\d+) more", word)))
+    assert str(1200 - int(more[1])) in table and int(more[1]) > 0
+
+
 def test_coordinates_of_a_national_grid_are_written_in_full() -> None:
     sheet = fit(SheetContents((392_000.0, 5_712_000.0, 392_020.0, 5_712_010.0), 8.0, 60.0, 65.0, 0))
     shown = words(ET.fromstring(f'<svg xmlns="http://www.w3.org/2000/svg">{coordinate_ticks(sheet)}</svg>'))
@@ -216,6 +228,22 @@ def test_a_long_room_name_is_broken_where_its_halves_are_alike() -> None:
     assert all(text_width(part, 2.2) <= 12.0 for part in wrapped("116 UPS/BATTERY STORAGE", width=12.0))
 
 
+@given(st.integers(0, 2**32 - 1), st.integers(0, 300))
+def test_points_near_a_label_are_found_and_weighed_as_one_by_one(seed: int, many: int) -> None:
+    random = np.random.default_rng(seed)
+    xy, weight = random.uniform(-30, 30, (many, 2)), random.integers(1, 60, many)
+    busy = Busy(xy, weight)
+    low, high = np.sort(random.uniform(-35, 35, (2, 2)), axis=0)
+    near = busy.near(low, high)
+    inner = ((xy > low) & (xy < high)).all(axis=1)
+    assert sorted(near.xy.tolist()) == sorted(xy[inner].tolist()) and near.weight.sum() == weight[inner].sum()
+    x, y, half = np.linspace(-20, 20, 7), np.linspace(-5, 25, 5), random.uniform(0, 15, 2)
+    under = (np.abs(xy[:, 0] - x[:, None]) < half[0])[None] & (np.abs(xy[:, 1] - y[:, None]) < half[1])[
+        :, None
+    ]
+    assert covered_weight(x, y, half, busy).tolist() == (under * weight).sum(axis=2).ravel().tolist()
+
+
 @given(st.text(min_size=1, max_size=40), st.floats(5, 50))
 def test_shortened_text_is_never_wider(content: str, width: float) -> None:
     short = shortened(content, size=2.0, width=width)
@@ -233,7 +261,7 @@ def test_room_names_cross_no_wall_and_no_other_name(wide: float) -> None:
         Room(f"R{k}", f"{k} Meeting and conference", (Polygon.of(box(x, y, x + wide, y + 3.0)),))
         for k, (x, y) in enumerate(corners, 101)
     )
-    avoid = Busy(np.empty((0, 2)), np.empty(0))
+    avoid = Busy(np.empty((0, 2)), np.empty(0, dtype=np.int64))
     root = ET.fromstring(f"<g>{room_labels(rooms, sheet, avoid=avoid)}</g>")
     rings = [sheet.on_paper(room.polygons[0].exterior) for room in rooms]
     for item in root.iter("text"):

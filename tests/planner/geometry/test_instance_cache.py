@@ -11,7 +11,7 @@ from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.reach import reach_of
 from tests.planner.worlds import two_rooms
-from tests.test_house import MODULES
+from tests.sources import MODULES
 
 
 def test_it_is_worked_out_once_and_again_for_a_noun_with_other_values() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,12 +16,15 @@ from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
 from stopgo.mission.stages.network import CONFIDENCE
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
-from stopgo.planner.overlap import ACCURACY_M, LEAST_HOLD_M, links_of, overlaps_of
+from stopgo.planner.overlap import ACCURACY_M, LEAST_HOLD_M, links_by_kernel, links_of, overlaps_of
 from stopgo.planner.overlap.boundary import MOST_SPACING_M
+from stopgo.planner.overlap.pair_kernel import firm_pairs
 from stopgo.planner.overlap.pairs import EDGE_M, LEVER_M, error_of
 from stopgo.planner.space.navigable import navigable
+from tests.planner.kernels import interpret, machine_code
 from tests.planner.worlds import LAYERED, SHARED, box, column, door, floor_of, shell, wall
 
+SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
 SETTINGS = Settings(d_sec=0.5, edge=0.0, overlap=0.1)
 
 
@@ -130,3 +134,20 @@ def test_the_least_strength_is_that_of_the_accuracy() -> None:
     least, more = error_of(np.array([LEAST_HOLD_M, 4 * LEAST_HOLD_M]))
     assert least * CONFIDENCE == pytest.approx(ACCURACY_M, rel=0.01)
     assert more == pytest.approx(least / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_links_are_the_same_in_numpy_as_written_and_compiled(
+    share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On the sample office, where thousands of pairs lie on both sides of each limit."""
+    found = candidates(navigable(read_floor(SAMPLE), Settings(overlap=share, grid=1.0)))
+    fast = links_of(found)
+    pairs = [
+        links_by_kernel(kernel, overlaps_of(found), share)
+        for kernel in (firm_pairs, machine_code(firm_pairs))
+    ]
+    written, built = (sorted(zip(*map(np.concatenate, zip(*one, strict=True)), strict=True)) for one in pairs)
+    interpret(monkeypatch)
+    assert written == built
+    assert (fast != links_of(found)).nnz == 0 and 100 < fast.nnz == 2 * len(built)

@@ -99,3 +99,17 @@ def test_a_restart_between_two_processes_is_reported_by_the_second() -> None:
     assert Listener(first.journal).hear(120.0, 15.0) == "restarted"
     again = Listener(first.journal)
     assert again.hear(121.0, 16.0) == "same"
+
+
+def test_reports_that_come_a_little_sooner_each_are_not_stored_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    station = Listener()
+    station.hear(60.0, 60.0)
+    stored: list[object] = []
+    store_fact = station.journal.store_fact
+    monkeypatch.setattr(station.journal, "store_fact", lambda *fact: (stored.append(fact), store_fact(*fact)))
+    station.hear_all(*((60.0 + t / 10, 60.0 + t / 9) for t in range(90)))  # 1 s sooner at the end
+    assert len(stored) == 0
+    station.hear(69.5, 69.5 + 2.0)
+    assert len(stored) == 1

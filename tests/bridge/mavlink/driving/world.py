@@ -37,8 +37,8 @@ ON_HOLD = dialect.MAVLINK_MSG_ID_HEARTBEAT
 
 
 def site_mission(*, site: SiteOrigin | None = SITE, **details: Any) -> Mission:
-    """Two stops along a corridor that has its place on the earth; each scan takes three seconds."""
-    scan = Scan(profile="default", duration_s=3.0, timeout_s=20.0)
+    """Two stops along a corridor that has its place on the earth; each scan takes two seconds."""
+    scan = Scan(profile="default", duration_s=2.0, timeout_s=20.0)
     made = corridor(**{"stops": 2, "closed": False, "settle_s": 0.2, "scan": scan, **details})
     return with_digest(msgspec.structs.replace(made, georeference=site))
 

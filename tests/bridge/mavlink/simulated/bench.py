@@ -63,7 +63,7 @@ class Bench:
         setup = VehicleSetup(PROFILES[profile], state, origin, at, VehicleFaults(made), seed, changed)
         self.vehicle = complete_vehicle(setup, clock=self.clock, wall=self.wall, send=self._hear)
         self.first = 1 if self.vehicle.autopilot.home_first else 0
-        self._wires = {who: dialect.MAVLink(None, *vars(who).values()) for who in (STATION, OTHER)}
+        self._wires = {who: dialect.MAVLink(None, *who) for who in (STATION, OTHER)}
         self._own = dialect.MAVLink(None, 1, 1)
 
     def _hear(self, message: Message) -> None:
