@@ -16,6 +16,7 @@ from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.overlap import links_of
 from stopgo.planner.selection.bound import counting_bound, first_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
@@ -106,11 +107,16 @@ def greedy_count(visibility: Visibility) -> int:
     return len(fixed) + len(greedy(problem))
 
 
+@instance_cached
+def _whole(visibility: Visibility) -> Cover:
+    return cover_of(visibility, demands_of(visibility))
+
+
 def cover_problem(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
     """The whole problem, the required rows, and the problem that remains after them."""
     candidates = visibility.candidates
     settings = candidates.settings
-    whole = cover_of(visibility, demands_of(visibility))
+    whole = _whole(visibility)
     fixed = np.union1d(candidates.must_rows, candidates.doorway_rows if settings.door_scan else [])
     fixed = fixed.astype(np.int64)
     offered = np.arange(whole.rows)

@@ -588,17 +588,14 @@ def test_ctrl_c_leaves_nothing_half_written(floor: Path, tmp_path: Path) -> None
     assert left_in(tmp_path / "out") == set()
 
 
-SAMPLE = Path(__file__).parents[2] / "recordings" / "samples" / "office.dxf"
-
-
 def test_a_plan_is_made_where_recordings_are_not_installed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    two_rooms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(stopgo, "recordings", stopgo.recordings)  # and back, whatever is loaded meanwhile
     for name in [name for name in sys.modules if f"{name}.".startswith(("rerun.", "stopgo.recordings."))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rerun", None)
-    assert main(["plan", str(SAMPLE), "-o", str(tmp_path)]) == 0
+    assert main(["plan", str(two_rooms), "-o", str(tmp_path)]) == 0
     told = capsys.readouterr()
     assert "rerun is not installed" in told.err
     assert "plan.rrd" not in told.out

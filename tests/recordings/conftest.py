@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,9 @@ from stopgo.recordings.runs.field import FieldRecording
 from tests.faults.sizes import FULL
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world
+
+with suppress(ModuleNotFoundError):
+    import pandas  # noqa: F401  pyarrow loads it for the first drawing: here once, before workers are copied
 
 
 @pytest.fixture(scope="package", autouse=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import shapely
@@ -11,6 +13,7 @@ from stopgo.planner.geometry.ring_index import FEW, RingIndex, areas_within, tri
 from stopgo.planner.geometry.shapes import polygon_parts
 
 
+@cache
 def _slabs(side: int, *, angle: float) -> shapely.Geometry:
     """A slab with many holes, in some of them a block, turned."""
     holes = [shapely.box(k + 0.2, j + 0.3, k + 0.7, j + 0.6) for k in range(side) for j in range(4)]

@@ -223,14 +223,14 @@ def test_a_cloud_has_all_rays_where_few_would_lie_too_far_apart(model: bool) -> 
 
 @cache
 def pair_in_a_room():
-    (pair,) = pair_of(hall(6, 4, column("c", 2, 2)), (1.5, 1.0), (4.5, 3.0), COARSEST)
+    (pair,) = pair_of(hall(6, 4, column("c", 2, 2)), (1.5, 1.0), (4.5, 3.0), replace(COARSEST, step_deg=0.8))
     return pair
 
 
 @cache
 def pair_in_a_corridor():
     """Its ends are out of range: nothing holds the pair along x."""
-    simulation = replace(COARSEST, range_m=4.0, joining_m=4.0)
+    simulation = replace(COARSEST, range_m=4.0, joining_m=4.0, step_deg=0.8)
     (pair,) = pair_of(hall(30, 2), (13.0, 1.0), (15.0, 1.0), simulation)
     return pair
 
