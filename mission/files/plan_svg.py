@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -13,7 +14,7 @@ from stopgo.mission.files.floor_drawing import building, targets
 from stopgo.mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
 from stopgo.mission.files.route_drawing import STOP, errors, network, rings, route, stops
 from stopgo.mission.files.shared_drawing import shared_routes, shared_stops
-from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
+from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit, sheet_with
 from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray, bounds
@@ -77,12 +78,14 @@ def _table_rows(
     made: Route, mission: Mission, figures: Figures | None, shared: Sequence[Mission]
 ) -> list[panel.Row]:
     """Rows of the table: fewer of each list on a floor whose drawing would else be smaller."""
-    scale = max(HANDY, whole_sheet(made, mission, shared).scale)
+    contents = _contents(made, mission, shared)
+    scale = max(HANDY, fit(contents).scale)
     rows: list[panel.Row] = []
     for most in panel.MOST_ROWS:
         rows = panel.shared_rows(shared, most) if shared else panel.stop_rows(mission, most)
         rows += panel.figure_rows(figures, most) if figures else []
-        if whole_sheet(made, mission, shared, rows=len(rows)).scale <= scale:
+        sheet = sheet_with(replace(contents, rows=len(rows)))
+        if sheet is not None and sheet.scale <= scale:
             break
     return rows
 
@@ -91,10 +94,15 @@ def whole_sheet(
     made: Route, mission: Mission, shared: Sequence[Mission] = (), *, rows: int = 0
 ) -> PaperSheet:
     """Return the sheet that shows everything, with this number of table rows next to it."""
+    return fit(replace(_contents(made, mission, shared), rows=rows))
+
+
+def _contents(made: Route, mission: Mission, shared: Sequence[Mission]) -> SheetContents:
+    """Contents of the one sheet, without a table."""
     entries = panel.legend_entries(made, mission, shared)
     facts = [*panel.facts_of(made, mission, shared, date=""), ("Scale", "")]
-    blocks = (panel.legend_height(entries), panel.title_height(facts), rows)
-    return fit(SheetContents(extent_of(made, *(shared or (mission,))), PADDING, *blocks))
+    blocks = (panel.legend_height(entries), panel.title_height(facts), 0)
+    return SheetContents(extent_of(made, *(shared or (mission,))), PADDING, *blocks)
 
 
 def drawing_of(

@@ -107,6 +107,14 @@ class SheetContents:
 
 def fit(contents: SheetContents) -> PaperSheet:
     """The sheet for a plan: the largest scale that is still handy, on the smallest paper that holds it."""
+    sheet = sheet_with(contents)
+    if sheet is None:
+        raise InputError(f"the floor reaches over {contents.bounds} m; no sheet holds that, check its unit")
+    return sheet
+
+
+def sheet_with(contents: SheetContents) -> PaperSheet | None:
+    """The same; None if no sheet holds the contents."""
     for scale, papers in _scales():
         for paper in papers:
             long, short = PAPERS[paper]
@@ -115,7 +123,7 @@ def fit(contents: SheetContents) -> PaperSheet:
                     sheet = layout(contents, paper, float(width), float(height), scale)
                     if sheet is not None:
                         return sheet
-    raise InputError(f"the floor reaches over {contents.bounds} m; no sheet holds that, check its unit")
+    return None
 
 
 def _scales() -> Iterator[tuple[int, tuple[str, ...]]]:

@@ -145,6 +145,15 @@ def test_a_long_table_is_cut_before_the_drawing_becomes_too_small() -> None:
     assert str(1200 - int(more[1])) in table and int(more[1]) > 0
 
 
+def test_a_table_that_no_sheet_holds_is_cut_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A floor of 100 000 m² was refused for its unit, after minutes of planning: its rows filled A0 twice."""
+    monkeypatch.setattr(plan_panel, "MOST_ROWS", (4000, 10))
+    legs = [(1.0 + 0.001 * number, 1.0) for number in range(4001)]
+    mission = mission_of(*(stop(f"S{n}", *leg) for n, leg in enumerate(pairwise(legs), 1)), begin=legs[0])
+    root = ET.fromstring(plan_svg(room_route(), mission, date="2026-11-21"))
+    assert "and 3990 more" in words(layer(root, "table"))
+
+
 def test_coordinates_of_a_national_grid_are_written_in_full() -> None:
     sheet = fit(SheetContents((392_000.0, 5_712_000.0, 392_020.0, 5_712_010.0), 8.0, 60.0, 65.0, 0))
     shown = words(ET.fromstring(f'<svg xmlns="http://www.w3.org/2000/svg">{coordinate_ticks(sheet)}</svg>'))
