@@ -64,7 +64,7 @@ def odd_drawing(rng: random.Random) -> Drawing:
 
 @pytest.mark.parametrize("strategy", some(["grid", "triangulation"], every=2))
 def test_an_anomalous_drawing_is_planned_or_refused_in_one_line(strategy: str) -> None:
-    planned, trials = 0, size(short=20, full=5000)
+    planned, trials = 0, size(short=10, full=5000)
     for seed in range(trials):
         drawing = odd_drawing(random.Random(seed))
         try:

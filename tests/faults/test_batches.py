@@ -16,9 +16,12 @@ from typing import Any
 import pytest
 
 import stopgo.plan_files
+import stopgo.planner.floors
 from stopgo.batches.store import ResultStore
 from stopgo.batches.work import PlanOutcome, PlanTask, work
+from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
+from stopgo.planner.floors.reader import FloorOptions
 from tests.batches.halls import hall
 from tests.faults.sizes import size
 
@@ -46,8 +49,18 @@ class StubReport:
 
 @pytest.fixture
 def planned(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Replace planning by writing two small files; returns the floors that were planned."""
+    """Replace planning by writing two small files; returns the floors that were planned.
+
+    Each drawing is read once: what is killed is the keeping of results.
+    """
     floors: list[str] = []
+    read_floor, read = stopgo.planner.floors.read_floor, dict[Path, FloorPlan]()
+
+    def read_once(path: Path, options: FloorOptions) -> FloorPlan:
+        drawing = path.resolve()
+        if drawing not in read:
+            read[drawing] = read_floor(path, options)
+        return read[drawing]
 
     def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool) -> list[StubReport]:
         floors.append(floor.stem)
@@ -56,6 +69,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return [StubReport()]
 
     monkeypatch.setattr(stopgo.plan_files, "plan_files", plan_files)
+    monkeypatch.setattr(stopgo.planner.floors, "read_floor", read_once)
     return floors
 
 

@@ -180,6 +180,12 @@ def planned(floor: FloorPlan, settings: Settings | None = None) -> tuple[Mission
     return plan(floor, settings or Settings(), observe=observe).mission, nouns
 
 
+@cache
+def mission_of_hall() -> Mission:
+    """The mission of a hall of 6 m by 4 m, planned once."""
+    return planned(hall(6, 4))[0]
+
+
 def changed(settings: Settings) -> list[str]:
     """The settings that are not the default."""
     values = {key: getattr(settings, key) for key in PARAMETERS}

@@ -125,9 +125,10 @@ def test_ctrl_c_in_watch_leaves_the_vehicle_alone(vehicle: Vehicle) -> None:
     assert vehicle.run("watch").returncode == 1
 
 
-def test_options_of_the_other_link_are_refused(vehicle: Vehicle) -> None:
+def test_options_of_the_other_link_are_refused(tmp_path: Path) -> None:
+    link = ("--mavlink", f"udpout:127.0.0.1:{free_port()}", "--vehicle", "1", "--state", str(tmp_path))
     for verb, *options in (("start", "--robot", "r1"), ("watch", "--site", "hall"), ("pause", "--keys", "k")):
-        told = vehicle.run(verb, *options)
+        told = stopgo(verb, *options, *link)
         assert told.returncode == 2 and "has no meaning with --mavlink" in told.stderr
 
 

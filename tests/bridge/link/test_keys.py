@@ -186,16 +186,22 @@ def test_a_station_with_keys_runs_a_mission_and_a_viewer_watches(site: Path, tmp
         assert '"state": "FINISHED"' in status.stdout, status.stderr
 
 
-def test_strangers_and_plain_links_do_not_reach_the_robot(site: Path, tmp_path: Path) -> None:
-    with guarded_robot(site, tmp_path) as endpoint:
-        stranger = connect(endpoint, robot="r1", keys=site / "other" / "stranger", timeout_s=1.5)
-        with pytest.raises(RobotUnreachable), stranger:
-            pass
-        plain = connect(endpoint.replace("tls/", "tcp/"), robot="r1", timeout_s=1.5)
-        with pytest.raises(RobotUnreachable), plain:
-            pass
-        with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
-            assert station.status().state == "IDLE"
+@pytest.fixture(scope="module")
+def robot_at_rest(site: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Endpoint of a robot that nobody starts."""
+    with guarded_robot(site, tmp_path_factory.mktemp("robot")) as endpoint:
+        yield endpoint
+
+
+def test_strangers_and_plain_links_do_not_reach_the_robot(site: Path, robot_at_rest: str) -> None:
+    stranger = connect(robot_at_rest, robot="r1", keys=site / "other" / "stranger", timeout_s=1.5)
+    with pytest.raises(RobotUnreachable), stranger:
+        pass
+    plain = connect(robot_at_rest.replace("tls/", "tcp/"), robot="r1", timeout_s=1.5)
+    with pytest.raises(RobotUnreachable), plain:
+        pass
+    with connect(robot_at_rest, robot="r1", keys=site / "site" / "alice") as station:
+        assert station.status().state in ("IDLE", "READY")
 
 
 LIVES = (8, 24, 72, 216)
@@ -261,21 +267,20 @@ def left_when_the_robots_ends(site: Path, folder: Path, lasts: int) -> bool:
 
 
 def test_a_viewer_that_commands_is_refused_and_a_forged_name_is_not_believed(
-    site: Path, tmp_path: Path
+    site: Path, robot_at_rest: str
 ) -> None:
-    keys = KeyExpressions("r1")
-    with guarded_robot(site, tmp_path) as endpoint:
-        with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
-            station.push(corridor())
-            order = station.order("start")
-        key = keys.command("start")
-        vera = read_keys(site / "site" / "vera", now=NOW)
-        with connecting(endpoint, Guard(vera)) as link:
-            Station(link, keys, commander="vera").reach(endpoint)
-            refused = link.ask(key, encode(order), timeout_s=2)
-        with connect(endpoint, robot="r1", keys=site / "site" / "bob") as other:
-            forged = other.link.ask(key, encode(order), timeout_s=1)
-            assert other.status().state == "READY"
+    keys, endpoint = KeyExpressions("r1"), robot_at_rest
+    with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+        station.push(corridor())
+        order = station.order("start")
+    key = keys.command("start")
+    vera = read_keys(site / "site" / "vera", now=NOW)
+    with connecting(endpoint, Guard(vera)) as link:
+        Station(link, keys, commander="vera").reach(endpoint)
+        refused = link.ask(key, encode(order), timeout_s=2)
+    with connect(endpoint, robot="r1", keys=site / "site" / "bob") as other:
+        forged = other.link.ask(key, encode(order), timeout_s=1)
+        assert other.status().state == "READY"
     assert refused is not None
     assert "vera is a viewer" in msgspec.json.decode(refused, type=Reply).messages[0]
     assert forged is not None

@@ -15,7 +15,7 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.checking.claims import overclaims, recount
 from stopgo.planner.checking.fit import misfits_on, other_machine
 from stopgo.planner.checking.network_claims import network_overclaims
-from tests.planner.worlds import hall, planned, two_rooms
+from tests.planner.worlds import hall, mission_of_hall, planned, two_rooms
 
 change = msgspec.structs.replace
 REGISTERING = Settings(overlap=0.1, range=2.5)
@@ -66,7 +66,7 @@ def test_a_dropped_stop_leaves_a_kind_below_its_required_fraction() -> None:
     ],
 )
 def test_a_robot_faster_than_planned_is_reported(changes: dict[str, float], path: str) -> None:
-    mission, _ = planned(hall(6, 4))
+    mission = mission_of_hall()
     assert list(other_machine(mission, Settings())) == []
     bold = change(mission, robot=change(mission.robot, **changes))
     assert paths(other_machine(bold, Settings())) == [path]
@@ -82,7 +82,7 @@ def test_no_parameters_excuse_what_no_robot_does() -> None:
 
 
 def test_a_scan_shorter_than_planned_is_reported() -> None:
-    mission, _ = planned(hall(6, 4))
+    mission = mission_of_hall()
     scan = mission.stops[0].scan
     empty = first_stop(mission, scan=change(scan, duration_s=0.0))
     (problem,) = other_machine(empty, Settings())
@@ -92,7 +92,7 @@ def test_a_scan_shorter_than_planned_is_reported() -> None:
 
 
 def test_a_position_tolerance_wider_than_planned_is_reported() -> None:
-    mission, _ = planned(hall(6, 4))
+    mission = mission_of_hall()
     (problem,) = other_machine(first_stop(mission, tolerance_m=8.0), Settings())
     assert str(problem) == "$.stops[0].tolerance_m: is 8; the plan allows at most 0.05"
 

@@ -25,6 +25,7 @@ from tests.planner.worlds import (
     element,
     floor_of,
     hall,
+    mission_of_hall,
     moved,
     planned,
     shell,
@@ -44,7 +45,7 @@ def told(floor: FloorPlan, mission: Mission, settings: Settings | None = None) -
 
 def driven(*places: Point, doorway: bool = False, **details: Any) -> Mission:
     """A mission of one stop at the last of the places, driven to through the others."""
-    mission = planned(hall(6, 4))[0]
+    mission = mission_of_hall()
     x, y = places[-1]
     stop = change(mission.stops[0], id="s1", x=x, y=y, doorway=doorway, approach=places)
     start = change(mission.start, x=places[0][0], y=places[0][1])

@@ -43,7 +43,7 @@ def tour_and_its_bound(seed: int) -> tuple[list[int], float]:
     return tour, tour_bound(lengths, tour, Ends(None, None, True, ""))
 
 
-@pytest.mark.parametrize("seed", range(size(short=3, full=30)))
+@pytest.mark.parametrize("seed", range(size(short=2, full=30)))
 @pytest.mark.parametrize(
     "ends",
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -21,6 +22,20 @@ from tests.planner.worlds import column, hall, mirrored, moved, planned, turned,
 
 def seen_with(floor: FloorPlan, fov: float, **given: object) -> Visibility:
     return visibility(candidates(navigable(floor, Settings(fov=fov, **given))))  # type: ignore[arg-type]
+
+
+@cache
+def seen_in_columned(fov: float, method: str) -> Visibility:
+    """In a hall with a column."""
+    return seen_with(hall(7, 5, column("c", 3.3, 2.4)), fov, visibility=method)
+
+
+OFF_THE_GRID = hall(7.3, 5.3, column("c", 3.3, 2.4))
+
+
+@cache
+def seen_off_the_grid() -> Visibility:
+    return seen_with(OFF_THE_GRID, 70, grid=0.83)
 
 
 def test_all_round_there_are_no_headings() -> None:
@@ -52,8 +67,7 @@ def test_headings_are_at_most_half_a_view_apart(fov: float, number: int) -> None
 @pytest.mark.parametrize("fov", [10.0, 45.0, 90.0, 200.0, 359.0])
 @pytest.mark.parametrize("method", ["exact", "bresenham"])
 def test_headings_see_within_their_view_and_together_everything(fov: float, method: str) -> None:
-    floor = hall(7, 5, column("c", 3.3, 2.4))
-    whole, parts = seen_with(floor, 360, visibility=method), seen_with(floor, fov, visibility=method)
+    whole, parts = seen_in_columned(360, method), seen_in_columned(fov, method)
     found = parts.candidates
     for row in range(parts.rows):
         index = found.kept[row]
@@ -67,8 +81,7 @@ def test_headings_see_within_their_view_and_together_everything(fov: float, meth
 
 
 def test_what_was_dropped_stays_dropped_once() -> None:
-    floor = hall(7, 5, column("c", 3.3, 2.4))
-    whole, parts = seen_with(floor, 360).candidates, seen_with(floor, 90).candidates
+    whole, parts = seen_in_columned(360, "exact").candidates, seen_in_columned(90, "exact").candidates
     assert np.sum(parts.reason != KEPT) == np.sum(whole.reason != KEPT)
     assert len(parts.kept) == 8 * len(whole.kept)
     assert len(parts.xy) == len(parts.room) == len(parts.part) == len(parts.heading)
@@ -98,8 +111,7 @@ def test_doorways_are_scanned_once() -> None:
     "move", [turned(90), turned(180), turned(30), mirrored], ids=["90", "180", "30", "m"]
 )
 def test_headings_turn_with_the_drawing(move) -> None:
-    floor = hall(7.3, 5.3, column("c", 3.3, 2.4))
-    one, other = seen_with(floor, 70, grid=0.83), seen_with(moved(floor, move), 70, grid=0.83)
+    one, other = seen_off_the_grid(), seen_with(moved(OFF_THE_GRID, move), 70, grid=0.83)
     sizes = [sorted(len(seen.seen_by(row)) for row in range(seen.rows)) for seen in (one, other)]
     assert len(sizes[0]) == len(sizes[1])
     assert sum(sizes[0]) == pytest.approx(sum(sizes[1]), rel=0.002)

@@ -29,6 +29,7 @@ from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.driving.world import rover
 from tests.bridge.mavlink.scripted import Scripted
 from tests.bridge.mavlink.simulated.test_simulated_mavsdk import item_of, raw, station, tour
+from tests.called import stopgo
 from tests.ports import free_port
 
 KEYS = KeyExpressions("r1")
@@ -326,13 +327,13 @@ def request_of(system: int) -> bytes:
     return bytes(request.pack(coder))
 
 
-def test_a_tunnel_off_this_machine_wants_keys_or_insecure(tmp_path: Path) -> None:
-    with pytest.raises(RobotUnreachable, match="leaves this machine without keys"):
-        start(
-            "tunnel", "station", "--robot", "r1", "--connect", "tcp/10.9.8.7:7447", called="the tunnel"
-        )  # fmt: skip
-    with pytest.raises(RobotUnreachable, match="leaves this machine unsigned"):
-        start("tunnel", "station", "--robot", "r1", "--mavlink", "udpin:0.0.0.0:14550", called="the tunnel")
+def test_a_tunnel_off_this_machine_wants_keys_or_insecure() -> None:
+    for option, value, why in (
+        ("--connect", "tcp/10.9.8.7:7447", "leaves this machine without keys"),
+        ("--mavlink", "udpin:0.0.0.0:14550", "leaves this machine unsigned"),
+    ):
+        told = stopgo("tunnel", "station", "--robot", "r1", option, value)
+        assert told.returncode == 2 and why in told.stderr
 
 
 def test_a_transport_is_closed_with_its_tunnel() -> None:

@@ -36,6 +36,9 @@ LARGE = ("workshop-2018-11-08", "workshop-2019-10-29", "house", "barcelona-plan"
 WILD = [path for path in sorted((LAYERED.parent / "dxf").glob("*.dxf")) if FULL or path.stem not in LARGE]
 FLOORS = ("duplex-l1", "fzk-haus-eg", *(["office-l1"] if FULL else []))
 
+BY_TURNS = [(floor, name) for k, name in enumerate(FORMATS) for floor in FLOORS[:: (-1) ** k]]
+"""Each format on each floor; of every two, the one floor and then the other comes first."""
+
 pytestmark = pytest.mark.skipif(not LAYERED.is_dir(), reason=f"the real inputs are not in {LAYERED}")
 
 
@@ -64,8 +67,7 @@ def supplements(name: str, folder: Path) -> Supplements:
     return Supplements(floor=under, coverage=read_stretches(folder / "coverage.json", mission))
 
 
-@pytest.mark.parametrize("floor", FLOORS)
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize(("floor", "name"), some(BY_TURNS, every=2))
 def test_a_real_mission_reads_back(floor: str, name: str, tmp_path: Path) -> None:
     mission, _ = planned(floor)
     assert exported(mission, name, supplements(floor, tmp_path))

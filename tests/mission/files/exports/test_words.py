@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from itertools import product
 
 import msgspec
 import pytest
@@ -17,6 +18,7 @@ from stopgo.mission.files.exports import FORMATS, exported
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.imports import READERS
 from stopgo.mission.files.imports.track import ImportOptions
+from tests.faults.sizes import some
 from tests.mission.files.exports.worlds import laboratory
 
 words = st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=20)
@@ -42,8 +44,7 @@ def named(word: str) -> Mission:
     return with_digest(msgspec.structs.replace(made, name=word, frame=frame, stops=stops))
 
 
-@pytest.mark.parametrize("name", FORMATS)
-@pytest.mark.parametrize("word", HOSTILE)
+@pytest.mark.parametrize(("word", "name"), some([*product(HOSTILE, FORMATS)], every=3))
 def test_hostile_names_pass_every_format(name: str, word: str) -> None:
     assert exported(named(word), name, Supplements())
 
