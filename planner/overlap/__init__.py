@@ -29,6 +29,11 @@ ROUNDING = 0.5 * 10.0**-DIGITS
 @instance_cached
 def overlaps_of(candidates: Candidates) -> Overlaps:
     """The boundary that kept candidates see in common."""
+    return _overlaps_of(candidates)
+
+
+def _overlaps_of(candidates: Candidates) -> Overlaps:
+    """The same, not kept: of a large floor it is a tenth of all memory."""
     return Overlaps(shown(candidates, np.arange(len(candidates.kept))))
 
 
@@ -40,11 +45,11 @@ def registers(pairs: Pairs, *, share: float) -> IntArray:
 
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
-    overlaps, share = overlaps_of(candidates), candidates.settings.least_overlap
+    overlaps, share = _overlaps_of(candidates), candidates.settings.least_overlap
     kernel = compiled(firm_pairs, large=False)
     pairs = _links(overlaps, share) if kernel is None else links_by_kernel(kernel, overlaps, share)
     ends = tuple(np.concatenate([np.empty(0, np.int64), *ends]) for ends in zip(*pairs, strict=True))
-    later = csr_array((np.ones(len(ends[0]), np.int64), ends), shape=(overlaps.rows,) * 2)
+    later = csr_array((np.ones(len(ends[0]), np.int8), ends), shape=(overlaps.rows,) * 2)
     return (later + later.T).tocsr()
 
 
