@@ -1,16 +1,26 @@
-"""Local search over tours: moves a stop, exchanges two, or reverses a stretch, by the schedule's times."""
+"""Local search over tours: moves a stop, exchanges two, or reverses a stretch, by the schedule's times.
+
+Of long tours only those changes are timed that are the best by driving time alone.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
+import numpy as np
+
+from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.task_allocation.tour_times import Tour, TourTimes
 
 ROUNDS = 200
 """Most improvements; a count, so that plans do not depend on speed."""
 GAIN = 1e-6
 """Seconds below which a change is no improvement."""
+LONG = 30
+"""Stops of a tour above which not all changes are timed."""
+LIKELY = 60
+"""Changes of a long tour that are timed, the best by driving time."""
 
 Tours = tuple[Tour, ...]
 
@@ -27,7 +37,10 @@ def shorter_longest(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> To
                 found, worth = other, its
         if found is None:
             return tours
-        tours = tuple(shorter(clock, tour, start) for tour, start in zip(found, starts, strict=True))
+        tours = tuple(
+            tour if tour is before else shorter(clock, tour, start)
+            for tour, before, start in zip(found, tours, starts, strict=True)
+        )
         worth = _worth(clock, tours, starts)
     return tours
 
@@ -49,7 +62,7 @@ def shorter(clock: TourTimes, tour: Tour, start: int) -> Tour:
     best = clock.seconds(tour, start)
     for _ in range(ROUNDS):
         order, seconds = min(
-            ((other, clock.seconds(other, start)) for other in _reordered(tour)),
+            ((other, clock.seconds(other, start)) for other in _orders_to_try(clock, tour, start)),
             key=lambda found: found[1], default=(tour, best),
         )  # fmt: skip
         if seconds > best - GAIN:
@@ -68,6 +81,9 @@ def _exchanged(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Iterato
     """Tours with a stop of the longest tour moved to another, or exchanged for one of another."""
     times = [clock.seconds(tour, start) for tour, start in zip(tours, starts, strict=True)]
     longest = times.index(max(times))
+    if len(tours[longest]) > LONG:
+        yield from _likely_exchanges(clock, tours, starts, times)
+        return
     for stop in tours[longest]:
         rest = _without(tours[longest], stop)
         for k, tour in enumerate(tours):
@@ -88,6 +104,86 @@ def _inserted(clock: TourTimes, tour: Tour, stop: int, start: int) -> Tour:
     added = [(least[a, stop] + least[stop, b] - least[a, b], k) for k, (a, b) in enumerate(pairwise(line))]
     at = min(added)[1]
     return (*tour[:at], stop, *tour[at:])
+
+
+def _likely_exchanges(
+    clock: TourTimes, tours: Tours, starts: Sequence[int], times: list[float]
+) -> Iterator[Tours]:
+    """Moves and exchanges of a stop of a long longest tour, the best by estimated driving time."""
+    longest = times.index(max(times))
+    own, leaving = np.array(tours[longest]), _left_out(clock, tours[longest], starts[longest])
+    found: list[tuple[float, float, int, int, int]] = []
+    for k, tour in enumerate(tours):
+        if k == longest:
+            continue
+        entering = _added(clock, own, tour, starts[k])
+        apart = (times[longest] - leaving - clock.pause_s, times[k] + entering + clock.pause_s)
+        found += zip(
+            np.maximum(*apart), apart[0] + apart[1], own, [k] * len(own), [-1] * len(own), strict=True
+        )
+        others = np.array(tour, dtype=np.int64)
+        back = times[longest] - leaving[:, None] + _added(clock, others, tours[longest], starts[longest])
+        there = times[k] + entering[:, None] - _left_out(clock, tour, starts[k])
+        a, b = (index.ravel() for index in np.indices(back.shape))
+        both = (np.maximum(back, there).ravel(), (back + there).ravel())
+        found += zip(*both, own[a], [k] * len(a), others[b], strict=True)
+    for _, _, stop, k, other in sorted(found)[:LIKELY]:
+        rest = _without(tours[longest], int(stop))
+        if other < 0:
+            yield _with(tours, {longest: rest, k: _inserted(clock, tours[k], int(stop), starts[k])})
+            continue
+        back_in = _inserted(clock, rest, int(other), starts[longest])
+        there_in = _inserted(clock, _without(tours[k], int(other)), int(stop), starts[k])
+        yield _with(tours, {longest: back_in, k: there_in})
+
+
+def _left_out(clock: TourTimes, tour: Tour, start: int) -> FloatArray:
+    """Driving time that a tour saves without each of its stops, about (stops,)."""
+    line = np.array([clock.stops + start, *tour, clock.stops + start])
+    a, at, b = line[:-2], line[1:-1], line[2:]
+    least = clock.least
+    return np.asarray(least[a, at] + least[at, b] - least[a, b])
+
+
+def _added(clock: TourTimes, stops: IntArray, tour: Tour, start: int) -> FloatArray:
+    """Driving time that each stop adds to a tour where it adds least, about (stops,)."""
+    line = np.array([clock.stops + start, *tour, clock.stops + start])
+    least = clock.least
+    added = least[stops[:, None], line[:-1]] + least[stops[:, None], line[1:]] - least[line[:-1], line[1:]]
+    return np.asarray(added.min(axis=1))
+
+
+def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
+    """All changes of a tour's order; of a long one the best by driving time."""
+    if len(tour) <= LONG:
+        yield from _reordered(tour)
+        return
+    line = np.array([clock.stops + start, *tour, clock.stops + start])
+    least, n = clock.least, len(tour)
+    step = least[line[:-1], line[1:]]
+    a, b = np.triu_indices(n + 1, 2)  # the stretch from stop a to before stop b is reversed
+    turned = least[line[a], line[b]] + least[line[a + 1], line[b + 1]] - step[a] - step[b]
+    found = [(gain, begin, end, -1) for gain, begin, end in _best(turned, a, b)]
+    for size in (1, 2, 3):
+        first, at = (index.ravel() for index in np.indices((n - size + 1, n + 1)))
+        apart = (at < first) | (at > first + size)
+        first, at = first[apart], at[apart]
+        closed = least[line[first], line[first + size + 1]] - step[first] - step[first + size]
+        moved = closed + least[line[at], line[first + 1]] + least[line[first + size], line[at + 1]] - step[at]
+        found += [(gain, begin, place, size) for gain, begin, place in _best(moved, first, at)]
+    for _, begin, place, size in sorted(found)[:LIKELY]:
+        if size < 0:
+            yield (*tour[:begin], *tour[begin:place][::-1], *tour[place:])
+            continue
+        stretch, rest = tour[begin : begin + size], (*tour[:begin], *tour[begin + size :])
+        at = place - size if place > begin else place
+        yield (*rest[:at], *stretch, *rest[at:])
+
+
+def _best(change: FloatArray, first: IntArray, second: IntArray) -> Iterator[tuple[float, int, int]]:
+    """The changes with the least driving time, LIKELY of them, with their two places."""
+    for k in np.argsort(change, kind="stable")[:LIKELY].tolist():
+        yield float(change[k]), int(first[k]), int(second[k])
 
 
 def _reordered(tour: Tour) -> Iterator[Tour]:
