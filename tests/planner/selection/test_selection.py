@@ -112,10 +112,21 @@ def test_the_first_bound_of_a_large_problem_is_nearly_that_of_its_relaxation(
     monkeypatch.setattr(bound, "QUICK", 500)
     monkeypatch.setattr(bound, "COARSE", 300)
     covers = [cover_of_rooms(seed, rows=60, columns=200, rooms=12) for seed in range(4)]
+    steps = []
     for cover in covers:
         found = len(greedy(cover))
-        quick = lower_bound(cover, found=found, quickly=True)
-        assert first_bound(cover, found=found) < quick <= relaxation_bound(cover) <= quick + 1
+        quick, few = lower_bound(cover, found=found, quickly=True), first_bound(cover, found=found)
+        assert few <= quick <= relaxation_bound(cover) <= quick + 1
+        steps.append(quick - few)
+    assert sum(steps) > 0  # of the relaxation: else the few steps alone would do
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_multiplier_bound_of_a_large_problem_is_nearly_that_of_its_relaxation(seed: int) -> None:
+    """Also where the best known selection has half as many rows more."""
+    cover = cover_of_rooms(seed, rows=300, columns=900, rooms=40)
+    best = relaxation_bound(cover)
+    assert best - 1 <= multiplier_bound(cover, found=len(greedy(cover)), steps=170) <= best
 
 
 def test_the_default_selector_finds_nearly_every_optimum() -> None:
