@@ -35,7 +35,8 @@ SCALE_AND_AXES = 25.0
 MOST_ROWS = (1500, 500, 200, 80, 30, 10)
 """Rows of each list in the table; beyond, it says how many more there are.
 
-The lower ones are for floors whose drawing would else be smaller."""
+The lower ones are for floors whose drawing would else be smaller.
+"""
 
 
 def title_height(facts: list[tuple[str, str]]) -> float:

@@ -24,7 +24,8 @@ AROUND = 0.4
 STOPS, WAY, WALLS = 60, 10, 7
 """Cost of each point of a stop, of the route (which a label may cross) and of an element.
 
-Costs are whole numbers: their sums are equal on every machine."""
+Costs are whole numbers: their sums are equal on every machine.
+"""
 OUTSIDE = 60
 """Cost of each of nine points of a label that lies outside its room."""
 LABEL = 20
