@@ -15,6 +15,7 @@ from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.mission.stages.figures import LEG_OVER_IGNORED
 from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, to_shape, union
+from stopgo.planner.space.local_shapes import ground_of, room_shapes
 from stopgo.planner.space.targets import solid_of
 
 AT_WALL = 0.35
@@ -109,10 +110,8 @@ def _first_corner(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float
 
 def floor_of_rooms(space: NavigableSpace) -> list[float]:
     """Area in m² of each room's floor: an outline also over a void or beyond the slab counts less."""
-    origin = local_origin(space.floor)
-    ground = to_shape(space.ground, origin)
-    whole = [to_shape(room.area, origin) for room in space.rooms]
-    inside = [shape.intersection(ground).area for shape in whole]
+    whole = room_shapes(space)
+    inside = shapely.area(shapely.intersection(whole, ground_of(space))).tolist()
     pairs = zip(whole, inside, strict=True)
     return [on if shape.area - on > LEAST_OFF else shape.area for shape, on in pairs]
 
@@ -141,11 +140,12 @@ def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
     ]
     walls = union([solid_of(item, origin, HAIRLINE) for item in known]).buffer(AT_WALL, quad_segs=2)
     shapely.prepare(walls)
-    outlines = [shapely.boundary(to_shape(room.area, origin)) for room in rooms]
     bare = [
         room
-        for room, outline in zip(rooms, outlines, strict=True)
-        if outline.length and outline.intersection(walls).length < WALLED * outline.length
+        for room, outline in zip(space.rooms, shapely.boundary(room_shapes(space)), strict=True)
+        if room.room is not None
+        and outline.length
+        and outline.intersection(walls).length < WALLED * outline.length
     ]
     if not bare:
         return
