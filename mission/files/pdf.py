@@ -134,7 +134,7 @@ class _Pen:
     def _path(self, element: ET.Element, style: Style) -> None:
         stroke, fill = self._inked(style)
         mode = 0 if style.get("fill-rule") == "evenodd" else 1
-        path = _Path(" ".join(_operators(style.get("d", ""))))
+        path = _WrittenPath(" ".join(_operators(style.get("d", ""))))
         self._canvas.drawPath(path, stroke=stroke, fill=fill, fillMode=mode)
 
     def _line(self, element: ET.Element, style: Style) -> None:
@@ -176,13 +176,13 @@ _DRAWING = {
 
 
 @dataclass(frozen=True)
-class _Path:
+class _WrittenPath:
     """A path that is written in the words of PDF already."""
 
     operators: str
 
     def getCode(self) -> str:
-        """What a canvas asks a path for."""
+        """The operators, as a canvas asks a path for them."""
         return self.operators
 
 

@@ -149,22 +149,22 @@ def _site_sheet(made: Route, mission: Mission) -> PaperSheet:
 
 
 def _tile_sheet(tile: Tile) -> PaperSheet:
-    """The paper of a tile, without the blocks beside its drawing."""
+    """The paper of a tile, without the blocks next to its drawing."""
     long, short = (float(side) for side in PAPERS[TILE_PAPER])
     nowhere, box = PaperBox(0.0, 0.0, 0.0, 0.0), PaperBox(MARGIN, MARGIN, *_window())
     middle = ((tile.low[0] + tile.high[0]) / 2, (tile.low[1] + tile.high[1]) / 2)
     return PaperSheet(TILE_PAPER, long, short, READABLE, box, nowhere, nowhere, (), middle)
 
 
-def _beside(sheet: PaperSheet) -> float:
-    """Where the blocks beside a tile's drawing begin, in millimetres from the left."""
+def _right_of_drawing(sheet: PaperSheet) -> float:
+    """Millimetres from the left at which the blocks next to a tile's drawing begin."""
     return sheet.width - MARGIN - COLUMN
 
 
 def _tile_legend(made: Route, mission: Mission, tile: Tile) -> str:
     """The legend, which is the same on every tile."""
     entries, sheet = panel.legend_entries(made, mission), _tile_sheet(tile)
-    box = PaperBox(_beside(sheet), MARGIN, COLUMN, panel.legend_height(entries))
+    box = PaperBox(_right_of_drawing(sheet), MARGIN, COLUMN, panel.legend_height(entries))
     return panel.legend(entries, mission, replace(sheet, legend=box))
 
 
@@ -175,7 +175,7 @@ def _tile_page(tile: Tile, tiles: Sequence[Tile], site: PaperSheet, mission: Mis
         *(("Digest", mission.digest[:12]), ("Floor", mission.origin.floor), ("Date", date)),
     ]
     sheet, height = _tile_sheet(tile), panel.title_height(facts)
-    box, left, title_y = sheet.drawing, _beside(sheet), sheet.height - MARGIN - height
+    box, left, title_y = sheet.drawing, _right_of_drawing(sheet), sheet.height - MARGIN - height
     content = (
         group(
             "drawing", [use("site", *sheet.on_paper(np.array(site.centre)).tolist())], clip_path="url(#frame)"

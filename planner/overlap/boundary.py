@@ -109,7 +109,7 @@ def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
 
 
 def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
-    """What the rows of all parts see, one part after the other."""
+    """The boundary that the rows of all parts see, one part after the other."""
     counts = np.concatenate([np.diff(part.pointer) for part in parts])
     return ShownBoundary(
         boundary=parts[0].boundary,

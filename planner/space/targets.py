@@ -244,7 +244,7 @@ class _Corners:
         corner = steps.tolist()
 
         def is_straight(begin: int, end: int) -> bool:
-            """Most vertices are off the line by far, which three of them tell."""
+            """Most vertices are off the line by far; three points show that."""
             if _is_off(corner[(end - 1) % n], corner[begin % n], corner[end % n]):
                 return False
             return self._is_straight(steps, begin, end)
