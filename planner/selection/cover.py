@@ -195,14 +195,11 @@ def _alike(sees: csr_array, weight: IntArray, stretch_first: IntArray) -> IntArr
 
 def _worth(demands: Demands, column: IntArray) -> csr_array:
     """Weight in each demand of the units of each column (demands, columns); `column` is -1 for none."""
-    counted = np.flatnonzero(column >= 0)
-    unit = np.tile(counted, len(demands.member))
-    demand = demands.member[:, counted].ravel()
-    belongs = demand >= 0
-    entries = (demands.weight[unit][belongs], (demand[belongs], column[unit][belongs]))
-    shape = (len(demands.fraction), int(column.max(initial=-1)) + 1)
-    worth = coo_array(entries, shape=shape, dtype=np.int64).tocsr()
-    worth.sum_duplicates()
+    worth = csr_array((len(demands.fraction), int(column.max(initial=-1)) + 1), dtype=np.int64)
+    for demand in demands.member:
+        unit = np.flatnonzero((column >= 0) & (demand >= 0))
+        places = (demand[unit].astype(np.int32), column[unit].astype(np.int32))
+        worth += coo_array((demands.weight[unit], places), shape=worth.shape, dtype=np.int64).tocsr()
     return _sorted(worth)
 
 

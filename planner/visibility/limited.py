@@ -18,7 +18,7 @@ from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.shapes import local_origin, to_grid
 from stopgo.planner.visibility.sight.well_seen import SeenSegments, clipped
 
-BLOCK = 500_000
+BLOCK = 100_000
 """Runs of units that are tested at a time, for the memory that this takes."""
 
 
