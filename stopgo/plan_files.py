@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from stopgo.freed_memory import give_back
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
@@ -286,6 +287,7 @@ class Stopwatch:
 
     def observe(self, result: object) -> None:
         """Count the time since the last result to the stage that ends with this one."""
+        give_back()
         ended, begins = STAGES.get(type(result).__name__, ("other", "files"))
         self.lap(ended)
         self._step.begin(begins)

@@ -5,6 +5,7 @@ Only those words are understood, not SVG at large. What several sheets show is p
 
 from __future__ import annotations
 
+import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.mission.files.sheet import PaperBox
+from stopgo.mission.files.svg import number as svg_number
 
 MM = 72 / 25.4
 """Points in a millimetre."""
@@ -27,7 +29,7 @@ WIDER = (
     "C:/Windows/Fonts/arial.ttf",
 )
 """Fonts with more letters than Helvetica's, for names that need them; the first that is there is embedded."""
-_STEPS = re.compile(r"([MLlZ])|(-?\d+(?:\.\d+)?)")
+_LETTER = re.compile(r"([MLlZ])")
 _TURN = re.compile(r"rotate\((\S+) (\S+) (\S+)\)")
 
 Style = Mapping[str, str]
@@ -55,9 +57,11 @@ def pdf_of(pages: Sequence[PdfPage], *, title: str, shared: Mapping[str, str] | 
     shared
         Drawings by name, elements in millimetres, y down.
     """
+    from reportlab import rl_config
     from reportlab.pdfgen.canvas import Canvas
 
     file = BytesIO()
+    rl_config.useA85 = 0  # streams of bytes, a fifth shorter than the letters of them
     canvas = Canvas(file, invariant=1, pageCompression=1)
     canvas.setTitle(title)
     canvas.setCreator("stopgo")
@@ -129,13 +133,8 @@ class _Pen:
 
     def _path(self, element: ET.Element, style: Style) -> None:
         stroke, fill = self._inked(style)
-        path = self._canvas.beginPath()
-        for step, points in _steps(style.get("d", "")):
-            if step == "Z":
-                path.close()
-            for number, (x, y) in enumerate(points):
-                (path.moveTo if step == "M" and number == 0 else path.lineTo)(x, y)
         mode = 0 if style.get("fill-rule") == "evenodd" else 1
+        path = _WrittenPath(" ".join(_operators(style.get("d", ""))))
         self._canvas.drawPath(path, stroke=stroke, fill=fill, fillMode=mode)
 
     def _line(self, element: ET.Element, style: Style) -> None:
@@ -159,10 +158,9 @@ class _Pen:
         begin = -shift * canvas.stringWidth(content, font, size)
         canvas.saveState()
         turn = _TURN.fullmatch(style.get("transform", ""))
-        canvas.translate(float(style["x"]), float(style["y"]))
-        if turn is not None:  # about its own place
-            canvas.rotate(float(turn[1]))
-        canvas.scale(1, -1)
+        angle = math.radians(float(turn[1])) if turn is not None else 0.0  # about its own place
+        cos, sin = math.cos(angle), math.sin(angle)
+        canvas.transform(cos, sin, sin, -cos, float(style["x"]), float(style["y"]))
         canvas.setFont(font, size)
         stroke, _ = self._inked(style)
         if stroke:  # a halo: the letters are painted over it
@@ -177,24 +175,33 @@ _DRAWING = {
 }  # fmt: skip
 
 
-def _steps(data: str) -> Iterator[tuple[str, list[tuple[float, float]]]]:
-    """Letters of path data with their points, relative ones made absolute."""
-    letter, numbers, last = "", list[float](), (0.0, 0.0)
-    for found in (*_STEPS.finditer(data), None):
-        if found is not None and found[2] is not None:
-            numbers.append(float(found[2]))
-            continue
-        if letter:
-            points = list(zip(numbers[::2], numbers[1::2], strict=True))
-            if letter == "l":
-                moved = []
-                for x, y in points:
-                    last = (last[0] + x, last[1] + y)
-                    moved.append(last)
-                points = moved
-            last = points[-1] if points else last
-            yield ("L" if letter == "l" else letter), points
-        letter, numbers = (found[1] if found is not None else ""), []
+@dataclass(frozen=True)
+class _WrittenPath:
+    """A path that is written in the words of PDF already."""
+
+    operators: str
+
+    def getCode(self) -> str:
+        """The operators, as a canvas asks a path for them."""
+        return self.operators
+
+
+def _operators(data: str) -> Iterator[str]:
+    """Path data in the words of PDF; the points after `l` are steps, those after `M` and `L` positions."""
+    last = ("0", "0")
+    letters = _LETTER.split(data)[1:]
+    for letter, numbers in zip(letters[::2], letters[1::2], strict=True):
+        if letter == "Z":
+            yield "h"
+        words = iter(numbers.split())
+        for count, xy in enumerate(zip(words, words, strict=True)):
+            last = _moved(last, xy) if letter == "l" else xy
+            yield f"{last[0]} {last[1]} {'m' if letter == 'M' and not count else 'l'}"
+
+
+def _moved(point: tuple[str, str], step: tuple[str, str]) -> tuple[str, str]:
+    x, y = (svg_number(float(at) + float(by)) for at, by in zip(point, step, strict=True))
+    return x, y
 
 
 @cache

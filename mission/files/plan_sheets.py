@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from stopgo.mission.files.plan_svg import drawing_of, extent_of, overview, whole
 from stopgo.mission.files.room_labels import inside
 from stopgo.mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, PaperSheet
 from stopgo.mission.files.stop_list import stop_list
-from stopgo.mission.files.svg import group, line, rect, shortened, text
+from stopgo.mission.files.svg import group, line, rect, shortened, text, use
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages import Route
@@ -37,6 +36,8 @@ KEY_HEIGHT = 60.0
 LIST_ROW, LIST_SIZE = 5.5, 2.6
 BOX = 3.2
 """Side of a box to tick, millimetres."""
+NAMED_TILES = 40
+"""Sheets up to which each has its name on the small plan."""
 COLUMNS = (
     ("", 0.0), ("no", 7.0), ("stop", 17.0), ("room", 37.0), ("x m", 87.0), ("y m", 107.0),
     ("heading °", 122.0), ("at", 143.0), ("sheet", 157.0), ("note", 170.0),
@@ -84,8 +85,9 @@ def sheets_of(
     if tiles:
         site = _site_sheet(made, mission)
         shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range))
-        shared["key"] = outline(floor, _key_sheet(tiles))
-        pages += [_tile_page(tile, tiles, site, made, mission, date) for tile in tiles]
+        shared["key"] = _key(tiles, floor)
+        shared["legend"] = _tile_legend(made, mission, tiles[0])
+        pages += [_tile_page(tile, tiles, site, mission, date) for tile in tiles]
     pages += _lists(mission, floor, figures, tiles, date)
     return [_numbered(page, number, len(pages)) for number, page in enumerate(pages, 1)], shared
 
@@ -116,11 +118,13 @@ def tiles_of(made: Route, mission: Mission) -> list[Tile]:
     top = (y0 + y1 + (rows - 1) * step_y + height) / 2
     busy = _places(made, mission)
     found = []
-    for row, column in product(range(rows), range(columns)):
-        low = (left + column * step_x, top - row * step_y - height)
-        tile = Tile(f"{_letters(row)}{column + 1}", low, (low[0] + width, low[1] + height))
-        if ((busy >= tile.low) & (busy <= tile.high)).all(axis=1).any():
-            found.append(tile)
+    for row in range(rows):
+        y = top - row * step_y - height
+        there = np.sort(busy[(busy[:, 1] >= y) & (busy[:, 1] <= y + height), 0])
+        for column in range(columns):
+            x = left + column * step_x
+            if np.searchsorted(there, x) < np.searchsorted(there, x + width, side="right"):
+                found.append(Tile(f"{_letters(row)}{column + 1}", (x, y), (x + width, y + height)))
     return found
 
 
@@ -144,34 +148,45 @@ def _site_sheet(made: Route, mission: Mission) -> PaperSheet:
     return PaperSheet("", 0.0, 0.0, READABLE, nowhere, nowhere, nowhere, (), ((x0 + x1) / 2, (y0 + y1) / 2))
 
 
-def _tile_page(
-    tile: Tile, tiles: Sequence[Tile], site: PaperSheet, made: Route, mission: Mission, date: str
-) -> PdfPage:
+def _tile_sheet(tile: Tile) -> PaperSheet:
+    """The paper of a tile, without the blocks next to its drawing."""
     long, short = (float(side) for side in PAPERS[TILE_PAPER])
-    width, height = _window()
-    box = PaperBox(MARGIN, MARGIN, width, height)
-    left = MARGIN + width + GAP
+    nowhere, box = PaperBox(0.0, 0.0, 0.0, 0.0), PaperBox(MARGIN, MARGIN, *_window())
+    middle = ((tile.low[0] + tile.high[0]) / 2, (tile.low[1] + tile.high[1]) / 2)
+    return PaperSheet(TILE_PAPER, long, short, READABLE, box, nowhere, nowhere, (), middle)
+
+
+def _right_of_drawing(sheet: PaperSheet) -> float:
+    """Millimetres from the left at which the blocks next to a tile's drawing begin."""
+    return sheet.width - MARGIN - COLUMN
+
+
+def _tile_legend(made: Route, mission: Mission, tile: Tile) -> str:
+    """The legend, which is the same on every tile."""
+    entries, sheet = panel.legend_entries(made, mission), _tile_sheet(tile)
+    box = PaperBox(_right_of_drawing(sheet), MARGIN, COLUMN, panel.legend_height(entries))
+    return panel.legend(entries, mission, replace(sheet, legend=box))
+
+
+def _tile_page(tile: Tile, tiles: Sequence[Tile], site: PaperSheet, mission: Mission, date: str) -> PdfPage:
     facts = [
         *(("Sheet", tile.name), ("Scale", f"1:{READABLE} on {TILE_PAPER} landscape")),
         ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
         *(("Digest", mission.digest[:12]), ("Floor", mission.origin.floor), ("Date", date)),
     ]
-    entries = panel.legend_entries(made, mission)
-    title_height, legend_height = panel.title_height(facts), panel.legend_height(entries)
-    middle = ((tile.low[0] + tile.high[0]) / 2, (tile.low[1] + tile.high[1]) / 2)
-    legend = PaperBox(left, MARGIN, COLUMN, legend_height)
-    title = PaperBox(left, short - MARGIN - title_height, COLUMN, title_height)
-    sheet = PaperSheet(TILE_PAPER, long, short, READABLE, box, legend, title, (), middle)
-    at = sheet.on_paper(np.array(site.centre)).tolist()
+    sheet, height = _tile_sheet(tile), panel.title_height(facts)
+    box, left, title_y = sheet.drawing, _right_of_drawing(sheet), sheet.height - MARGIN - height
     content = (
-        group("drawing", [f'<use href="#site" x="{at[0]}" y="{at[1]}"/>'], clip_path="url(#frame)"),
+        group(
+            "drawing", [use("site", *sheet.on_paper(np.array(site.centre)).tolist())], clip_path="url(#frame)"
+        ),
         rect(box.x, box.y, box.width, box.height, fill="none", stroke="#000", stroke_width=0.35),
         panel.coordinate_ticks(sheet),
-        panel.legend(entries, mission, sheet),
-        panel.title_block(mission, facts, title),
-        _key_window(tile, tiles, PaperBox(left, title.y - GAP - KEY_HEIGHT, COLUMN, KEY_HEIGHT)),
+        use("legend", 0.0, 0.0),
+        panel.title_block(mission, facts, PaperBox(left, title_y, COLUMN, height)),
+        _key_window(tile, tiles, PaperBox(left, title_y - GAP - KEY_HEIGHT, COLUMN, KEY_HEIGHT)),
     )
-    return PdfPage(long, short, "\n".join(content), f"Sheet {tile.name}", box)
+    return PdfPage(sheet.width, sheet.height, "\n".join(content), f"Sheet {tile.name}", box)
 
 
 def _key_sheet(tiles: Sequence[Tile]) -> PaperSheet:
@@ -185,38 +200,32 @@ def _key_sheet(tiles: Sequence[Tile]) -> PaperSheet:
     return PaperSheet("", 0.0, 0.0, scale, nowhere, nowhere, nowhere, (), ((x0 + x1) / 2, (y0 + y1) / 2))
 
 
-def _key_window(tile: Tile, tiles: Sequence[Tile], box: PaperBox) -> str:
-    """Draw the sheet's position among the others."""
+def _key(tiles: Sequence[Tile], floor: FloorPlan) -> str:
+    """The small plan of all sheets, about its middle."""
     small = _key_sheet(tiles)
-    x, y = box.x + box.width / 2, box.y + box.height / 2
-    marks = []
-    for one in tiles:
-        (x0, y1), (x1, y0) = small.on_paper(np.array([one.low, one.high])).tolist()
-        here = one.name == tile.name
-        look = (
-            {"stroke": "#b00000", "stroke_width": 0.6}
-            if here
-            else {"stroke": "#999999", "stroke_width": 0.15}
-        )
-        marks.append((here, rect(x + x0, y + y0, x1 - x0, y1 - y0, fill="none", **look)))
-        if len(tiles) <= 40 or here:
-            ink = "#b00000" if here else "#777777"
-            marks.append(
-                (
-                    here,
-                    text(
-                        x + (x0 + x1) / 2,
-                        y + (y0 + y1) / 2 + 0.9,
-                        one.name,
-                        size=2.5,
-                        fill=ink,
-                        text_anchor="middle",
-                    ),
-                )
-            )
-    drawn = [mark for _, mark in sorted(marks, key=lambda pair: pair[0])]
+    marks = (
+        _mark(tile, small, "#999999", 0.15, named="#777777" if len(tiles) <= NAMED_TILES else "")
+        for tile in tiles
+    )
+    return outline(floor, small) + "".join(marks)
+
+
+def _mark(tile: Tile, small: PaperSheet, stroke: str, width: float, *, named: str) -> str:
+    """A sheet on the small plan, with its name in the colour `named`, if there is one."""
+    (x0, y1), (x1, y0) = small.on_paper(np.array([tile.low, tile.high])).tolist()
+    frame = rect(x0, y0, x1 - x0, y1 - y0, fill="none", stroke=stroke, stroke_width=width)
+    if not named:
+        return frame
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2 + 0.9
+    return frame + text(x, y, tile.name, size=2.5, fill=named, text_anchor="middle")
+
+
+def _key_window(tile: Tile, tiles: Sequence[Tile], box: PaperBox) -> str:
+    """The small plan, with this sheet marked."""
+    small = replace(_key_sheet(tiles), drawing=box)
     frame = rect(box.x, box.y, box.width, box.height, fill="#fff", stroke="#000", stroke_width=0.25)
-    return frame + f'<use href="#key" x="{x}" y="{y}"/>' + "".join(drawn)
+    here = _mark(tile, small, "#b00000", 0.6, named="#b00000")
+    return frame + use("key", box.x + box.width / 2, box.y + box.height / 2) + here
 
 
 # Lists

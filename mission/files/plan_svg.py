@@ -139,8 +139,8 @@ def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> B
     lines = [line for item in floor.elements for line in item.lines]
     return Busy.of(
         (STOPS, discs),
-        (WAY, list(points_along([sheet.on_paper(leg) for leg in _legs(missions)], spacing=1.0))),
-        (WALLS, list(points_along([sheet.on_paper(line) for line in (*closed, *lines)], spacing=1.5))),
+        (WAY, [points_along([sheet.on_paper(leg) for leg in _legs(missions)], spacing=1.0)]),
+        (WALLS, [points_along([sheet.on_paper(line) for line in (*closed, *lines)], spacing=1.5)]),
     )
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 
@@ -243,9 +243,12 @@ def inside(x: FloatArray, y: FloatArray, rings: list[FloatArray]) -> BoolArray:
     return result
 
 
-def points_along(legs: list[FloatArray], *, spacing: float) -> Iterator[FloatArray]:
-    """Points on polylines at most `spacing` apart, for `avoid`."""
-    for leg in legs:
-        for a, b in pairwise(leg):
-            count = max(2, int(np.hypot(*(b - a)) / spacing) + 2)
-            yield a + np.linspace(0, 1, count)[:, None] * (b - a)
+def points_along(lines: Sequence[FloatArray], *, spacing: float) -> FloatArray:
+    """Points (n, 2) on polylines at most `spacing` apart, for `avoid`."""
+    none = np.empty((0, 2))
+    begin = np.concatenate([none, *(line[:-1] for line in lines)])
+    along = np.concatenate([none, *(line[1:] for line in lines)]) - begin
+    steps = np.maximum(1, (np.hypot(*along.T) / spacing).astype(np.int64) + 1)
+    of = np.repeat(np.arange(len(begin)), steps + 1)
+    step = np.arange(len(of)) - np.repeat(np.cumsum(steps + 1) - steps - 1, steps + 1)
+    return np.asarray(begin[of] + (step / steps[of])[:, None] * along[of])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from html import escape
+from itertools import accumulate, takewhile
 
 import numpy as np
 
@@ -41,26 +43,27 @@ def clean(content: str) -> str:
 
 def text_width(content: str, size: float) -> float:
     """About the width of a line of text, as in the widest of the fonts asked for."""
-    return size * sum(map(_letter_width, content))
+    return size * sum(map(_letter_width, content)) / 100
 
 
-def _letter_width(letter: str) -> float:
+@lru_cache(maxsize=1024)
+def _letter_width(letter: str) -> int:
+    """Hundredths of the text's size."""
     if letter in " .,:;'|ijlI-()[]/":
-        return 0.36
+        return 36
     if letter.isupper() or letter in "mw%@":
-        return 0.72
+        return 72
     # East Asian letters are square.
-    return 0.62 if letter < "\u2e80" else 1.0
+    return 62 if letter < "\u2e80" else 100
 
 
 def shortened(content: str, *, size: float, width: float) -> str:
     """The text, cut with an ellipsis where it would be wider than `width`."""
     if text_width(content, size) <= width:
         return content
-    kept = content
-    while len(kept) > 1 and text_width(kept + "…", size) > width:
-        kept = kept[:-1]
-    return kept.rstrip() + "…"
+    widths = accumulate(map(_letter_width, content), initial=_letter_width("…"))
+    fits = sum(1 for _ in takewhile(lambda hundredths: size * hundredths / 100 <= width, widths)) - 1
+    return content[: max(1, fits)].rstrip() + "…"
 
 
 def line(x1: float, y1: float, x2: float, y2: float, **style: object) -> str:
@@ -69,6 +72,11 @@ def line(x1: float, y1: float, x2: float, y2: float, **style: object) -> str:
 
 def rect(x: float, y: float, width: float, height: float, **style: object) -> str:
     return f"<rect{attributes({'x': x, 'y': y, 'width': width, 'height': height, **style})}/>"
+
+
+def use(name: str, x: float, y: float) -> str:
+    """A shared drawing, moved by x, y."""
+    return f'<use href="#{name}" x="{x}" y="{y}"/>'
 
 
 def circle(x: float, y: float, radius: float, **style: object) -> str:

@@ -14,7 +14,9 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.mission.stages.figures import LEG_OVER_IGNORED
+from stopgo.planner.geometry.ring_index import RingIndex, areas_within
 from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, to_shape, union
+from stopgo.planner.space.local_shapes import ground_of, room_shapes
 from stopgo.planner.space.targets import solid_of
 
 AT_WALL = 0.35
@@ -109,10 +111,8 @@ def _first_corner(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float
 
 def floor_of_rooms(space: NavigableSpace) -> list[float]:
     """Area in m² of each room's floor: an outline also over a void or beyond the slab counts less."""
-    origin = local_origin(space.floor)
-    ground = to_shape(space.ground, origin)
-    whole = [to_shape(room.area, origin) for room in space.rooms]
-    inside = [shape.intersection(ground).area for shape in whole]
+    whole = room_shapes(space)
+    inside = areas_within(np.array(whole, dtype=object), ground_of(space)).tolist()
     pairs = zip(whole, inside, strict=True)
     return [on if shape.area - on > LEAST_OFF else shape.area for shape, on in pairs]
 
@@ -140,12 +140,13 @@ def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
         item for item in space.floor.elements if item.kind != "other" and (item.obstacle or item.occludes)
     ]
     walls = union([solid_of(item, origin, HAIRLINE) for item in known]).buffer(AT_WALL, quad_segs=2)
-    shapely.prepare(walls)
-    outlines = [shapely.boundary(to_shape(room.area, origin)) for room in rooms]
+    index = RingIndex(walls)
     bare = [
         room
-        for room, outline in zip(rooms, outlines, strict=True)
-        if outline.length and outline.intersection(walls).length < WALLED * outline.length
+        for room, outline in zip(space.rooms, shapely.boundary(room_shapes(space)), strict=True)
+        if room.room is not None
+        and outline.length
+        and outline.intersection(index.around(outline.bounds)).length < WALLED * outline.length
     ]
     if not bare:
         return

@@ -9,8 +9,9 @@ import numpy as np
 import shapely
 
 from stopgo.mission.stages import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
-from stopgo.planner.geometry.shapes import local_origin, to_shape
+from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.floor_gaps import gap_before
+from stopgo.planner.space.local_shapes import room_shapes
 from stopgo.planner.space.opening_joins import PROBES
 from stopgo.planner.space.reach import reach_of, room_areas_by_part
 from stopgo.planner.space.stop_feasibility import StopFeasibility
@@ -44,7 +45,7 @@ def _cut_off(candidates: Candidates, index: int, parts: frozenset[int]) -> Itera
     space = candidates.space
     for part, area in sorted(room_areas_by_part(space)[index].items()):
         if part not in parts and area >= LEAST_CUT_OFF:
-            shape = to_shape(space.rooms[index].area, local_origin(space.floor))
+            shape = room_shapes(space)[index]
             x, y = _middle(candidates, part, shape)
             gap = gap_before(space, shape, parts)
             beyond = f" ({gap})" if gap else ""
@@ -100,8 +101,7 @@ def _barriers(candidates: Candidates, index: int, parts: frozenset[int]) -> str:
 def _gap(candidates: Candidates, index: int, parts: frozenset[int]) -> str:
     """The gap in the floor between a room and the planned parts, in words."""
     space = candidates.space
-    shape = to_shape(space.rooms[index].area, local_origin(space.floor))
-    return gap_before(space, shape, parts)
+    return gap_before(space, room_shapes(space)[index], parts)
 
 
 def _closed_openings(candidates: Candidates, index: int) -> str:
@@ -112,7 +112,7 @@ def _closed_openings(candidates: Candidates, index: int) -> str:
         return ""
     its = [item for item in space.openings if room in item.rooms]
     if room is None:
-        shape = to_shape(space.rooms[index].area, local_origin(space.floor))
+        shape = room_shapes(space)[index]
         lines = [shapely.LineString(item.opening.line - local_origin(space.floor)) for item in its]
         its = [item for item, line in zip(its, lines, strict=True) if line.distance(shape) <= PROBES[-1]]
     if not its:

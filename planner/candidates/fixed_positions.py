@@ -10,7 +10,8 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages import DROP_REASONS, KEPT, NavigableSpace, OpeningState
 from stopgo.planner.candidates.proposals import Proposals
 from stopgo.planner.geometry.ring_index import RingIndex
-from stopgo.planner.geometry.shapes import local_origin, to_shape
+from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.space.local_shapes import obstacles_of
 from stopgo.planner.space.opening_joins import widest_clear
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 
@@ -21,7 +22,7 @@ def doorways(space: NavigableSpace) -> Proposals:
     if not (settings.door_scan or settings.door_candidates or settings.registers):
         return Proposals.of(np.empty((0, 2)), [])
     index = {item.room: k for k, item in enumerate(space.rooms) if item.room is not None}
-    obstacles = RingIndex(to_shape(space.obstacles, local_origin(space.floor)))
+    obstacles = RingIndex(obstacles_of(space))
     passable = [item for item in space.openings if item.passable]
     rooms = [next((index[k] for k in item.rooms if k is not None), 0) for item in passable]
     return Proposals.of([_middle(space, item, obstacles) for item in passable], rooms, doorway=True)

@@ -127,8 +127,8 @@ def _ellipse(entity: Ellipse, fineness: Fineness) -> Iterator[Curve]:
 
 
 def _lwpolyline(entity: LWPolyline, fineness: Fineness) -> Iterator[Curve]:
-    vertices = np.array(entity.get_points("xyb"), dtype=np.float64).reshape(-1, 3)
-    points = _bulged(vertices[:, :2], vertices[:, 2], closed=bool(entity.closed), fineness=fineness)
+    vertices = np.array(list(entity), dtype=np.float64).reshape(-1, 5)  # with two widths before the bulge
+    points = _bulged(vertices[:, :2], vertices[:, 4], closed=bool(entity.closed), fineness=fineness)
     level = np.full((len(points), 1), float(entity.dxf.elevation))
     yield Curve(_in_world(entity.ocs(), np.hstack((points, level))), closed=entity.closed)
 

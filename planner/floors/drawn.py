@@ -5,6 +5,7 @@ The order is that of the geometry, so that nothing later depends on the order in
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -170,8 +171,9 @@ def _without_fills(shapes: Sequence[Closed]) -> list[Closed]:
 
 def _each_closed_once(shapes: Sequence[Closed]) -> tuple[Closed, ...]:
     first = distinct([shape.region for shape in shapes])
+    drawn = Counter(first)
     return tuple(
-        replace(shape, anomalies=(*shape.anomalies, *_copies(first.count(index), shape.region.bounds[:2])))
+        replace(shape, anomalies=(*shape.anomalies, *_copies(drawn[index], shape.region.bounds[:2])))
         for index, shape in enumerate(shapes)
         if first[index] == index
     )

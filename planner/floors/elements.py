@@ -145,9 +145,12 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Eleme
     """Solids without their holes; a ring around rooms becomes a line, and each shape in it its own solid."""
     above = parents([shape.region for shape in closed])
     holes = hole_indices(closed, above, partial(_is_hole, kind))
+    holes_of: dict[int | None, list[Closed]] = {}
+    for item in sorted(holes):
+        holes_of.setdefault(above[item], []).append(closed[item])
     parts: list[_ElementPart] = []
     for index in (item for item in range(len(closed)) if item not in holes):
-        inner = [closed[item] for item in sorted(holes) if above[item] == index]
+        inner = holes_of.get(index, [])
         body = closed[index].region
         if inner:
             body = body.difference(shapely.union_all([hole.region for hole in inner]))

@@ -106,7 +106,7 @@ def distinct(polygons: Sequence[shapely.Polygon]) -> list[int]:
 
 
 def _same(one: shapely.Polygon, other: shapely.Polygon) -> bool:
-    if not np.allclose(one.bounds, other.bounds, rtol=0.0, atol=SNAP):
+    if any(abs(a - b) > SNAP for a, b in zip(one.bounds, other.bounds, strict=True)):
         return False
     return one.symmetric_difference(other).area <= SNAP * max(one.length, other.length) / 2
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import shapely
@@ -40,8 +40,11 @@ def rooms_of(
     names, stray = _names(rings, above, words)
     named = {id(ring) for ring, texts in zip(rings, names, strict=True) if texts}
     holes = hole_indices(rings, above, lambda inner, outer: _is_hole(inner, outer, named=id(inner) in named))
+    inner: dict[int | None, list[Region]] = {}
+    for ring, parent in zip(rings, above, strict=True):
+        inner.setdefault(parent, []).append(ring.region)
     rooms = [
-        _Room(_hollowed(index, rings, above), _title(names[index]), ring.global_id, ring.anomalies)
+        _Room(_hollowed(ring, inner.get(index, [])), _title(names[index]), ring.global_id, ring.anomalies)
         for index, ring in enumerate(rings)
         if index not in holes
     ]
@@ -55,10 +58,7 @@ def _names(
     """The texts in each ring, each in the innermost one that is not a hole by its GlobalId."""
     names: list[list[Word]] = [[] for _ in rings]
     stray: list[Finding] = []
-    by_size = sorted(range(len(rings)), key=lambda index: rings[index].region.area)
-    by_size = [index for index in by_size if not _same_space(index, rings, above)]
-    for word in words:
-        home = _home(word, rings, by_size)
+    for word, home in zip(words, _homes(words, rings, above), strict=True):
         if home is None:
             stray.append(
                 Finding("text_outside_rooms", f"ROOMS: text '{word.text}' lies in no room", at=word.at[0])
@@ -68,13 +68,16 @@ def _names(
     return names, stray
 
 
-def _home(word: Word, rings: Sequence[Closed], by_size: Sequence[int]) -> int | None:
-    for at in word.at:
-        point = shapely.Point(at)
-        for index in by_size:
-            if rings[index].region.intersects(point):
-                return index
-    return None
+def _homes(
+    words: Sequence[Word], rings: Sequence[Closed], above: Sequence[int | None]
+) -> Iterator[int | None]:
+    """For each text the smallest ring round its first point that lies in one; None if none does."""
+    by_size = sorted(range(len(rings)), key=lambda index: rings[index].region.area)
+    by_size = [index for index in by_size if not _same_space(index, rings, above)]
+    tree = shapely.STRtree([rings[index].region for index in by_size])
+    for word in words:
+        found = (tree.query(shapely.Point(at), predicate="intersects") for at in word.at)
+        yield next((by_size[min(ranks)] for ranks in found if len(ranks)), None)
 
 
 def _same_space(index: int, rings: Sequence[Closed], above: Sequence[int | None]) -> bool:
@@ -89,9 +92,8 @@ def _is_hole(inner: Closed, outer: Closed, *, named: bool) -> bool:
     return not named and inner.clockwise != outer.clockwise
 
 
-def _hollowed(index: int, rings: Sequence[Closed], above: Sequence[int | None]) -> Region:
-    inner = [rings[item].region for item, parent in enumerate(above) if parent == index]
-    return rings[index].region.difference(shapely.union_all(inner)) if inner else rings[index].region
+def _hollowed(ring: Closed, inner: Sequence[Region]) -> Region:
+    return ring.region.difference(shapely.union_all(inner)) if inner else ring.region
 
 
 def _title(words: Sequence[Word]) -> str:

@@ -122,14 +122,17 @@ def _width(shape: Shape, *, scale: float) -> list[Finding]:
 def _placed(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:
     """Each curve with its points (n, 2) in the world, in drawing units; trials of layers compute it once."""
     known = shape.memo.get("placed")
-    if known is None or (known[0] != fineness and shape.kind not in _STRAIGHT):
+    if known is None or (known[0] != fineness and not _is_straight(shape)):
         known = shape.memo["placed"] = (fineness, _placed_curves(shape, fineness))
     placed: list[tuple[FloatArray, Curve]] = known[1]
     return placed
 
 
-_STRAIGHT = ("LINE", "SOLID", "3DFACE")
-"""Kinds of entity whose points do not depend on the fineness of curves."""
+def _is_straight(shape: Shape) -> bool:
+    """True if no point depends on the fineness of curves."""
+    if isinstance(shape.entity, LWPolyline):
+        return not shape.entity.has_arc
+    return shape.kind in ("LINE", "SOLID", "3DFACE")
 
 
 def _placed_curves(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:

@@ -7,7 +7,7 @@ not apply here. Beams do not count, because their height decides which parts of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,7 +23,7 @@ from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_st
 from stopgo.planner.space.targets import face_segments, units_on, without_needless_vertices
 from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
-from stopgo.planner.visibility.sight.sight import scene_of, sight
+from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
 from stopgo.planner.visibility.unit_ranges import ranges, runs_of
 
 PIECE_M = 0.05
@@ -34,6 +34,8 @@ MOST_SPACING_M = 0.15
 """Largest spacing of points with which a surface has a direction: two cells of a thinned cloud."""
 MOST_INCIDENCE_DEG = 85.0
 """Flattest angle from the surface normal at which a scanner measures a surface."""
+BLOCK = 4096
+"""Candidates whose boundary is found at a time, which takes several times the memory of the result."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +100,32 @@ def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
 
     `rows` (n,) are indices into `kept`; the result is in their order.
     """
+    boundary = boundary_of(candidates.space)
+    faces = np.ones(len(boundary.a), dtype=bool)
+    mesh = open_space_around(candidates, _solids(candidates.space))
+    scene = scene_of(mesh, boundary.a, boundary.b, boundary.pieces, faces)
+    blocks = np.split(rows, range(BLOCK, len(rows), BLOCK))
+    return _together([_shown_from(candidates, block, boundary, scene) for block in blocks])
+
+
+def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
+    """The boundary that the rows of all parts see, one part after the other."""
+    counts = np.concatenate([np.diff(part.pointer) for part in parts])
+    return ShownBoundary(
+        boundary=parts[0].boundary,
+        pointer=frozen(np.concatenate([[0], np.cumsum(counts)]), np.int64),
+        face=frozen(np.concatenate([part.face for part in parts]), np.int64),
+        begin=frozen(np.concatenate([part.begin for part in parts])),
+        end=frozen(np.concatenate([part.end for part in parts])),
+        xy=frozen(np.concatenate([part.xy for part in parts])),
+    )
+
+
+def _shown_from(candidates: Candidates, rows: IntArray, boundary: Boundary, scene: Scene) -> ShownBoundary:
+    """`shown` in a prepared scene."""
     space = candidates.space
     origin = local_origin(space.floor)
-    boundary = boundary_of(space)
     places, row = _viewpoints(candidates, rows)
-    faces = np.ones(len(boundary.a), dtype=bool)
-    mesh = open_space_around(candidates, _solids(space))
-    scene = scene_of(mesh, boundary.a, boundary.b, boundary.pieces, faces)
     runs = sight(scene, to_grid(places - origin), reach=space.settings.farthest_overlap)
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
     stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)

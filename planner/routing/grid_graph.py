@@ -27,9 +27,10 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.room_grid import main_axes, room_grid
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_shape
+from stopgo.planner.geometry.shapes import GRID, local_origin
 from stopgo.planner.routing.paths import Paths, shortest_paths
 from stopgo.planner.routing.roadmap import anchors_of, on_crossings, outward_corners
+from stopgo.planner.space.local_shapes import drive_area_of, room_shapes
 from stopgo.planner.space.opening_joins import middle_and_normal
 
 RESOLUTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)
@@ -75,7 +76,7 @@ def paths_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Se
     middle, exits = net.add(doors.middle), net.add(doors.exits)
     net.join(*links.T)
     net.join(middle[doors.door], exits)
-    areas = [to_shape(room.area, origin) for room in space.rooms]
+    areas = room_shapes(space)
     grids = [_fine_grid(area, free, net.xy[entry], doors, space.settings, resolutions) for area in areas]
     node = [net.add(grid.xy) for grid in grids]
     for grid, number in zip(grids, node, strict=True):
@@ -129,7 +130,7 @@ def _entries(space: NavigableSpace, net: Net, stop: IntArray, links: IntArray) -
 
 def _free(space: NavigableSpace) -> BaseGeometry:
     """The drive area in local coordinates with its edge, widened by the margin with which it was drawn."""
-    free = to_shape(space.drive_area, local_origin(space.floor)).buffer(GRID, quad_segs=2)
+    free = drive_area_of(space).buffer(GRID, quad_segs=2)
     shapely.prepare(free)
     return free
 

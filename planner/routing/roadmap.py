@@ -22,11 +22,11 @@ from stopgo.planner.geometry.shapes import (
     polygon_parts,
     snapped,
     to_grid,
-    to_shape,
     whole_steps,
 )
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths, shortest_paths
+from stopgo.planner.space.local_shapes import drive_area_of
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.sight.mesh import Mesh, mesh_of
 from stopgo.planner.visibility.sight.sight import scene_of, sight
@@ -111,7 +111,7 @@ def _oriented_rings(piece: shapely.Polygon) -> list[FloatArray]:
 
 @instance_cached
 def _drive_area(space: NavigableSpace) -> BaseGeometry:
-    return snapped(to_shape(space.drive_area, local_origin(space.floor)))
+    return snapped(drive_area_of(space))
 
 
 @instance_cached

@@ -41,6 +41,8 @@ UPRIGHT = 0.5
 """Largest vertical component of an upright surface's normal."""
 NEARLY_ALL = 0.95
 """Fraction of the shared points that a coarse stage reaches."""
+MOST = 0.5
+"""Fraction of the points that a coarse stage reached; if its pose brings so many together, it is right."""
 MOST_ITERATIONS = 60
 FINE = 1e-5
 """Step size in metres and radians at which registration ends."""
@@ -177,12 +179,27 @@ class _CloudPair:
     def aligned(self, there: FloatArray, *, moved_m: float = 0.0) -> FloatArray:
         """The pose of the second in the first that registration finds from `there`.
 
-        `moved_m` is the distance by which the error of `there` moves points.
+        `moved_m` is the distance by which the error of `there` moves points. A coarse stage that has to
+        reach so far may match one surface with another. So where the pose found with it brings few of the
+        points together that it reached, the one found without it counts if it brings more together.
         """
+        if moved_m <= STAGES[0][1]:
+            return self._aligned(there, STAGES)
+        reach = moved_m + SAME_M
+        found = self._aligned(there, ((reach, moved_m), *STAGES))
+        if self._together(found) >= MOST * self._together(there, reach):
+            return found
+        return max((found, self._aligned(there, STAGES)), key=self._together)
+
+    def _together(self, there: FloatArray, within: float = STAGES[-1][1]) -> int:
+        """Number of points of both clouds on surfaces of the other, at the pose `there`."""
+        return sum(int(mask.sum()) for mask in _shared(self.one, self.other, there, within))
+
+    def _aligned(self, there: FloatArray, stages: Sequence[tuple[float, float]]) -> FloatArray:
+        """The pose that these stages find."""
         import small_gicp
 
-        coarse = [(moved_m + SAME_M, moved_m)] if moved_m > STAGES[0][1] else []
-        for within, matched in (*coarse, *STAGES):
+        for within, matched in stages:
             one, other = _shared(self.one, self.other, there, within)
             if min(one.sum(), other.sum()) <= NEIGHBOURS:
                 return there

@@ -106,6 +106,7 @@ class _Priced:
 
     def __init__(self, cover: Cover, scale: float) -> None:
         self._cover = cover
+        self._sees = cover.sees.astype(float)
         self._weight = cover.weight / scale
         self._needed = cover.needed / scale
         self._rest = cover.worth[1:].astype(float) / scale
@@ -115,12 +116,12 @@ class _Priced:
         """The lower bound at prices of columns, then demands; and its subgradient."""
         cover = self._cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
-        spare = 1.0 - cover.sees @ column
+        spare = 1.0 - self._sees @ column
         cost = cover.asks * column - self._rest_of_column @ demand
         bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self._needed[1:])
         value = whole + float((cost * bought).sum())
-        seen = cover.seen_by @ (spare < 0).astype(float)
+        seen = self._sees.T @ (spare < 0).astype(float)
         return value, np.concatenate([cover.asks * bought - seen, self._needed[1:] - self._rest @ bought])
 
     def _cheapest(self, cost: FloatArray) -> FloatArray:

@@ -97,6 +97,10 @@ class ConnectedCover:
         inside = rows[self._region_of[rows] >= 0]  # no link leads out of a region
         return len(components_of(self.links, inside)) - len(np.unique(self._region_of[inside]))
 
+    def in_region(self, rows: IntArray, number: int) -> IntArray:
+        """Those of the rows that are in the region of this number."""
+        return rows[self._region_of[rows] == number]
+
     def inside(self, rows: IntArray) -> IntArray:
         """1 for each of these rows that is in a region, else 0 (all rows,)."""
         found = np.zeros(self.links.shape[0], dtype=np.int64)
@@ -142,11 +146,13 @@ def _by_greedy(task: ConnectedCover) -> IntArray:
 def connected_rows(task: ConnectedCover, rows: IntArray) -> IntArray:
     """The rows, with others that connect their components and without superfluous ones."""
     coverage = RunningCoverage(task.cover, rows)
-    for region in task.regions:
-        while len(found := components_of(task.links, np.intersect1d(rows, region))) > 1:
-            more = connecting_rows(task.links, region, found, coverage.added_by)
-            coverage.add(np.setdiff1d(more, rows))
-            rows = np.union1d(rows, more)
+    for number, region in enumerate(task.regions):
+        inside = task.in_region(rows, number)
+        while len(found := components_of(task.links, inside)) > 1:
+            more = np.setdiff1d(connecting_rows(task.graph, region, found, coverage.added_by), inside)
+            coverage.add(more)
+            inside = np.concatenate([inside, more])
+        rows = np.union1d(rows, inside)
     return _without_idle(task, np.unique(rows))
 
 

@@ -9,10 +9,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import IntArray
+from stopgo.planner.selection.link_graph import LinkGraph
 
 
 def connecting_rows(
-    links: csr_array,
+    graph: LinkGraph,
     region: IntArray,
     components: list[IntArray],
     gain_of: Callable[[IntArray], IntArray],
@@ -21,20 +22,19 @@ def connecting_rows(
 
     Of rows that connect as many, it is the first with the largest gain in coverage.
     """
-    members = np.concatenate(components)
-    component = np.repeat(np.arange(len(components)), [len(one) for one in components])
-    shape = (links.shape[0], len(components))
-    belongs = csr_array((np.ones(len(members), np.int64), (members, component)), shape=shape)
-    joins = np.diff((links @ belongs).tocsr().indptr)[region]
+    reached = np.concatenate([graph.neighbours(one) for one in components])
+    joins = np.bincount(reached, minlength=graph.links.shape[0])[region]
     most = int(joins.max())
     if most < 2:
-        return _shortest_path(links, region, members, component)
+        return _shortest_path(graph.links, region, components)
     alike = region[joins == most]
     return alike[[int(np.argmax(gain_of(alike)))]]
 
 
-def _shortest_path(links: csr_array, region: IntArray, members: IntArray, component: IntArray) -> IntArray:
+def _shortest_path(links: csr_array, region: IntArray, components: list[IntArray]) -> IntArray:
     """The fewest rows of a region that lead from one component to another."""
+    members = np.concatenate(components)
+    component = np.repeat(np.arange(len(components)), [len(one) for one in components])
     inside = links[region][:, region]
     start = np.searchsorted(region, members)
     steps, before, source = dijkstra(

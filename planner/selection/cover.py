@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack
 
 from stopgo.mission.geometry import IntArray
@@ -25,7 +26,7 @@ class Cover:
     """
 
     sees: csr_array
-    """(rows, columns), 1 where the candidate sees the group."""
+    """(rows, columns), 1 where the candidate sees the group, in 8 bits: large floors have many."""
     worth: csr_array
     """Weight that each column adds to each demand (demands, columns)."""
     needed: IntArray
@@ -84,9 +85,10 @@ class Cover:
         return Worths(self.adds_to, self.seen_by)
 
     @cached_property
-    def seen_columns(self) -> tuple[IntArray, IntArray]:
+    def seen_columns(self) -> tuple[IntArray, NDArray[np.int32]]:
         """First entry of each row, and their end (rows + 1,); and the columns that rows see: for kernels."""
-        return np.ascontiguousarray(self.sees.indptr, np.int64), self._seen
+        first, to = self.sees.indptr, self.sees.indices
+        return np.ascontiguousarray(first, np.int64), np.ascontiguousarray(to, np.int32)
 
     @cached_property
     def most_demands(self) -> int:
@@ -94,19 +96,15 @@ class Cover:
         seen, adds = (_pattern(matrix) for matrix in (self.sees, self.adds_to))
         return int(np.diff(csr_array(seen @ adds).indptr).max(initial=0))
 
-    @cached_property
-    def _seen(self) -> IntArray:
-        return np.ascontiguousarray(self.sees.indices, np.int64)
-
     def columns_of(self, row: int) -> IntArray:
         """Columns that a row sees."""
-        return self._seen[self.sees.indptr[row] : self.sees.indptr[row + 1]]
+        return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]].astype(np.int64)
 
     def covered_by(self, rows: IntArray) -> IntArray:
         """Number of `rows` that see each column (columns,)."""
         begin = self.sees.indptr[rows]
         entries = ranges(begin, self.sees.indptr[np.asarray(rows) + 1] - begin)
-        return np.bincount(self._seen[entries], minlength=self.columns)
+        return np.bincount(self.sees.indices[entries], minlength=self.columns)
 
     def seen_weight(self, covered: IntArray) -> int:
         """Weight of the columns that have all views they need."""
@@ -156,14 +154,14 @@ class Cover:
         worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, to guide greedy
         sizes = [len(rows) for rows in sets]
         entries = (
-            np.ones(sum(sizes), np.int64),
-            (np.concatenate(sets), np.repeat(np.arange(len(sets)), sizes)),
+            np.ones(sum(sizes), np.int8),
+            (np.concatenate(sets).astype(np.int32), np.repeat(np.arange(len(sets), dtype=np.int32), sizes)),
         )
         chosen = coo_array(entries, shape=(self.rows, len(sets)))
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
         return Cover(
-            _sorted(hstack([self.sees, chosen]).astype(np.int64)),
+            _sorted(hstack([self.sees, chosen])),
             _sorted(worths.astype(np.int64)),
             np.concatenate([self.needed, np.full(len(sets), worth)]),
             np.concatenate([self.asks, np.ones(len(sets), np.int64)]),
@@ -197,14 +195,11 @@ def _alike(sees: csr_array, weight: IntArray, stretch_first: IntArray) -> IntArr
 
 def _worth(demands: Demands, column: IntArray) -> csr_array:
     """Weight in each demand of the units of each column (demands, columns); `column` is -1 for none."""
-    counted = np.flatnonzero(column >= 0)
-    unit = np.tile(counted, len(demands.member))
-    demand = demands.member[:, counted].ravel()
-    belongs = demand >= 0
-    entries = (demands.weight[unit][belongs], (demand[belongs], column[unit][belongs]))
-    shape = (len(demands.fraction), int(column.max(initial=-1)) + 1)
-    worth = coo_array(entries, shape=shape, dtype=np.int64).tocsr()
-    worth.sum_duplicates()
+    worth = csr_array((len(demands.fraction), int(column.max(initial=-1)) + 1), dtype=np.int64)
+    for demand in demands.member:
+        unit = np.flatnonzero((column >= 0) & (demand >= 0))
+        places = (demand[unit].astype(np.int32), column[unit].astype(np.int32))
+        worth += coo_array((demands.weight[unit], places), shape=worth.shape, dtype=np.int64).tocsr()
     return _sorted(worth)
 
 
@@ -214,7 +209,7 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
     stays = np.ones(sees.shape[0], dtype=bool)
     stays[rows] = False
     entries = np.repeat(stays, many)
-    pointer = np.concatenate([[0], np.cumsum(np.where(stays, many, 0))])
+    pointer = np.concatenate([[0], np.cumsum(np.where(stays, many, 0))]).astype(np.int32)
     return _sorted(csr_array((sees.data[entries], sees.indices[entries], pointer), shape=sees.shape))
 
 
@@ -237,12 +232,13 @@ def _first_of_stretches(visibility: Visibility) -> IntArray:
 
 
 def _stretch_matrix(visibility: Visibility, stretch_first: IntArray) -> csr_array:
+    """1 where the row sees the stretch (rows, stretches); its indices have 32 bits, as it has many."""
     row = np.repeat(np.arange(visibility.rows), np.diff(visibility.pointer))
     begin = np.searchsorted(stretch_first, visibility.first)
     end = np.searchsorted(stretch_first, visibility.last, side="right")
-    rows = np.repeat(row, end - begin)
-    columns = ranges(begin, end - begin)
+    rows = np.repeat(row.astype(np.int32), end - begin)
+    columns = ranges(begin, end - begin).astype(np.int32)
     shape = (visibility.rows, len(stretch_first))
-    matrix = csr_array((np.ones(len(rows), dtype=np.int64), (rows, columns)), shape=shape)
+    matrix = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=shape)
     matrix.data[:] = 1
     return matrix

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import csr_array
 
-from stopgo.mission.geometry import IntArray
+from stopgo.mission.geometry import BoolArray, IntArray
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.running_coverage import RunningCoverage
 
@@ -28,26 +28,30 @@ def improved_by_districts(
 
     Rows `settled` were searched before without success, and are again only around others. More are added.
     """
-    rows, coverage = np.sort(chosen), RunningCoverage(cover, chosen)
-    while len(rows) > at_least and len(district := _around_first(cover, rows, settled)):
+    is_chosen, coverage, many = _mask(cover, chosen), RunningCoverage(cover, chosen), len(chosen)
+    is_settled = _mask(cover, np.fromiter(settled, np.int64))
+    while many > at_least and len(district := _around_first(cover, is_chosen, is_settled)):
         coverage.remove(district)
-        least = max(0, len(district) - (len(rows) - at_least))
-        found = _searched(coverage, np.setdiff1d(rows, district), district, search, least)
+        is_chosen[district] = False
+        found = _searched(coverage, is_chosen, district, search, max(0, len(district) - (many - at_least)))
         if len(found) == len(district):
             settled.update(district.tolist())
+            is_settled[district] = True
         coverage.add(found)
-        rows = np.union1d(np.setdiff1d(rows, district), found)
-    return rows
+        is_chosen[found] = True
+        many -= len(district) - len(found)
+    return np.flatnonzero(is_chosen)
 
 
-def _around_first(cover: Cover, rows: IntArray, settled: set[int]) -> IntArray:
+def _mask(cover: Cover, rows: IntArray) -> BoolArray:
+    found = np.zeros(cover.rows, dtype=bool)
+    found[rows] = True
+    return found
+
+
+def _around_first(cover: Cover, is_chosen: BoolArray, is_settled: BoolArray) -> IntArray:
     """The first row that is not settled, with those that see the same columns, directly or over others."""
-    first = next((row for row in rows.tolist() if row not in settled), None)
-    if first is None:
-        return rows[:0]
-    is_chosen = np.zeros(cover.rows, dtype=bool)
-    is_chosen[rows] = True
-    found = newest = np.array([first], dtype=np.int64)
+    found = newest = np.flatnonzero(is_chosen & ~is_settled)[:1]
     while len(newest) and len(found) < SIZE:
         seers = np.unique(cover.worths.seers(np.unique(cover.sees[newest].indices)))
         newest = np.setdiff1d(seers[is_chosen[seers]], found)
@@ -56,26 +60,27 @@ def _around_first(cover: Cover, rows: IntArray, settled: set[int]) -> IntArray:
 
 
 def _searched(
-    others: RunningCoverage, rows: IntArray, district: IntArray, search: DistrictSearch, least: int
+    others: RunningCoverage, is_other: BoolArray, district: IntArray, search: DistrictSearch, least: int
 ) -> IntArray:
-    """The district's rows, or fewer if the search finds them; `others` covers what all other `rows` do."""
-    problem, offered = _problem_of(others, rows, district)
+    """The district's rows, or fewer if the search finds them; `others` covers what all other rows do."""
+    problem, offered = _problem_of(others, is_other, district)
     found = search(problem, np.searchsorted(offered, district), least)
     return offered[found] if len(found) < len(district) else district
 
 
-def _problem_of(others: RunningCoverage, rows: IntArray, district: IntArray) -> tuple[Cover, IntArray]:
+def _problem_of(others: RunningCoverage, is_other: BoolArray, district: IntArray) -> tuple[Cover, IntArray]:
     """The problem that the other rows leave in a district, and the rows offered there (ascending)."""
-    cover, left = others.cover, others.cover.asks - others.covered
+    cover, missing = others.cover, others.missing
     seen = np.unique(cover.sees[district].indices)
-    seers = cover.worths.seers(seen[left[seen] > 0].astype(np.int64))
-    offered = np.setdiff1d(np.union1d(seers, district), rows).astype(np.int64)
-    sees, missing = cover.sees[offered], others.missing
+    offered = np.union1d(cover.worths.seers(seen[others.left(seen) > 0].astype(np.int64)), district)
+    offered = offered[~is_other[offered]].astype(np.int64)
+    sees = cover.sees[offered]
     columns = np.unique(sees.indices)
-    columns = columns[left[columns] > 0]
+    left = others.left(columns)
+    columns, left = columns[left > 0], left[left > 0]
     demands = np.union1d([0], np.flatnonzero(missing))
     worth = _with_columns(cover.adds_to[columns], demands)
-    return Cover(_with_columns(sees, columns), csr_array(worth.T), missing[demands], left[columns]), offered
+    return Cover(_with_columns(sees, columns), csr_array(worth.T), missing[demands], left), offered
 
 
 def _with_columns(matrix: csr_array, columns: IntArray) -> csr_array:

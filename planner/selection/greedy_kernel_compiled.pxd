@@ -3,10 +3,11 @@
 cimport cython
 
 ctypedef long long whole
+ctypedef int index
 
 @cython.locals(at=whole, count=whole, row=whole, size=whole)
 cpdef whole choose(
-    whole until_met, const whole[::1] row_first, const whole[::1] seen, const whole[::1] adds_first,
+    whole until_met, const whole[::1] row_first, const index[::1] seen, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, const whole[::1] asks, whole[::1] covered,
     whole[::1] wanted, whole[::1] needed, whole[::1] keys, whole[::1] heap, whole[::1] sums,
     whole[::1] chosen
@@ -23,21 +24,21 @@ cdef void sink(whole at, whole size, whole[::1] keys, whole[::1] heap) noexcept 
 
 @cython.locals(at=whole, entry=whole, first=whole, second=whole, total=whole, whole_gain=whole)
 cdef void evaluate(
-    whole row, const whole[::1] row_first, const whole[::1] seen, const whole[::1] adds_first,
+    whole row, const whole[::1] row_first, const index[::1] seen, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, const whole[::1] asks, whole[::1] covered,
     whole[::1] wanted, whole[::1] needed, whole[::1] keys, whole[::1] sums
 ) noexcept nogil
 
 @cython.locals(at=whole, entry=whole)
 cdef void add(
-    whole row, const whole[::1] row_first, const whole[::1] seen, const whole[::1] adds_first,
+    whole row, const whole[::1] row_first, const index[::1] seen, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, const whole[::1] asks, whole[::1] covered,
     whole[::1] sums
 ) noexcept nogil
 
 @cython.locals(at=whole, column=whole, entry=whole)
 cdef void take(
-    whole row, const whole[::1] row_first, const whole[::1] seen, const whole[::1] adds_first,
+    whole row, const whole[::1] row_first, const index[::1] seen, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, const whole[::1] asks, whole[::1] covered,
     whole[::1] wanted, whole[::1] needed, whole[::1] sums
 ) noexcept nogil

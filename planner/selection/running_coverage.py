@@ -30,6 +30,10 @@ class RunningCoverage:
         """True if every demand is met."""
         return bool((self.reached >= self.cover.needed).all())
 
+    def left(self, columns: IntArray) -> IntArray:
+        """Views that each of these columns still needs; 0 or less if none (n,)."""
+        return np.asarray(self.cover.asks[columns] - self.covered[columns])
+
     def add(self, rows: IntArray) -> None:
         """Let rows come."""
         self._count(rows, 1)

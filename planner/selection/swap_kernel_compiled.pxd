@@ -3,12 +3,13 @@
 cimport cython
 
 ctypedef long long whole
+ctypedef int index
 cdef whole NEVER
 
 @cython.locals(held=whole, into=whole, k=whole, out=whole, place=whole, swap=whole)
 cpdef whole repair(
-    whole swaps, whole most, const whole[::1] row_first, const whole[::1] seen,
-    const whole[::1] seer_first, const whole[::1] seer, const whole[::1] adds_first,
+    whole swaps, whole most, const whole[::1] row_first, const index[::1] seen,
+    const whole[::1] seer_first, const index[::1] seer, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, whole[::1] left, whole[::1] asked,
     whole[::1] weight, whole[::1] gain, whole[::1] chosen, whole[::1] free, whole[::1] tabu,
     whole[::1] stale, whole[::1] counts, whole[::1] touched, whole[::1] lost, whole[::1] near,
@@ -23,8 +24,8 @@ cdef whole add_up(
 
 @cython.locals(at=whole, demands=whole, first=whole, k=whole, others=whole, row=whole, rows=whole)
 cdef void leave(
-    whole place, whole most, const whole[::1] row_first, const whole[::1] seen,
-    const whole[::1] seer_first, const whole[::1] seer, const whole[::1] adds_first,
+    whole place, whole most, const whole[::1] row_first, const index[::1] seen,
+    const whole[::1] seer_first, const index[::1] seer, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, whole[::1] left, whole[::1] chosen,
     whole[::1] stale, whole[::1] counts, whole[::1] touched, whole[::1] lost, whole[::1] near,
     whole[::1] regained, whole[::1] where, whole[::1] is_near
@@ -39,7 +40,7 @@ cdef whole lose(
 @cython.locals(entry=whole, k=whole, rows=whole, to=whole)
 cdef whole regain(
     whole column, whole first, whole begin, whole others, const whole[::1] seer_first,
-    const whole[::1] seer, const whole[::1] adds_first, const whole[::1] demand,
+    const index[::1] seer, const whole[::1] adds_first, const whole[::1] demand,
     const whole[::1] worth, whole[::1] left, whole[::1] near, whole[::1] regained, whole[::1] where,
     whole[::1] is_near
 ) noexcept nogil
@@ -64,8 +65,8 @@ cdef whole is_better(whole place, whole covered, whole[::1] chosen, whole[::1] f
 
 @cython.locals(at=whole, begin=whole, column=whole, demands=whole, entry=whole, k=whole, short=whole)
 cdef void see(
-    whole row, whole more, const whole[::1] row_first, const whole[::1] seen,
-    const whole[::1] seer_first, const whole[::1] seer, const whole[::1] adds_first,
+    whole row, whole more, const whole[::1] row_first, const index[::1] seen,
+    const whole[::1] seer_first, const index[::1] seer, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, whole[::1] left, whole[::1] asked,
     whole[::1] gain, whole[::1] stale
 ) noexcept nogil

@@ -3,6 +3,7 @@
 cimport cython
 
 ctypedef long long whole
+ctypedef int index
 
 @cython.locals(column=whole, entry=whole, k=whole)
 cpdef void add_worth(
@@ -12,13 +13,13 @@ cpdef void add_worth(
 
 @cython.locals(begin=whole, column=whole, entry=whole, k=whole, pair=whole)
 cpdef void add_worth_by_row(
-    const whole[::1] columns, const whole[::1] seen_first, const whole[::1] seer, const whole[::1] adds_first,
+    const whole[::1] columns, const whole[::1] seen_first, const index[::1] seer, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, const whole[::1] place, whole rows, whole[::1] sums
 ) noexcept nogil
 
 @cython.locals(at=whole, column=whole, entry=whole, k=whole)
 cpdef void count_views(
-    const whole[::1] rows, whole step, const whole[::1] row_first, const whole[::1] seen,
+    const whole[::1] rows, whole step, const whole[::1] row_first, const index[::1] seen,
     const whole[::1] adds_first, const whole[::1] demand, const whole[::1] worth,
     const whole[::1] asks, whole[::1] covered, whole[::1] reached
 ) noexcept nogil

@@ -14,7 +14,7 @@ from stopgo.planner.visibility.unit_ranges import ranges
 
 
 class _Entries(NamedTuple):
-    """Demands or rows of each column of the covering problem, in 64-bit integers."""
+    """Demands (in 64-bit integers) or rows (in 32 bits) of each column of the covering problem."""
 
     first: IntArray
     """First entry of each column, and their end (columns + 1,)."""
@@ -28,7 +28,7 @@ class Worths:
     def __init__(self, adds_to: csr_array, seen_by: csr_array) -> None:
         """`adds_to` has the worth of columns (columns, demands), `seen_by` who sees them (columns, rows)."""
         self._demands, self._rows = int(adds_to.shape[1]), int(seen_by.shape[1])
-        self._adds, self._seen = _entries(adds_to), _entries(seen_by)
+        self._adds, self._seen = _entries(adds_to, np.int64), _entries(seen_by, np.int32)
         self._worth = np.ascontiguousarray(adds_to.data, np.int64)
         self._sums = np.zeros(self._demands, dtype=np.int64)
         self._gains = np.zeros(3, dtype=np.int64)
@@ -102,8 +102,9 @@ class Worths:
     def seers(self, columns: IntArray) -> IntArray:
         """Rows that see the columns, once for each column (n,)."""
         counts = self._seen.first[columns + 1] - self._seen.first[columns]
-        return self._seen.to[ranges(self._seen.first[columns], counts)]
+        return self._seen.to[ranges(self._seen.first[columns], counts)].astype(np.int64)
 
 
-def _entries(by_column: csr_array) -> _Entries:
-    return _Entries(*(np.ascontiguousarray(part, np.int64) for part in (by_column.indptr, by_column.indices)))
+def _entries(by_column: csr_array, of: type[np.signedinteger]) -> _Entries:
+    first, to = by_column.indptr, by_column.indices
+    return _Entries(np.ascontiguousarray(first, np.int64), np.ascontiguousarray(to, of))

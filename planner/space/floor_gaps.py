@@ -13,7 +13,8 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.geometry.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
+from stopgo.planner.geometry.shapes import SLACK, local_origin, polygon_parts, segments_of
+from stopgo.planner.space.local_shapes import ground_of, obstacles_of
 from stopgo.planner.space.reach import INSIDE, reach_of
 
 APART = 0.1
@@ -58,7 +59,7 @@ def gap_before(space: NavigableSpace, shape: BaseGeometry, parts: Set[int]) -> s
 @instance_cached
 def _gaps_of(space: NavigableSpace) -> FloorGaps:
     """Every gap of a space, measured at each point of its edges."""
-    ground = to_shape(space.ground, local_origin(space.floor))
+    ground = ground_of(space)
     shapely.prepare(ground)
     begin, out = _edge_points(ground)
     unblocked = ~_blocked(space, shapely.points(begin))
@@ -88,7 +89,7 @@ def _edge_points(ground: BaseGeometry) -> tuple[FloatArray, FloatArray]:
 def _blocked(space: NavigableSpace, shapes: NDArray[np.object_]) -> BoolArray:
     """True for each shape that an obstacle or a closed opening is nearer to than the robot's radius."""
     origin = local_origin(space.floor)
-    solid = np.concatenate([segments_of(to_shape(space.obstacles, origin)), space.barriers - origin])
+    solid = np.concatenate([segments_of(obstacles_of(space)), space.barriers - origin])
     radius = space.settings.radius - SLACK
     near, _ = shapely.STRtree(shapely.linestrings(solid)).query(shapes, predicate="dwithin", distance=radius)
     found = np.zeros(len(shapes), dtype=bool)

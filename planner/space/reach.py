@@ -12,9 +12,10 @@ import shapely
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.geometry.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
+from stopgo.planner.geometry.shapes import GRID, boundary_lines, local_origin, segments_of
 from stopgo.planner.space.connected_parts import Parts, parts_of
 from stopgo.planner.space.gaps import Site, Walls
+from stopgo.planner.space.local_shapes import drive_area_of, ground_of, obstacles_of, room_shapes
 
 INSIDE = 3 * GRID
 """Points nearer than this (m) to the drive area's edge are anchored, since the mesh is snapped."""
@@ -26,9 +27,9 @@ class Reach:
 
     def __init__(self, space: NavigableSpace) -> None:
         origin = local_origin(space.floor)
-        drive_area = to_shape(space.drive_area, origin)
+        drive_area = drive_area_of(space)
         self.parts: Parts = parts_of(drive_area, space.gaps - origin)
-        self.site = Site(walls_of(space), drive_area, to_shape(space.ground, origin))
+        self.site = Site(walls_of(space), drive_area, ground_of(space))
         self._rim = boundary_lines(drive_area)
         self._rim_tree = shapely.STRtree(self._rim)
 
@@ -86,15 +87,15 @@ def reach_of(space: NavigableSpace) -> Reach:
 @instance_cached
 def room_areas_by_part(space: NavigableSpace) -> tuple[dict[int, float], ...]:
     """Return the drive area of every room, by part."""
-    parts, origin = reach_of(space).parts, local_origin(space.floor)
-    return tuple(parts.area_by_part(to_shape(room.area, origin)) for room in space.rooms)
+    parts = reach_of(space).parts
+    return tuple(parts.area_by_part(shape) for shape in room_shapes(space))
 
 
 @instance_cached
 def walls_of(space: NavigableSpace) -> Walls:
     """Everything that a robot's centre keeps clear of: obstacles, closed openings, floor edges."""
     origin = local_origin(space.floor)
-    solid = np.concatenate([segments_of(to_shape(space.obstacles, origin)), space.barriers - origin])
-    edges = segments_of(to_shape(space.ground, origin))
+    solid = np.concatenate([segments_of(obstacles_of(space)), space.barriers - origin])
+    edges = segments_of(ground_of(space))
     clearance = np.repeat([space.settings.radius, space.settings.edge], [len(solid), len(edges)])
     return Walls(np.concatenate([solid, edges]), clearance)

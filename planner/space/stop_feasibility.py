@@ -11,6 +11,7 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
 from stopgo.planner.geometry.nested_clips import NestedClips
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape
+from stopgo.planner.space.local_shapes import obstacles_of, room_shapes
 
 
 class StopFeasibility:
@@ -20,8 +21,8 @@ class StopFeasibility:
         self.space = space
         self.origin = local_origin(space.floor)
         self.outline = to_shape(space.floor.outline, self.origin)
-        self.rooms = [to_shape(room.area, self.origin) for room in space.rooms]
-        self.obstacles = to_shape(space.obstacles, self.origin)
+        self.rooms = room_shapes(space)
+        self.obstacles = obstacles_of(space)
         self._walls = boundary_lines(self.obstacles)
         self._edges = boundary_lines(self.outline)
         self._wall_tree, self._edge_tree = shapely.STRtree(self._walls), shapely.STRtree(self._edges)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -241,10 +241,18 @@ class _Corners:
     def straightened(self, ring: FloatArray) -> FloatArray:
         """Return the ring (n, 2) with the fewest vertices that keep its shape."""
         n, steps, needless = len(ring), to_grid(ring).astype(float), self._needless(ring)
-        needed = (k for k in range(n) if not (needless[k] and self._is_straight(steps, k - 1, k + 1)))
+        corner = steps.tolist()
+
+        def is_straight(begin: int, end: int) -> bool:
+            """Most vertices are off the line by far; three points show that."""
+            if _is_off(corner[(end - 1) % n], corner[begin % n], corner[end % n]):
+                return False
+            return self._is_straight(steps, begin, end)
+
+        needed = (k for k in range(n) if not (needless[k] and is_straight(k - 1, k + 1)))
         corners = [next(needed, 0)]
         for k in range(corners[0] + 2, corners[0] + n + 1):
-            if not (needless[(k - 1) % n] and self._is_straight(steps, corners[-1], k)):
+            if not (needless[(k - 1) % n] and is_straight(corners[-1], k)):
                 corners.append(k - 1)
         return ring[np.array(corners) % n] if len(corners) >= 3 else ring
 
@@ -262,6 +270,13 @@ class _Corners:
             return False
         near = self._all[self._tree.query(shapely.LineString(line), predicate="dwithin", distance=CLEAR)]
         return len(near) == len(between) + 2
+
+
+def _is_off(point: Sequence[float], a: Sequence[float], b: Sequence[float]) -> bool:
+    """True if a point is farther than STRAIGHT, for certain, from the line through two others."""
+    x, y = b[0] - a[0], b[1] - a[1]
+    area = x * (point[1] - a[1]) - y * (point[0] - a[0])
+    return area * area > 1.01 * STRAIGHT * STRAIGHT * (x * x + y * y)
 
 
 def _distance_to(points: FloatArray, line: FloatArray) -> FloatArray:

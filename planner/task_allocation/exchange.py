@@ -112,29 +112,39 @@ def _likely_exchanges(
     """Moves and exchanges of a stop of a long longest tour, the best by estimated driving time."""
     longest = times.index(max(times))
     own, leaving = np.array(tours[longest]), _left_out(clock, tours[longest], starts[longest])
-    found: list[tuple[float, float, int, int, int]] = []
+    found: list[FloatArray] = []
     for k, tour in enumerate(tours):
         if k == longest:
             continue
         entering = _added(clock, own, tour, starts[k])
         apart = (times[longest] - leaving - clock.pause_s, times[k] + entering + clock.pause_s)
-        found += zip(
-            np.maximum(*apart), apart[0] + apart[1], own, [k] * len(own), [-1] * len(own), strict=True
-        )
+        found.append(_rated(*apart, own, k, -1))
         others = np.array(tour, dtype=np.int64)
         back = times[longest] - leaving[:, None] + _added(clock, others, tours[longest], starts[longest])
         there = times[k] + entering[:, None] - _left_out(clock, tour, starts[k])
-        a, b = (index.ravel() for index in np.indices(back.shape))
-        both = (np.maximum(back, there).ravel(), (back + there).ravel())
-        found += zip(*both, own[a], [k] * len(a), others[b], strict=True)
-    for _, _, stop, k, other in sorted(found)[:LIKELY]:
-        rest = _without(tours[longest], int(stop))
+        found.append(_rated(back, there, own[:, None], k, others))
+    for stop, k, other in _likeliest(np.concatenate([np.empty((0, 5)), *found])):
+        rest = _without(tours[longest], stop)
         if other < 0:
-            yield _with(tours, {longest: rest, k: _inserted(clock, tours[k], int(stop), starts[k])})
+            yield _with(tours, {longest: rest, k: _inserted(clock, tours[k], stop, starts[k])})
             continue
-        back_in = _inserted(clock, rest, int(other), starts[longest])
-        there_in = _inserted(clock, _without(tours[k], int(other)), int(stop), starts[k])
+        back_in = _inserted(clock, rest, other, starts[longest])
+        there_in = _inserted(clock, _without(tours[k], other), stop, starts[k])
         yield _with(tours, {longest: back_in, k: there_in})
+
+
+def _rated(one: FloatArray, other: FloatArray, stop: IntArray, tour: int, back: IntArray | int) -> FloatArray:
+    """Exchanges (n, 5): the longer time of two tours, both times, the stop, the other tour and its stop."""
+    columns = np.broadcast_arrays(np.maximum(one, other), one + other, stop, tour, back)
+    return np.column_stack([column.ravel() for column in columns])
+
+
+def _likeliest(rated: FloatArray) -> list[list[int]]:
+    """Stop, other tour and its stop of the best exchanges."""
+    if len(rated) > LIKELY:
+        rated = rated[rated[:, 0] <= np.partition(rated[:, 0], LIKELY - 1)[LIKELY - 1]]
+    found: list[list[int]] = rated[np.lexsort(rated.T[::-1])][:LIKELY, 2:].astype(np.int64).tolist()
+    return found
 
 
 def _left_out(clock: TourTimes, tour: Tour, start: int) -> FloatArray:

@@ -11,12 +11,15 @@ import numpy as np
 from stopgo.mission.document.limits import ViewLimits, limits_in_words, limits_of
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import NegativeResult
-from stopgo.mission.geometry import frozen
+from stopgo.mission.geometry import IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.settings.coverage_parameters import ANY_INCIDENCE
 from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.shapes import local_origin, to_grid
 from stopgo.planner.visibility.sight.well_seen import SeenSegments, clipped
+
+BLOCK = 100_000
+"""Runs of units that are tested at a time, for the memory that this takes."""
 
 
 def within_limits(in_sight: Visibility) -> Visibility:
@@ -44,11 +47,18 @@ def _clipped(in_sight: Visibility, limits: ViewLimits) -> Visibility:
     candidates, targets = in_sight.candidates, in_sight.targets
     origin = local_origin(candidates.floor)
     row = np.repeat(np.arange(in_sight.rows), np.diff(in_sight.pointer))
-    place = to_grid(candidates.xy[candidates.kept] - origin)[row]
-    a, b = (to_grid(end - origin)[in_sight.segment] - place for end in (targets.a, targets.b))
     begin = targets.first_unit[:-1][in_sight.segment]
-    stretches = SeenSegments(a, b, targets.units[in_sight.segment])
-    run, first, last = clipped(stretches, in_sight.first - begin, in_sight.last - begin, limits)
+    a, b, at = (to_grid(xy - origin) for xy in (targets.a, targets.b, candidates.xy[candidates.kept]))
+
+    def within(own: slice) -> tuple[IntArray, ...]:
+        segment, place = in_sight.segment[own], at[row[own]]
+        stretches = SeenSegments(a[segment] - place, b[segment] - place, targets.units[segment])
+        low, high = (unit[own] - begin[own] for unit in (in_sight.first, in_sight.last))
+        run, first, last = clipped(stretches, low, high, limits)
+        return run + own.start, first, last
+
+    blocks = [slice(k, k + BLOCK) for k in range(0, max(1, len(row)), BLOCK)]
+    run, first, last = (np.concatenate(part) for part in zip(*map(within, blocks), strict=True))
     return replace(
         in_sight,
         pointer=frozen(np.searchsorted(row[run], np.arange(in_sight.rows + 1)), np.int64),

@@ -44,11 +44,9 @@ def words(page: PdfPage) -> list[str]:
 
 
 def streams(pdf: bytes) -> list[bytes]:
-    """Drawing commands, page by page and form by form."""
-    from base64 import a85decode
-
-    found = re.findall(rb"stream\r?\n(.*?)endstream", pdf, re.DOTALL)
-    return [zlib.decompress(a85decode(b"<~" + body.strip(), adobe=True)) for body in found]
+    """The drawings in the file, of pages and shared ones."""
+    begins = re.finditer(rb"/Length (\d+)\s*>>\s*stream\r?\n", pdf)
+    return [zlib.decompress(pdf[at.end() : at.end() + int(at[1])]) for at in begins]
 
 
 def test_the_same_plan_gives_the_same_bytes() -> None:
@@ -73,12 +71,14 @@ def test_neighbouring_sheets_share_a_strip() -> None:
 
 def test_a_sheet_says_which_of_how_many_it_is_and_shows_the_drawing_through_its_window() -> None:
     pages, shared = sheets()
-    assert shared.keys() == {"site", "key"}
+    assert shared.keys() == {"site", "key", "legend"}
     assert [words(page)[-1] for page in pages] == [
         f"sheet {n} of {len(pages)}" for n in range(1, len(pages) + 1)
     ]
     tiles = [page for page in pages if page.name.startswith("Sheet ")]
-    assert all('href="#site"' in page.content and "1:20 on A3 landscape" in words(page) for page in tiles)
+    uses = [{use.group(1) for use in re.finditer('href="#([a-z]+)"', page.content)} for page in tiles]
+    assert uses == [shared.keys()] * len(tiles)
+    assert all("1:20 on A3 landscape" in words(page) for page in tiles)
 
 
 def test_every_stop_is_listed_once_with_its_room_sheet_and_a_box_to_tick() -> None:
@@ -123,6 +123,7 @@ def test_relative_steps_and_turned_words_are_understood() -> None:
     (drawn,) = streams(pdf_of([PdfPage(50.0, 50.0, content)], title="t"))
     assert b"1 2 m 4 6 l 3 6 l h" in drawn
     assert b"Z\\344hler" in drawn
+    assert b"0 -1 -1 0 5 6 cm" in drawn
 
 
 def test_letters_of_any_script_are_written_or_replaced() -> None:

@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stopgo.planner.overlap.boundary import _Stretches
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.overlap import boundary
+from stopgo.planner.overlap.boundary import _Stretches, shown
+from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.unit_ranges import runs_of
+from tests.planner.worlds import two_rooms
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -29,3 +34,18 @@ def test_joined_stretches_have_the_same_pieces_in_the_fewest_runs(seed: int) -> 
 def test_nothing_seen_is_no_stretch() -> None:
     nothing = np.empty(0, np.int64)
     assert len(_Stretches(nothing, nothing, nothing).joined(np.zeros(3, np.int64)).row) == 0
+
+
+@pytest.mark.parametrize("fov", [360, 200])
+def test_what_is_found_block_by_block_is_what_is_found_at_once(
+    fov: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = candidates(navigable(two_rooms(1.0), Settings(fov=fov, grid=0.5)))
+    rows = np.arange(len(found.kept))[::-1]
+    whole = shown(found, rows)
+    monkeypatch.setattr(boundary, "BLOCK", 7)
+    parts = shown(found, rows)
+    assert len(rows) > 3 * 7 and len(whole.face)
+    for name in ("pointer", "face", "begin", "end", "xy"):
+        assert np.array_equal(getattr(parts, name), getattr(whole, name)), name
+    assert len(shown(found, rows[:0]).face) == 0

@@ -22,6 +22,8 @@ from stopgo.mission.stages.sight import Sight, sight_of
 from stopgo.planner import plan
 from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.floors import read_floor
+from stopgo.planner.visibility import limited
+from stopgo.planner.visibility.limited import within_limits
 from stopgo.planner.visibility.sight.sightlines import SightLines
 from tests.faults.sizes import FULL, some
 from tests.planner.worlds import LAYERED, SHARED, box, column, element, hall, planned, two_rooms
@@ -192,3 +194,15 @@ def test_what_cannot_be_seen_as_asked_is_reported_and_strict_refuses_it() -> Non
 def test_limits_that_leave_nothing_are_named(limits: dict[str, Any], told: str) -> None:
     with pytest.raises(NegativeResult, match=rf"^test: no visible target is within the limits: .*{told}"):
         plan(FLOOR, replace(Settings(), **limits))
+
+
+def test_runs_are_within_the_limits_in_whatever_blocks_they_are_tested(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    in_sight = planned(FLOOR, QUALITY)[1][Visibility].in_sight
+    assert in_sight is not None and len(in_sight.first) > 50
+    whole = within_limits(in_sight)
+    monkeypatch.setattr(limited, "BLOCK", 17)
+    parts = within_limits(in_sight)
+    for name in ("pointer", "segment", "first", "last"):
+        assert np.array_equal(getattr(parts, name), getattr(whole, name)), name
