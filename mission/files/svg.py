@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
+from functools import cache
 from html import escape
 from itertools import accumulate, takewhile
 
@@ -46,7 +46,7 @@ def text_width(content: str, size: float) -> float:
     return size * sum(map(_letter_width, content)) / 100
 
 
-@lru_cache(maxsize=1024)
+@cache
 def _letter_width(letter: str) -> int:
     """Hundredths of the text's size."""
     if letter in " .,:;'|ijlI-()[]/":
