@@ -13,8 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.overlap.control import SeenPoint
+from stopgo.planner.overlap.normal_equations import NormalEquations
 from stopgo.planner.overlap.pairs import FLOOR_M, LEVER_M, NOISE_M
 
 TARGET_M = 2e-3
@@ -51,8 +52,8 @@ def network_errors(
         return scan_covariances(xy, ends, information, [], seen), None
     away = np.hypot(*(xy[largest] - xy[largest].mean(axis=0)).T)
     nearest = np.argsort(np.round(away, 3), kind="stable")[:MOST_FRAMES]
-    middle = [largest[k] for k in nearest.tolist()]
-    tried = [(scan_covariances(xy, ends, information, [k]), k) for k in middle]
+    network = _HeldNetwork(len(xy), ends, information, [largest[nearest[0]]])
+    tried = [(network.position_covariances(xy, largest[k]), largest[k]) for k in nearest.tolist()]
     return min(tried, key=lambda one: _worst(worst_errors(one[0])))
 
 
@@ -98,40 +99,65 @@ def scan_covariances(
         Scans, and the control points that they see. Two points hold all scans that pairs join to these.
         A scan that nothing holds has an infinite variance.
     """
-    count = len(xy)
-    joined = _joined(count, ends, [*anchors, *_held(count, ends, seen)])
-    free = [k for k in range(count) if joined[k] and k not in anchors]
-    normal = normal_matrix({k: 3 * place for place, k in enumerate(free)}, ends, information, seen)
-    covariance = np.linalg.inv(normal) if free else normal
-    found = np.zeros((count, 2, 2))
-    found[~np.array(joined, dtype=bool)] = np.inf
-    for place, k in enumerate(free):
-        own = covariance[3 * place : 3 * place + 3, 3 * place : 3 * place + 3]
-        there = shift_at(xy[k])
-        found[k] = there @ own @ there.T
-    return found
+    return _HeldNetwork(len(xy), ends, information, anchors, seen).position_covariances(xy)
 
 
-def normal_matrix(
-    row: dict[int, int],
+class _HeldNetwork:
+    """The scans that anchors or control points hold, and the covariances of their motions."""
+
+    def __init__(
+        self,
+        count: int,
+        ends: Sequence[tuple[int, int]],
+        information: Sequence[FloatArray],
+        anchors: Sequence[int],
+        seen: Sequence[SeenPoint] = (),
+    ) -> None:
+        self.held = np.array(_joined(count, ends, [*anchors, *_held(count, ends, seen)]), dtype=bool)
+        free = np.flatnonzero(self.held)
+        self.free = free[~np.isin(free, anchors)]
+        self.equations = normal_equations(count, self.free, ends, information, seen)
+        self.covariances = np.zeros((count, 3, 3))
+        self.covariances[self.free] = self.equations.inverse_at_scans()
+
+    def position_covariances(self, xy: FloatArray, frame: int | None = None) -> FloatArray:
+        """Covariance of each scan's position (n, 2, 2), where one scan is the frame also in that of another.
+
+        All motions are about one origin: in the frame of another scan its motion is taken from each.
+        """
+        moved = self.covariances
+        if frame is not None and frame in self.free:
+            unit = np.zeros((len(self.free), 3, 3))
+            unit[self.free == frame] = np.eye(3)
+            common = np.zeros_like(moved)
+            common[self.free] = self.equations.solved(unit)
+            moved = moved + moved[frame] - common - common.transpose(0, 2, 1)
+        there = np.array([shift_at(at) for at in xy]).reshape(-1, 2, 3)
+        found = there @ moved @ there.transpose(0, 2, 1)
+        found[~self.held] = np.inf
+        return np.asarray(found)
+
+
+def normal_equations(
+    count: int,
+    free: IntArray,
     ends: Sequence[tuple[int, int]],
     information: Sequence[FloatArray],
     seen: Sequence[SeenPoint] = (),
-) -> FloatArray:
-    """Return the normal matrix of the free scans, whose first rows these are."""
-    normal = np.zeros((3 * len(row), 3 * len(row)))
-    if len(ends):
-        pair = np.array([(row.get(a, -1), row.get(b, -1)) for a, b in ends])
-        first, second = pair[:, [0, 1, 0, 1]].ravel(), pair[:, [0, 1, 1, 0]].ravel()
-        blocks = np.array(information)[:, None] * np.array([1.0, 1.0, -1.0, -1.0])[:, None, None]
-        free = (first >= 0) & (second >= 0)
-        at = first[free, None, None] + np.arange(3)[:, None], second[free, None, None] + np.arange(3)
-        np.add.at(normal, at, blocks.reshape(-1, 3, 3)[free])
+) -> NormalEquations:
+    """Return the normal equations of the free scans, in their order; the others do not move."""
+    pairs = np.array(ends, dtype=np.int64).reshape(-1, 2)
+    blocks = np.array(information, dtype=np.float64).reshape(-1, 3, 3)
+    own = np.zeros((count, 3, 3))
+    for side in pairs.T:
+        np.add.at(own, side, blocks)
     for k, point in seen:
-        if k in row:
-            move = shift_at(point) / TARGET_M
-            normal[row[k] : row[k] + 3, row[k] : row[k] + 3] += move.T @ move
-    return normal
+        move = shift_at(point) / TARGET_M
+        own[k] += move.T @ move
+    row = np.full(count, -1)
+    row[free] = np.arange(len(free))
+    both = (row[pairs] >= 0).all(axis=1)
+    return NormalEquations(own[free], row[pairs[both]], -blocks[both])
 
 
 def _held(count: int, ends: Sequence[tuple[int, int]], seen: Sequence[SeenPoint]) -> list[int]:

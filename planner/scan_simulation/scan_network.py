@@ -20,7 +20,7 @@ from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.proof.plan_proof import ScanNetwork
 from stopgo.mission.stages.network import CONTROL_FRAME, frame_of
 from stopgo.planner.overlap.control import SeenPoint
-from stopgo.planner.overlap.network_error import normal_matrix, sees_two_points, shift_at
+from stopgo.planner.overlap.network_error import normal_equations, sees_two_points, shift_at
 from stopgo.planner.scan_simulation.registration import Registered, off
 
 PairPoses = dict[int, list[tuple[int, FloatArray]]]
@@ -122,17 +122,16 @@ class _Adjustment:
 
     def _motions(self, free: Sequence[int]) -> FloatArray:
         """Motions (n, 3) by which all pairs together misplace the free scans; zero for the others."""
-        row = {k: 3 * place for place, k in enumerate(free)}
         about = [_about_origin(self.xy[a]) for a, _ in self.ends]
         weights = [one @ pair.information @ one.T for one, pair in zip(about, self.pairs, strict=True)]
-        right = np.zeros(3 * len(free))
+        right = np.zeros((len(self.xy), 3, 1))
         for (a, b), pair, weight in zip(self.ends, self.pairs, weights, strict=True):
             error = weight @ _motion(self.xy[a], self.xy[b], pair.there)
-            for scan, sign in ((a, -1.0), (b, 1.0)):
-                if scan in row:
-                    right[row[scan] : row[scan] + 3] += sign * error
-        found = np.zeros((len(self.xy), 3))
-        found[list(free)] = np.linalg.solve(normal_matrix(row, self.ends, weights), right).reshape(-1, 3)
+            right[a, :, 0] -= error
+            right[b, :, 0] += error
+        found, rows = np.zeros((len(self.xy), 3)), np.array(free, dtype=np.int64)
+        equations = normal_equations(len(self.xy), rows, self.ends, weights)
+        found[rows] = equations.solved(right[rows])[..., 0]
         return found
 
 
