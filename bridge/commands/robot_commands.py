@@ -41,6 +41,7 @@ from stopgo.bridge.commands.bridge_options import (
 )
 from stopgo.bridge.commands.connection import GivenOptions, given_options, refuse_options
 from stopgo.bridge.console import say
+from stopgo.bridge.robot.simulated_faults import RobotFaults, read_faults
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings.parameter import seconds
 
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
     from stopgo.bridge.mavlink.driving.mavlink_scanner import ScanTrigger
     from stopgo.bridge.robot.program import RobotOptions
     from stopgo.bridge.robot.robot_hardware import OpenBody
-    from stopgo.bridge.robot.simulator import Faults
     from stopgo.mission.frames.transform import Transform
     from stopgo.mission.run.events import Pose
     from stopgo.mission.run.revision import RevisionPolicy
@@ -123,7 +123,7 @@ class SimulatedOptions:
     to_map: Transform | None
     runtime_s: float
     """Runtime per battery charge."""
-    faults: Faults
+    faults: RobotFaults
 
 
 @dataclass(frozen=True)
@@ -210,13 +210,6 @@ def guard(
         raise InputError(f"--ros2 {ros2}: a guard needs rmw_zenoh; write DOMAIN or DOMAIN/NAMESPACE, as 0/r1")
     end_at_sigterm()
     guard_at_robot(connect, domain, namespace, node, say)
-
-
-def read_faults(texts: list[str] | None) -> Faults:
-    """Read the faults to simulate, each as KIND@N[=AMOUNT]."""
-    from stopgo.bridge.robot.simulator import Faults, read_fault
-
-    return Faults(tuple(read_fault(text) for text in texts or ()))
 
 
 def read_revisions(text: str) -> RevisionPolicy:
