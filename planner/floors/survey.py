@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, bounds
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,19 @@ class FloorChoice:
     """True if the model has doors or several rooms on it."""
     chosen: bool = False
     """True if a plan with the same options uses this floor."""
+
+
+def choice_of(floor: FloorPlan) -> FloorChoice:
+    """Return a floor that was read, as the choice of a file."""
+    kinds = (*(item.kind for item in floor.elements), *(f"{item.kind}s" for item in floor.openings))
+    return FloorChoice(
+        name=floor.name,
+        option="",
+        area_m2=floor.area,
+        bounds=bounds([part.exterior for part in floor.outline]),
+        elements={"rooms": len(floor.rooms), **Counter(kinds)},
+        chosen=True,
+    )
 
 
 @dataclass(frozen=True)
