@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from hashlib import file_digest
 from typing import Any
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.run.run_log import LogSource
 from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.mission.stages.stop_reasons import StopReason
@@ -96,6 +96,5 @@ def _results(items: Sequence[RecordingReview]) -> PlanResults:
 
 
 def _source(recording: Recording) -> LogSource:
-    with recording.path.open("rb") as file:
-        digest = file_digest(file, "sha256").hexdigest()
-    return LogSource(recording.path.name, "rrd", digest, recording.contents.total_rows)
+    path = recording.path
+    return LogSource(path.name, "rrd", file_digest(path), recording.contents.total_rows)
