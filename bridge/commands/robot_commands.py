@@ -244,20 +244,16 @@ def read_battery_life(text: str) -> float:
 
 def read_map(text: str | None) -> Transform | None:
     """Read the transform from the site frame to the map, if one was given."""
-    return None if text is None else read_transform("--map", text)
-
-
-def read_transform(option: str, text: str) -> Transform:
-    """Read a transform from X,Y,HEADING in metres and degrees."""
     from stopgo.mission.frames.transform import Transform
 
-    pose = read_pose(option, text)
+    if text is None:
+        return None
+    pose = read_pose("--map", text)
     return Transform(x=pose.x, y=pose.y, heading=pose.heading)
 
 
 def read_pose(option: str, text: str) -> Pose:
     """Read a pose from X,Y,HEADING in metres and degrees."""
-
     from stopgo.mission.run.events import Pose
 
     try:
