@@ -22,7 +22,6 @@ from stopgo.recordings.embedded.floor_lines import FloorLines
 from stopgo.recordings.page import whole_page
 from stopgo.recordings.page.floor_picture import (
     PictureFrame,
-    along,
     legend,
     line_sample,
     plan_picture,
@@ -90,9 +89,9 @@ def _layers(proof: PlanProof, frame: PictureFrame) -> Iterator[str]:
     """Draw targets by outcome, and the pairs."""
     promised = proof.seen if proof.promised is None else proof.promised
     missed = promised & ~proof.seen
-    yield stroke(along(proof.targets, ~proof.seen & ~missed, frame), GREY, 1.2, stroke_dasharray="4 3")
-    yield stroke(along(proof.targets, missed, frame), VERMILION, 5)
-    yield stroke(along(proof.targets, proof.seen, frame), BLUE, 2.4)
+    yield stroke(frame.along(proof.targets, ~proof.seen & ~missed), GREY, 1.2, stroke_dasharray="4 3")
+    yield stroke(frame.along(proof.targets, missed), VERMILION, 5)
+    yield stroke(frame.along(proof.targets, proof.seen), BLUE, 2.4)
     position = {stop.id: (stop.x, stop.y) for stop in proof.mission.stops}
 
     def lines(wanted: bool) -> str:

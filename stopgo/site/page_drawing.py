@@ -14,10 +14,10 @@ import numpy as np
 
 from stopgo.mission.document import Mission
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.geometry import BoolArray, FloatArray, Polygon, bounds
+from stopgo.mission.geometry import FloatArray, Polygon, bounds
 from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.settings.element_kinds import kind_of
-from stopgo.mission.stages.covered_intervals import runs_of
+from stopgo.mission.stages.covered_intervals import lines_along
 from stopgo.mission.stages.sight import Sight
 
 MARGIN = 0.02
@@ -161,16 +161,9 @@ def _targets(sight: Sight, mission: Mission, frame: PageFrame) -> list[dict[str,
     made = []
     for number, unit in enumerate(first.tolist()):
         stops = [one for one, sees in zip(ids, seen[:, unit].tolist(), strict=True) if sees]
+        lines = lines_along(sight.targets, group.reshape(-1) == number)
         made.append({
-            "d": _along(sight, group.reshape(-1) == number, frame), "stops": stops,
+            "d": frame.path(lines), "stops": stops,
             "need": int(asked[unit]), "visible": bool(sight.totals.visible[unit]),
         })  # fmt: skip
     return made
-
-
-def _along(sight: Sight, units: BoolArray, frame: PageFrame) -> str:
-    """Return the path of the units in a mask (n,)."""
-    runs = runs_of(sight.targets, units)
-    a, b = sight.targets.a[runs.segment], sight.targets.b[runs.segment]
-    ends = (a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None])
-    return frame.path(np.stack(ends, axis=1))
