@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.geometry import FloatArray, bounds
+from stopgo.mission.geometry import FloatArray, bounds, closed
 
 
 @dataclass(frozen=True)
@@ -79,7 +77,7 @@ class SurveyLine:
     @property
     def drawn(self) -> FloatArray:
         """Points (n, 2); a closed line ends where it begins."""
-        return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
+        return closed(self.points) if self.closed else self.points
 
 
 @dataclass(frozen=True)

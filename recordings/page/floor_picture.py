@@ -13,7 +13,7 @@ from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.files.sheet import PaperMap
 from stopgo.mission.files.svg import text_width
-from stopgo.mission.geometry import BoolArray, FloatArray, bounds
+from stopgo.mission.geometry import BoolArray, FloatArray, bounds, is_closed
 from stopgo.mission.run.events import Held, LinkLost, Paused
 from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.settings.element_kinds import kind_of
@@ -116,11 +116,6 @@ class PictureFrame:
         points = self.paper.on_paper(line)
         points = points[:-1] if closed else points
         return "M" + "L".join(f"{x:.3f} {y:.3f}" for x, y in points.tolist()) + ("Z" if closed else "")
-
-
-def is_closed(line: FloatArray) -> bool:
-    """True if a line (n, 2) ends where it begins."""
-    return len(line) > 2 and bool(np.allclose(line[0], line[-1]))
 
 
 def _scale_bar(frame: PictureFrame) -> Iterator[str]:

@@ -7,11 +7,12 @@ from typing import Any
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import file_digest
+from stopgo.mission.floor.polylines import FloorLines
 from stopgo.mission.run.run_log import LogSource
 from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.mission.stages.stop_reasons import StopReason
 from stopgo.recordings.embedded.findings import EmbeddedFindings, findings_in
-from stopgo.recordings.embedded.floor_lines import FloorLines, floor_lines
+from stopgo.recordings.embedded.floor_lines import floor_lines
 from stopgo.recordings.embedded.plan import origin_in
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.embedded.reasons import reasons_in
