@@ -41,12 +41,10 @@ ALONE = Settings(register=False)
 """Candidates without doorways, of which any may be required as a position."""
 POSITIONS, CLUSTER = 20, 10
 """Positions on each floor, and of each cluster."""
-STARTS = 2
 DRAWS = 4
 """Times that a weak pair is repeated, each with noise of its own and from every start."""
-LEVEL = 10
-PLAIN_M, PLAIN_END_M = 0.1, 0.003
-"""Hold, and end of the first start, with which a pair is plain."""
+WEAK_M = 0.1
+"""Hold below which a pair is weak."""
 STOREYS = {
     "office": ("Level 2",),
     "school": ("u4pyxnN8d1", "w85seUQP"),
@@ -125,7 +123,7 @@ def surface(found: FloatArray, simulation: Simulation, seed: list[int]) -> regis
     """A scan's cloud as `prove` keeps it, from its points (n, 3) without noise."""
     noise = np.random.default_rng(seed).normal(0.0, simulation.noise_m, len(found))
     noisy = found * (1 + noise / np.linalg.norm(found, axis=1))[:, None]
-    return thinned(registration.surface_of(noisy))
+    return registration.surface_of(noisy)
 
 
 def _hits(
@@ -142,34 +140,22 @@ def _hits(
     return towards, far, normal
 
 
-def thinned(surface: registration.OrientedCloud) -> registration.OrientedCloud:
-    """The cloud with one of LEVEL points of floor and ceiling: these hold height and tilt only."""
-    kept = surface.upright.copy()
-    kept[np.flatnonzero(~kept)[::LEVEL]] = True
-    return registration.OrientedCloud(frozen(surface.points[kept]), frozen(surface.normals[kept]))
-
-
 def simulated(name: str, floor: FloorPlan, settings: Settings, seed: int) -> Iterator[dict[str, Any]]:
-    """Every pair of positions with shared surfaces, registered from both sides of its weakest direction.
-
-    Where the plan's hold is PLAIN_M and the first start ends well, it is the only one.
-    """
+    """Every pair of positions with shared surfaces, registered from every start up to the first miss."""
     simulation = Simulation(range_m=settings.range, ceiling_m=floor.ceiling_m or 2.7)
     site = ScanSite.of(navigable(floor, settings), simulation, None)
     found = standing(floor, settings, positions(floor, settings, seed))
-    xy, overlaps = found.xy[found.kept], overlaps_of(found)
+    xy = found.xy[found.kept]
     at = np.column_stack([xy - site.solids.origin, np.full(len(xy), simulation.height_m)])
     surfaces = [surface(cloud(site, place, simulation), simulation, [seed, k]) for k, place in enumerate(at)]
     for i, j in combinations(range(len(xy)), 2):
         two = registration._CloudPair(surfaces[i], surfaces[j], registration._shift(at[j] - at[i]))
         if not two.meets or two.shared_points < registration.LEAST_POINTS:
             continue
-        near = overlaps.of(i)
-        plain = bool((near.hold_m[near.other == j] >= PLAIN_M).any())
-        errors, moved = [], two.moved_m(simulation)
-        for start in registration._starts(two, simulation, (i, j))[:STARTS]:
-            errors.append(two.error(two.aligned(start, moved_m=moved)))
-            if not within_tolerance(*errors[-1]) or (plain and errors[-1][0] < PLAIN_END_M):
+        errors = []
+        for start in registration._starts(two, simulation, (i, j)):
+            errors.append(two.error(two.aligned(start, simulation)))
+            if not within_tolerance(*errors[-1]):
                 break
         ends = {"a": xy[i].tolist(), "b": xy[j].tolist()}
         yield {"floor": name, **ends, "shared": two.share, "free_deg": two.free_deg, "errors": errors}
@@ -182,7 +168,7 @@ def repeated(
     simulation = Simulation(range_m=settings.range, ceiling_m=floor.ceiling_m or 2.7)
     site = ScanSite.of(navigable(floor, settings), simulation, None)
     figures = counted(floor, settings, rows)
-    weak = [row for row, one in zip(rows, figures, strict=True) if registers(row) and one.hold_m < PLAIN_M]
+    weak = [row for row, one in zip(rows, figures, strict=True) if registers(row) and one.hold_m < WEAK_M]
     ends = sorted({tuple(row[end]) for row in weak for end in "ab"})
     at = {end: np.append(np.array(end) - site.solids.origin, simulation.height_m) for end in ends}
     points = {end: cloud(site, place, simulation) for end, place in at.items()}
@@ -193,10 +179,9 @@ def repeated(
         for row in filter(registers, weak):
             a, b = tuple(row["a"]), tuple(row["b"])
             two = registration._CloudPair(surfaces[a], surfaces[b], registration._shift(at[b] - at[a]))
-            moved = two.moved_m(simulation)
             row["free_deg"] = row["free_deg"] or two.free_deg
             for start in registration._starts(two, simulation, (draw, len(row["errors"]))):
-                row["errors"].append(two.error(two.aligned(start, moved_m=moved)))
+                row["errors"].append(two.error(two.aligned(start, simulation)))
                 if not registers(row):
                     break
     yield from weak
@@ -298,7 +283,7 @@ def main(paths: list[str]) -> None:
     head = ("rule", "promised", "wrong", "precision", "recall")
     note = (
         f"{len(good)} pairs on {len(known)} floors, {sum(good)} of which register from every start: the weak ones "
-        f"with noise of {DRAWS + 1} scans each, up to {STARTS + 4 * DRAWS} starts in all."
+        f"with noise of {DRAWS + 1} scans each, {4 * (DRAWS + 1)} starts in all."
     )
     put("registration", f"{versions('numpy', 'embreex', 'small-gicp')}\n\n{table(head, lines)}\n\n{note}")
 

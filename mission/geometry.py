@@ -60,6 +60,21 @@ def _directed(ring: ArrayLike, sign: float) -> FloatArray:
     return frozen(points)
 
 
+def closed(ring: FloatArray) -> FloatArray:
+    """The ring with its first point repeated at the end."""
+    return np.concatenate([ring, ring[:1]])
+
+
+def is_closed(line: FloatArray) -> bool:
+    """True if a line (n, 2) ends where it begins."""
+    return len(line) > 2 and bool(np.allclose(line[0], line[-1]))
+
+
+def outlines(polygons: Iterable[Polygon]) -> list[FloatArray]:
+    """Every ring of the polygons as a closed line."""
+    return [closed(ring) for polygon in polygons for ring in polygon.rings]
+
+
 def bounds(parts: Iterable[FloatArray]) -> tuple[float, float, float, float]:
     """(min x, min y, max x, max y) in metres over all points of `parts`; zeros if there are none."""
     arrays = [part for part in parts if len(part)]

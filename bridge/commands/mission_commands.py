@@ -26,7 +26,13 @@ from stopgo.bridge.commands.bridge_options import (
     VehicleId,
     WhileRunning,
 )
-from stopgo.bridge.commands.connection import Connection, reached, refuse_options, with_connection
+from stopgo.bridge.commands.connection import (
+    Connection,
+    connection_of,
+    reached,
+    refuse_options,
+    with_connection,
+)
 from stopgo.bridge.console import Bar, print_json, print_line, refusals_printed, reporting_done, say
 
 if TYPE_CHECKING:
@@ -63,20 +69,20 @@ def push(
 
     Example: stopgo push out/mission.json --mavlink udpout:127.0.0.1:14550 --set-origin
     """
-    from stopgo.bridge.commands.vehicle_missions import VehicleLink, push_mission
+    from stopgo.bridge.commands.vehicle_missions import push_mission
     from stopgo.bridge.mavlink.auto.mission_push import PushConsent
     from stopgo.mission.files.exports.format import written_as
     from stopgo.mission.files.mission_json import read
 
+    connection = pushing(connection, patience)
     if connection.mavlink is None:
         refuse_options(connection.given, "--robot", *ONLY_VEHICLES)
-        return push_over_zenoh(read(mission), pushing(connection, patience), take_over=take_over, json_=json_)
+        return push_over_zenoh(read(mission), connection, take_over=take_over, json_=json_)
     refuse_options(connection.given, "--mavlink", "--take-over", "--as")
-    link = VehicleLink.of(connection, autopilot, patience)
     words = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
     with refusals_printed(as_json=json_):
         push_mission(
-            read(mission), link, state=connection.mavlink.state, as_json=json_,
+            read(mission), connection, autopilot, state=connection.mavlink.state, as_json=json_,
             items=written_as(words),
             consent=PushConsent(set_origin, any_origin, while_running),
         )  # fmt: skip
@@ -134,11 +140,14 @@ def fetch_mission(
 
     Example: stopgo fetch-mission --mavlink udpout:127.0.0.1:14550 -o held.plan
     """
-    from stopgo.bridge.commands.vehicle_missions import VehicleLink, fetch_mission
+    from stopgo.bridge.commands.vehicle_missions import fetch_mission
 
-    link = VehicleLink(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
+    connection = connection_of(
+        frozenset(), mavlink=mavlink, vehicle=vehicle, signing_key=signing_key, timeout=timeout,
+        insecure=insecure,
+    )  # fmt: skip
     with refusals_printed(as_json=json_):
-        fetch_mission(link, out=out, as_json=json_)
+        fetch_mission(connection, autopilot, out=out, as_json=json_)
 
 
 def clear(
@@ -157,8 +166,11 @@ def clear(
 
     Example: stopgo clear --mavlink udpout:127.0.0.1:14550
     """
-    from stopgo.bridge.commands.vehicle_missions import VehicleLink, clear_mission
+    from stopgo.bridge.commands.vehicle_missions import clear_mission
 
-    link = VehicleLink(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
+    connection = connection_of(
+        frozenset(), mavlink=mavlink, vehicle=vehicle, signing_key=signing_key, state=state,
+        timeout=timeout, insecure=insecure,
+    )  # fmt: skip
     with refusals_printed(as_json=json_):
-        clear_mission(link, state=state, while_running=while_running, as_json=json_)
+        clear_mission(connection, autopilot, state=state, while_running=while_running, as_json=json_)

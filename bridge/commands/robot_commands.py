@@ -41,6 +41,7 @@ from stopgo.bridge.commands.bridge_options import (
 )
 from stopgo.bridge.commands.connection import GivenOptions, given_options, refuse_options
 from stopgo.bridge.console import say
+from stopgo.bridge.robot.simulated_faults import RobotFaults, read_faults
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings.parameter import seconds
 
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
     from stopgo.bridge.mavlink.driving.mavlink_scanner import ScanTrigger
     from stopgo.bridge.robot.program import RobotOptions
     from stopgo.bridge.robot.robot_hardware import OpenBody
-    from stopgo.bridge.robot.simulator import Faults
     from stopgo.mission.frames.transform import Transform
     from stopgo.mission.run.events import Pose
     from stopgo.mission.run.revision import RevisionPolicy
@@ -123,7 +123,7 @@ class SimulatedOptions:
     to_map: Transform | None
     runtime_s: float
     """Runtime per battery charge."""
-    faults: Faults
+    faults: RobotFaults
 
 
 @dataclass(frozen=True)
@@ -212,13 +212,6 @@ def guard(
     guard_at_robot(connect, domain, namespace, node, say)
 
 
-def read_faults(texts: list[str] | None) -> Faults:
-    """Read the faults to simulate, each as KIND@N[=AMOUNT]."""
-    from stopgo.bridge.robot.simulator import Faults, read_fault
-
-    return Faults(tuple(read_fault(text) for text in texts or ()))
-
-
 def read_revisions(text: str) -> RevisionPolicy:
     """Read the handling of a revision that is pushed during a run."""
     from stopgo.mission.run.revision import POLICIES
@@ -251,20 +244,16 @@ def read_battery_life(text: str) -> float:
 
 def read_map(text: str | None) -> Transform | None:
     """Read the transform from the site frame to the map, if one was given."""
-    return None if text is None else read_transform("--map", text)
-
-
-def read_transform(option: str, text: str) -> Transform:
-    """Read a transform from X,Y,HEADING in metres and degrees."""
     from stopgo.mission.frames.transform import Transform
 
-    pose = read_pose(option, text)
+    if text is None:
+        return None
+    pose = read_pose("--map", text)
     return Transform(x=pose.x, y=pose.y, heading=pose.heading)
 
 
 def read_pose(option: str, text: str) -> Pose:
     """Read a pose from X,Y,HEADING in metres and degrees."""
-
     from stopgo.mission.run.events import Pose
 
     try:

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,32 +49,10 @@ ITEMS = ("items", 1)
 """Unit of the progress bars."""
 
 
-@dataclass(frozen=True)
-class VehicleLink:
-    """Address of a vehicle, and parameters of the link to it."""
-
-    url: str
-    vehicle: int | None = None
-    signing_key: Path | None = None
-    insecure: bool = False
-    autopilot: str | None = None
-    """Kind of the autopilot, if its heartbeat names another."""
-    timeout_s: float = 5.0
-
-    @staticmethod
-    def of(connection: Connection, autopilot: str | None, patience_s: float | None) -> VehicleLink:
-        """Return the link of a command's connection; a given patience replaces its timeout."""
-        vehicle = connection.mavlink
-        assert vehicle is not None
-        timeout_s = patience_s or connection.timeout_s
-        return VehicleLink(
-            vehicle.url, vehicle.vehicle, vehicle.signing_key, connection.insecure, autopilot, timeout_s
-        )
-
-
 def push_mission(
     mission: Mission,
-    link: VehicleLink,
+    connection: Connection,
+    autopilot: str | None,
     *,
     items: Supplements,
     consent: PushConsent,
@@ -82,10 +60,10 @@ def push_mission(
     as_json: bool,
 ) -> None:
     """Upload a mission to an autopilot, verify it there, and store in the logbook that it was sent."""
-    made = None if link.autopilot is None else qgc_plan.items_of(mission, items)
+    made = None if autopilot is None else qgc_plan.items_of(mission, items)
     with ExitStack() as opened:
         with if_stopped(say, lambda: NOTHING_SENT):
-            url, peer = opened.enter_context(_peer(link))
+            url, peer = opened.enter_context(_peer(connection, autopilot))
         sent = made or qgc_plan.items_of(mission, replace(items, autopilot=peer.autopilot.name))
         origin = check_pushable(url, peer, sent, consent, state=state, report=say)
         deviation = _path_deviation_note(peer, mission)
@@ -103,11 +81,11 @@ def push_mission(
         _report_push(peer, mission, replace(sent, notes=notes), done, origin, as_json)
 
 
-def fetch_mission(link: VehicleLink, *, out: Path | None, as_json: bool) -> None:
+def fetch_mission(connection: Connection, autopilot: str | None, *, out: Path | None, as_json: bool) -> None:
     """Read the mission on an autopilot, and show it or write it to a file."""
     if out is not None:
         _check_suffix(out)
-    with _peer(link) as (_, peer), Bar("fetching", ITEMS) as bar:
+    with _peer(connection, autopilot) as (_, peer), Bar("fetching", ITEMS) as bar:
         read = download(peer, progress=bar.show)
         origin = None if out is None else peer.origin()
     own = own_items(peer, read)
@@ -122,9 +100,11 @@ def fetch_mission(link: VehicleLink, *, out: Path | None, as_json: bool) -> None
         print_text(_items_table(peer, own))
 
 
-def clear_mission(link: VehicleLink, *, state: Path | None, while_running: bool, as_json: bool) -> None:
+def clear_mission(
+    connection: Connection, autopilot: str | None, *, state: Path | None, while_running: bool, as_json: bool
+) -> None:
     """Clear the mission on an autopilot, verify that it holds none, and store that in the logbook."""
-    with _peer(link) as (url, peer), logbook(url, peer.who.system, state) as book:
+    with _peer(connection, autopilot) as (url, peer), logbook(url, peer.who.system, state) as book:
         if not while_running:
             check_run_over(peer, url, book, "to clear it")
         had = clear(peer, while_running=while_running, report=say)
@@ -136,12 +116,14 @@ def clear_mission(link: VehicleLink, *, state: Path | None, while_running: bool,
 
 
 @contextmanager
-def _peer(link: VehicleLink) -> Iterator[tuple[Url, Peer]]:
-    """Connect to the vehicle."""
-    written_as({"autopilot": link.autopilot})
-    url, key = read_link(link.url, link.signing_key, insecure=link.insecure)
-    with reached(url, vehicle=link.vehicle, signing_key=key, timeout_s=link.timeout_s) as peer:
-        peer.autopilot = autopilot_named(link.autopilot) if link.autopilot else peer.autopilot
+def _peer(connection: Connection, autopilot: str | None) -> Iterator[tuple[Url, Peer]]:
+    """Connect to the vehicle; the kind of the autopilot may be given, if its heartbeat names another."""
+    written_as({"autopilot": autopilot})
+    mavlink = connection.mavlink
+    assert mavlink is not None
+    url, key = read_link(mavlink.url, mavlink.signing_key, insecure=connection.insecure)
+    with reached(url, vehicle=mavlink.vehicle, signing_key=key, timeout_s=connection.timeout_s) as peer:
+        peer.autopilot = autopilot_named(autopilot) if autopilot else peer.autopilot
         yield url, peer
 
 

@@ -28,7 +28,7 @@ from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.robot.recorder import LIMIT_BYTES, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
 from stopgo.bridge.robot.robot_hardware import OpenBody
-from stopgo.bridge.robot.simulator import NO_FAULTS, Faults
+from stopgo.bridge.robot.simulated_faults import NO_FAULTS, RobotFaults
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.revision import RevisionPolicy
@@ -69,7 +69,7 @@ class RobotOptions:
     """Most disk space for the records of its runs."""
     say: Callable[[str], None] = lambda line: None
     """Prints refusals to the person at the robot, or its service's log."""
-    faults: Faults = NO_FAULTS
+    faults: RobotFaults = NO_FAULTS
     """Simulated crashes of the program; other faults belong to the hardware."""
 
 
@@ -185,7 +185,7 @@ def robots_keys(folder: Path, name: str, state: Path | None = None) -> key_files
     return held
 
 
-def crashing(faults: Faults) -> Callable[[str], None]:
+def crashing(faults: RobotFaults) -> Callable[[str], None]:
     """Return a commit hook that kills the process at the journal entry that the faults name."""
     seen: Counter[str] = Counter()
 

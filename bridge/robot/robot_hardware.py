@@ -11,10 +11,9 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Base, Scanner
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.map_frame import OnMap, turned
+from stopgo.bridge.robot.simulated_faults import NO_FAULTS, RobotFaults
 from stopgo.bridge.robot.simulator import (
     ENDURANCE_S,
-    NO_FAULTS,
-    Faults,
     SimulatedBase,
     SimulatedScanner,
     Wear,
@@ -48,7 +47,7 @@ class SimulatedBody:
     to_map: Transform | None = None
     endurance_s: float = ENDURANCE_S
     """Seconds that a full battery lasts; 0: it never runs down."""
-    faults: Faults = NO_FAULTS
+    faults: RobotFaults = NO_FAULTS
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:

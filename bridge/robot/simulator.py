@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import Literal
 
 import msgspec
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import BaseHealth, Outcome, Rest
 from stopgo.bridge.robot.motion import Brake, Motion, along
+from stopgo.bridge.robot.simulated_faults import NO_FAULTS, RobotFaults
 from stopgo.mission.document import Mission, Point, RobotSpec, Scan
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Pose
@@ -52,57 +52,6 @@ class Wear:
     """While it drives; 0 for a battery that does not run down."""
 
 
-FaultKind = Literal["slip", "blocked", "shaking", "drain", "scanner", "empty", "crash", "crashed"]
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A fault that occurs once, at the n-th drive, scan or journal entry of this process."""
-
-    kind: FaultKind
-    at: int
-    amount: float = 0.0
-
-
-FAULTS: dict[FaultKind, str] = {
-    "slip": "drive N ends AMOUNT metres to the left of where it should",
-    "blocked": "drive N meets an obstacle halfway",
-    "shaking": "after drive N the robot shakes for AMOUNT seconds",
-    "drain": "after drive N the battery is at AMOUNT (0 to 1)",
-    "scanner": "scan N fails",
-    "empty": "scan N holds no points",
-    "crash": "the process dies just before journal entry N is stored",
-    "crashed": "the process dies just after journal entry N is stored",
-}
-
-
-def read_fault(text: str) -> Fault:
-    """Read a fault from KIND@N or KIND@N=AMOUNT, such as `slip@2=0.2`."""
-    kind, _, rest = text.partition("@")
-    at, _, amount = rest.partition("=")
-    try:
-        fault = Fault(msgspec.convert(kind, FaultKind), int(at), float(amount or 0.0))
-    except (ValueError, msgspec.ValidationError):
-        kinds = ", ".join(FAULTS)
-        raise InputError(f"--fault {text}: write it KIND@N or KIND@N=AMOUNT, KIND of {kinds}") from None
-    if fault.at < 0 or not math.isfinite(fault.amount):
-        raise InputError(f"--fault {text}: N must be 0 or more, and AMOUNT a finite number")
-    return fault
-
-
-@dataclass(frozen=True)
-class Faults:
-    """The faults to simulate."""
-
-    all: tuple[Fault, ...] = ()
-
-    def due(self, kind: FaultKind, at: int) -> Fault | None:
-        return next((fault for fault in self.all if (fault.kind, fault.at) == (kind, at)), None)
-
-
-NO_FAULTS = Faults()
-
-
 class SimulatedBase:
     """A differential drive on an empty floor."""
 
@@ -112,7 +61,7 @@ class SimulatedBase:
         clock: Clock,
         keep: Path | None = None,
         wear: Wear = Wear(),
-        faults: Faults = NO_FAULTS,
+        faults: RobotFaults = NO_FAULTS,
         seed: int = 1,
     ) -> None:
         self._clock = clock
@@ -263,7 +212,7 @@ class SimulatedScanner:
 
     profiles: tuple[str, ...] | None = None
 
-    def __init__(self, *, clock: Clock, record: Path | None = None, faults: Faults = NO_FAULTS) -> None:
+    def __init__(self, *, clock: Clock, record: Path | None = None, faults: RobotFaults = NO_FAULTS) -> None:
         self._clock = clock
         self._record = record
         self._faults = faults

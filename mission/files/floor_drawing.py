@@ -14,7 +14,7 @@ from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, Polygon
 from stopgo.mission.settings.element_kinds import kind_of
 from stopgo.mission.stages import NavigableSpace, OpeningState, Selection, Targets
-from stopgo.mission.stages.covered_intervals import runs_of, seen_units
+from stopgo.mission.stages.covered_intervals import lines_along, seen_units
 
 FLOOR: dict[str, object] = {"fill": "#f3f0dc", "stroke": "#555", "stroke_width": 0.25}
 ROOM: dict[str, object] = {"fill": "#ffffff", "stroke": "#b5b5b5", "stroke_width": 0.1}
@@ -135,10 +135,8 @@ def _middle(state: OpeningState, sheet: PaperSheet) -> FloatArray:
 
 def _strokes(targets: Targets, units: BoolArray, sheet: PaperSheet) -> Iterator[str]:
     """Yield the path data of the units of a mask; adjoining stretches become one polyline."""
-    runs = runs_of(targets, units)
-    a, b = targets.a[runs.segment], targets.b[runs.segment]
-    begins = sheet.on_paper(a + runs.t0[:, None] * (b - a))
-    ends = sheet.on_paper(a + runs.t1[:, None] * (b - a))
+    lines = lines_along(targets, units)
+    begins, ends = sheet.on_paper(lines[:, 0]), sheet.on_paper(lines[:, 1])
     apart = np.abs(begins[1:] - ends[:-1]).max(axis=1, initial=0.0) > 0.005
     breaks = [0, *(np.flatnonzero(apart) + 1).tolist(), len(begins)]
     for first, last in pairwise(breaks):

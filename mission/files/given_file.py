@@ -1,8 +1,9 @@
-"""Files that a user names: their bytes, and the rows of those that are tables."""
+"""Files that a user names: their bytes and digest, and the rows of those that are tables."""
 
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 from pathlib import Path
 
@@ -24,6 +25,16 @@ def bytes_of(path: Path, remedy: str, *, most: int | None = None) -> bytes:
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path}: cannot be read ({why}); {remedy}") from None
+
+
+def file_digest(*paths: Path) -> str:
+    """Return the sha256 of the files' bytes, one after another, hexadecimal."""
+    digest = hashlib.sha256()
+    for path in paths:
+        with path.open("rb") as file:
+            while chunk := file.read(1 << 20):
+                digest.update(chunk)
+    return digest.hexdigest()
 
 
 def separator_of(text: str) -> str:

@@ -17,7 +17,7 @@ from stopgo.mission.files.shared_drawing import shared_routes, shared_stops
 from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit, sheet_with
 from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.geometry import FloatArray, bounds
+from stopgo.mission.geometry import FloatArray, bounds, closed
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures
 
@@ -134,13 +134,12 @@ def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> B
         for place in ((item.start.x, item.start.y), *((stop.x, stop.y) for stop in item.stops))
     ]
     discs = [place + disc for place in sheet.on_paper(np.array(centres))]
-    solids = [solid.exterior for item in floor.elements for solid in item.solids]
-    closed = [np.concatenate([ring, ring[:1]]) for ring in solids]
+    solids = [closed(solid.exterior) for item in floor.elements for solid in item.solids]
     lines = [line for item in floor.elements for line in item.lines]
     return Busy.of(
         (STOPS, discs),
         (WAY, [points_along([sheet.on_paper(leg) for leg in _legs(missions)], spacing=1.0)]),
-        (WALLS, [points_along([sheet.on_paper(line) for line in (*closed, *lines)], spacing=1.5)]),
+        (WALLS, [points_along([sheet.on_paper(line) for line in (*solids, *lines)], spacing=1.5)]),
     )
 
 

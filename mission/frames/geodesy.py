@@ -50,7 +50,7 @@ def to_steps(place: Geodetic) -> tuple[int, int]:
 
 def to_geodetic(origin: SiteOrigin, point: Point, rule: str = "wgs84") -> Geodetic:
     """Return the position of a point of the site's frame (metres), by one of `RULES`."""
-    east, north = _turned(point, math.radians(origin.heading_deg))
+    east, north = origin.from_east.back(point)
     return RULES[rule](origin, east, north)
 
 
@@ -69,7 +69,7 @@ def from_geodetic(origin: SiteOrigin, place: Geodetic, rule: str = "wgs84") -> P
         metres_per_degree = math.radians(WGS84_A)
         north += d_lat * metres_per_degree
         east += d_lon * metres_per_degree * math.cos(math.radians(here.lat))
-    return _turned((east, north), -math.radians(origin.heading_deg))
+    return origin.from_east.point((east, north))
 
 
 def out_of_reach(point: Point) -> str:
@@ -91,12 +91,6 @@ def bearing_deg(origin: SiteOrigin, heading: float) -> float:
 def heading_of(origin: SiteOrigin, bearing: float) -> float:
     """The inverse of `bearing_deg`, radians within ±π."""
     return math.remainder(math.radians(origin.heading_deg + 90.0 - bearing), math.tau)
-
-
-def _turned(point: Point, angle: float) -> Point:
-    """Rotate clockwise by `angle`: (x, y) of the site to (east, north) where +y bears `angle`."""
-    cos, sin = math.cos(angle), math.sin(angle)
-    return cos * point[0] + sin * point[1], -sin * point[0] + cos * point[1]
 
 
 def _wgs84(origin: SiteOrigin, east: float, north: float) -> Geodetic:

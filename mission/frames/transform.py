@@ -69,3 +69,8 @@ class SiteOrigin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     lon: float
     alt: float
     heading_deg: float
+
+    @property
+    def from_east(self) -> Transform:
+        """Transform to the frame from metres east and north of its origin."""
+        return Transform(x=0.0, y=0.0, heading=math.radians(self.heading_deg))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from stopgo.mission.document import Point
 from stopgo.mission.frames.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of
-from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin, Transform
 from stopgo.mission.run.events import Pose
 
 SAME_M = 0.05
@@ -38,20 +38,18 @@ class LocalFrame:
 
     def pose(self, north: float, east: float, yaw: float) -> Pose:
         """Return the pose in the site of a position and a yaw (radians clockwise from north)."""
-        bearing = math.radians(self.site.heading_deg)
-        cos, sin = math.cos(bearing), math.sin(bearing)
-        return Pose(
-            x=self.origin[0] + cos * east - sin * north,
-            y=self.origin[1] + sin * east + cos * north,
-            heading=heading_of(self.site, math.degrees(yaw)),
-        )
+        x, y = self._from_east.point((east, north))
+        return Pose(x=x, y=y, heading=heading_of(self.site, math.degrees(yaw)))
 
     def north_east(self, point: Point) -> Point:
         """Return a point of the site as metres north and east of the autopilot's origin."""
-        bearing = math.radians(self.site.heading_deg)
-        cos, sin = math.cos(bearing), math.sin(bearing)
-        dx, dy = point[0] - self.origin[0], point[1] - self.origin[1]
-        return (-sin * dx + cos * dy, cos * dx + sin * dy)
+        east, north = self._from_east.back(point)
+        return north, east
+
+    @property
+    def _from_east(self) -> Transform:
+        x, y = self.origin
+        return Transform(x=x, y=y, heading=self.site.from_east.heading)
 
     def yaw(self, heading: float) -> float:
         """Return a heading of the site as radians clockwise from north, within ±π."""

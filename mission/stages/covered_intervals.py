@@ -35,3 +35,10 @@ def runs_of(targets: Targets, units: BoolArray) -> SeenStretches:
     return SeenStretches(
         frozen(on, np.int64), frozen((first - begin) / count), frozen((last + 1 - begin) / count)
     )
+
+
+def lines_along(targets: Targets, units: BoolArray) -> FloatArray:
+    """Return the units of a mask (n,) as lines (k, 2, 2), one per run."""
+    runs = runs_of(targets, units)
+    a, b = targets.a[runs.segment], targets.b[runs.segment]
+    return np.stack([a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None]], axis=1)

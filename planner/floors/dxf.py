@@ -28,7 +28,7 @@ from stopgo.planner.floors.linework import Derived, as_room_name, completed, der
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.raised_floor import with_heights
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
-from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
+from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine, choice_of
 from stopgo.planner.floors.units.unit_lengths import METRES
 from stopgo.planner.floors.wall_layers import (
     MOST_STRAY,
@@ -346,26 +346,15 @@ def _messages(floor: FloorPlan | None, code: str) -> tuple[str, ...]:
 def _choices(sheet: DxfSheet, floor: FloorPlan | None) -> Iterable[FloorChoice]:
     """The drawings side by side, or the only floor."""
     if floor is not None and len(sheet.drawings) < 2:
-        yield _choice(floor)
+        yield choice_of(floor)
         return
     for number, item in enumerate(sheet.drawings, start=1):
         option = f"--drawing {number}" if len(sheet.drawings) > 1 else ""
+        name, notes = f"drawing {number}", (item.description,)
         if floor is not None and item is sheet.chosen:
-            yield replace(_choice(floor), name=f"drawing {number}", option=option, notes=(item.description,))
+            yield replace(choice_of(floor), name=name, option=option, notes=notes)
         else:
-            yield FloorChoice(f"drawing {number}", option, bounds=item.box, notes=(item.description,))
-
-
-def _choice(floor: FloorPlan) -> FloorChoice:
-    kinds = (*(item.kind for item in floor.elements), *(f"{item.kind}s" for item in floor.openings))
-    return FloorChoice(
-        name=floor.name,
-        option="",
-        area_m2=floor.area,
-        bounds=bounds([part.exterior for part in floor.outline]),
-        elements={"rooms": len(floor.rooms), **Counter(kinds)},
-        chosen=True,
-    )
+            yield FloorChoice(name, option, bounds=item.box, notes=notes)
 
 
 def _layers(drawing: Drawing, sheet: DxfSheet, source: Path) -> Iterable[LayerUse]:

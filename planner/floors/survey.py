@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, bounds, closed
 
 
 @dataclass(frozen=True)
@@ -36,6 +35,19 @@ class FloorChoice:
     """True if the model has doors or several rooms on it."""
     chosen: bool = False
     """True if a plan with the same options uses this floor."""
+
+
+def choice_of(floor: FloorPlan) -> FloorChoice:
+    """Return a floor that was read, as the choice of a file."""
+    kinds = (*(item.kind for item in floor.elements), *(f"{item.kind}s" for item in floor.openings))
+    return FloorChoice(
+        name=floor.name,
+        option="",
+        area_m2=floor.area,
+        bounds=bounds([part.exterior for part in floor.outline]),
+        elements={"rooms": len(floor.rooms), **Counter(kinds)},
+        chosen=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -65,7 +77,7 @@ class SurveyLine:
     @property
     def drawn(self) -> FloatArray:
         """Points (n, 2); a closed line ends where it begins."""
-        return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
+        return closed(self.points) if self.closed else self.points
 
 
 @dataclass(frozen=True)

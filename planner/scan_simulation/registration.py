@@ -26,11 +26,19 @@ TURNED_M = 0.5
 """Distance in metres that counts as much as one radian between two surface normals."""
 SAME_M = 0.1
 """Largest distance between points of the same surface under the true poses."""
-STAGES = ((0.35, 0.3), (0.15, 0.1))
+STAGES = ((0.35, 0.3), (0.15, 0.1), (0.1, 0.05))
 """Per stage, distances in metres: for shared surfaces, and for matched points.
 
-A coarse stage precedes them where the error of the start moves points farther: 2° are 0.5 m at 14 m.
+The last keeps points at the ends of a few shared surfaces from pulling the pose: 13 mm became 1 mm.
+
+A coarse stage precedes them where the position of the start is so uncertain that they would not reach.
 """
+HEADING_M = 0.1
+"""Distance by which one of the headings tried moves the farthest shared points from the next one."""
+HEADING_FEW = 3
+"""One of so many points of upright surfaces compares the headings."""
+LEVEL_FEW = 10
+"""One of so many points of level surfaces is kept: they hold height and tilt only."""
 LEAST_POINTS = 100
 """Fewest shared points on upright surfaces for a pair, about 0.5 m²."""
 FEW = 10
@@ -40,9 +48,7 @@ WEAKEST = 0.02
 UPRIGHT = 0.5
 """Largest vertical component of an upright surface's normal."""
 NEARLY_ALL = 0.95
-"""Fraction of the shared points that a coarse stage reaches."""
-MOST = 0.5
-"""Fraction of the points that a coarse stage reached; if its pose brings so many together, it is right."""
+"""Fraction of the shared points that count for the farthest of them."""
 MOST_ITERATIONS = 60
 FINE = 1e-5
 """Step size in metres and radians at which registration ends."""
@@ -67,6 +73,11 @@ class OrientedCloud:
     def upright(self) -> BoolArray:
         return frozen(np.abs(self.normals[:, 2]) < UPRIGHT, np.bool_)
 
+    def one_of(self, few: int, among: BoolArray) -> OrientedCloud:
+        """One of `few` of these points."""
+        kept = np.flatnonzero(among)[::few]
+        return OrientedCloud(frozen(self.points[kept]), frozen(self.normals[kept]))
+
     def near(self, other: OrientedCloud, there: FloatArray, within: float) -> BoolArray:
         """True for points of `other` that lie on surfaces of this cloud, at the pose `there` (4, 4)."""
         distance, _ = self.tree.query(other._both(there), distance_upper_bound=within)
@@ -79,7 +90,7 @@ class OrientedCloud:
 
 
 def surface_of(cloud: FloatArray) -> OrientedCloud:
-    """A scan's cloud (n, 3), thinned, with its normals."""
+    """A scan's cloud (n, 3), thinned, on level surfaces more than on upright ones, with its normals."""
     import small_gicp
 
     if len(cloud) <= NEIGHBOURS:
@@ -89,7 +100,10 @@ def surface_of(cloud: FloatArray) -> OrientedCloud:
     )
     points, normals = thin.points()[:, :3], thin.normals()[:, :3]
     towards = -np.sign(np.einsum("ij,ij->i", points, normals))
-    return OrientedCloud(frozen(points), frozen(normals * towards[:, None]))
+    whole = OrientedCloud(frozen(points), frozen(normals * towards[:, None]))
+    kept = whole.upright.copy()
+    kept[np.flatnonzero(~kept)[::LEVEL_FEW]] = True
+    return whole.one_of(1, kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +127,7 @@ def registered(
                 two = _CloudPair(surfaces[i], surfaces[j], _shift(positions[j] - positions[i]))
                 if two.meets and two.shared_points >= LEAST_POINTS:
                     starts = _starts(two, simulation, (i, j))
-                    moved_m = two.moved_m(simulation) if simulation.poses else 0.0
-                    yield _registered((names[i], names[j]), two, starts, moved_m)
+                    yield _registered((names[i], names[j]), two, starts, simulation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +147,8 @@ class _CloudPair:
     @property
     def meets(self) -> bool:
         """True if a few points lie on shared surfaces; this rules out most pairs quickly."""
-        few = OrientedCloud(self.other.points[::FEW], self.other.normals[::FEW])
-        return bool((self.one.near(few, self.truth, SAME_M) & few.upright).any())
+        few = self.other.one_of(FEW, self.other.upright)
+        return bool(self.one.near(few, self.truth, SAME_M).any())
 
     @property
     def shared_points(self) -> int:
@@ -170,30 +183,32 @@ class _CloudPair:
         rows = np.column_stack([facing, arm])
         return np.asarray(rows.T @ rows)
 
-    def moved_m(self, simulation: Simulation) -> float:
-        """Distance by which the error of the robot's pose moves the farthest shared points."""
+    @cached_property
+    def farthest_m(self) -> float:
+        """Distance of the farthest shared points from the second scanner."""
         shared = np.linalg.norm(self.other.points[self.shared[1]], axis=1)
-        farthest = float(np.quantile(shared, NEARLY_ALL)) if len(shared) else 0.0
-        return simulation.pose_error_m + math.radians(simulation.pose_error_deg) * farthest
+        return float(np.quantile(shared, NEARLY_ALL)) if len(shared) else 0.0
 
-    def aligned(self, there: FloatArray, *, moved_m: float = 0.0) -> FloatArray:
-        """The pose of the second in the first that registration finds from `there`.
+    def aligned(self, start: FloatArray, simulation: Simulation) -> FloatArray:
+        """The pose of the second in the first that registration finds from a start.
 
-        `moved_m` is the distance by which the error of `there` moves points. A coarse stage that has to
-        reach so far may match one surface with another. So where the pose found with it brings few of the
-        points together that it reached, the one found without it counts if it brings more together.
+        An error of the heading moves far points beyond others that look alike: 2° are 0.5 m at 14 m. So the
+        headings within that error are compared first.
         """
-        if moved_m <= STAGES[0][1]:
-            return self._aligned(there, STAGES)
-        reach = moved_m + SAME_M
-        found = self._aligned(there, ((reach, moved_m), *STAGES))
-        if self._together(found) >= MOST * self._together(there, reach):
-            return found
-        return max((found, self._aligned(there, STAGES)), key=self._together)
+        if not simulation.poses:
+            return self._aligned(start, STAGES)
+        left_m = simulation.pose_error_m + HEADING_M / 2
+        coarse = [] if left_m <= STAGES[0][1] else [(left_m + SAME_M, left_m)]
+        return self._aligned(self._headed(start, simulation), (*coarse, *STAGES))
 
-    def _together(self, there: FloatArray, within: float = STAGES[-1][1]) -> int:
-        """Number of points of both clouds on surfaces of the other, at the pose `there`."""
-        return sum(int(mask.sum()) for mask in _shared(self.one, self.other, there, within))
+    def _headed(self, start: FloatArray, simulation: Simulation) -> FloatArray:
+        """The start, with the heading within its error that brings most points together."""
+        error = math.radians(simulation.pose_error_deg)
+        steps = max(1, math.ceil(error * self.farthest_m / HEADING_M))
+        few = self.other.one_of(HEADING_FEW, self.other.upright)
+        angles = np.linspace(-error, error, 2 * steps + 1)
+        poses = [start @ _turned(angle) for angle in angles[np.argsort(np.abs(angles), kind="stable")]]
+        return max(poses, key=lambda there: int(self.one.near(few, there, HEADING_M).sum()))
 
     def _aligned(self, there: FloatArray, stages: Sequence[tuple[float, float]]) -> FloatArray:
         """The pose that these stages find."""
@@ -218,12 +233,12 @@ class _CloudPair:
 
 
 def _registered(
-    names: tuple[str, str], two: _CloudPair, starts: Sequence[FloatArray], moved_m: float
+    names: tuple[str, str], two: _CloudPair, starts: Sequence[FloatArray], simulation: Simulation
 ) -> Registered:
     """The pair registered from its starts up to the first that misses; the worst result counts."""
     ends: list[FloatArray] = []
     for start in starts:
-        ends.append(two.aligned(start, moved_m=moved_m))
+        ends.append(two.aligned(start, simulation))
         if not within_tolerance(*two.error(ends[-1])):
             break
     errors = [two.error(end) for end in ends]

@@ -53,10 +53,19 @@ def _around_first(cover: Cover, is_chosen: BoolArray, is_settled: BoolArray) -> 
     """The first row that is not settled, with those that see the same columns, directly or over others."""
     found = newest = np.flatnonzero(is_chosen & ~is_settled)[:1]
     while len(newest) and len(found) < SIZE:
-        seers = np.unique(cover.worths.seers(np.unique(cover.sees[newest].indices)))
+        seers = np.unique(cover.worths.seers(_to_cover(cover, newest)))
         newest = np.setdiff1d(seers[is_chosen[seers]], found)
         found = np.concatenate([found, newest])
     return np.sort(found[:SIZE])
+
+
+def _to_cover(cover: Cover, rows: IntArray) -> IntArray:
+    """The columns of the whole that any of these rows sees.
+
+    A separator of a network is seen by rows of many rooms, which have nothing else in common.
+    """
+    columns = np.unique(cover.sees[rows].indices)
+    return columns[cover.weight[columns] > 0].astype(np.int64)
 
 
 def _searched(

@@ -17,6 +17,8 @@ AHEAD = (0.02, 0.1, 0.25)
 """Distances (m) in front of a face at which its room is searched: rooms often begin a little off it."""
 JAMB_DISTANCE = 0.3
 """Faces of jambs and niches belong to a room at most this far (m) from them."""
+AT_ONCE = 50_000
+"""Points that are looked for at once: a shape for each of a million is a large part of the memory."""
 
 
 def faced_rooms(targets: Targets, rooms: Sequence[RoomSpace], ground: Ground) -> IntArray:
@@ -29,7 +31,7 @@ def faced_rooms(targets: Targets, rooms: Sequence[RoomSpace], ground: Ground) ->
         found[unassigned] = faced.nearest(middle[unassigned] + ahead * normal[unassigned], 0.0)
     front = middle + AHEAD[0] * normal
     unassigned = np.flatnonzero(found < 0)
-    unassigned = unassigned[shapely.intersects(ground.outline, shapely.points(front[unassigned]))]
+    unassigned = unassigned[shapely.intersects_xy(ground.outline, *front[unassigned].T)]
     found[unassigned] = faced.nearest(front[unassigned], JAMB_DISTANCE)
     return frozen(found, np.int64)
 
@@ -52,6 +54,10 @@ class _RoomEdges:
 
     def nearest(self, points: FloatArray, distance: float) -> IntArray:
         """The nearest room within a distance of each point, of several the first; -1 where there is none."""
+        blocks = np.split(points, range(AT_ONCE, len(points), AT_ONCE))
+        return np.concatenate([self._nearest(block, distance) for block in blocks])
+
+    def _nearest(self, points: FloatArray, distance: float) -> IntArray:
         found = np.full(len(points), -1, dtype=np.int64)
         room, at = shapely.STRtree(shapely.points(points)).query(self._shapes, predicate="intersects")
         _first_of_each(found, at, room)

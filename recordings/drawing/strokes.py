@@ -25,16 +25,6 @@ class Strokes:
     radii: FloatArray
 
 
-def outlines(polygons: Iterable[Polygon]) -> list[FloatArray]:
-    """Return every ring of the polygons as a closed line strip."""
-    return [closed(ring) for polygon in polygons for ring in polygon.rings]
-
-
-def closed(ring: FloatArray) -> FloatArray:
-    """Return the ring with its first point repeated at the end."""
-    return np.vstack([ring, ring[:1]])
-
-
 def hatch(polygons: Iterable[Polygon], *, spacing: float, angle: float) -> FloatArray:
     """Return chords (k, 2, 2) of the polygons at `angle`, on one raster, so that neighbours line up."""
     rotation = _rotation(angle)

@@ -2,29 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from stopgo.mission.floor.polylines import FloorLines, Polylines
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.recordings.drawing import entities
 from stopgo.recordings.embedded.values import Values
-
-Polylines = tuple[FloatArray, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class FloorLines:
-    """Lines of a floor, each a polyline (n, 2); the outline of a filled shape ends where it begins."""
-
-    outline: Polylines
-    rooms: Polylines
-    kinds: dict[str, Polylines]
-    """By kind of element."""
-    openings: Polylines
-    names: tuple[tuple[str, float, float], ...]
-    """Room names with their label positions."""
 
 
 def floor_lines(values: Values, origin: tuple[float, float]) -> FloorLines | None:

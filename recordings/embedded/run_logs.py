@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from hashlib import file_digest
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.run.boots import joined_boots
 from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.mission.run.health_text import HealthWords
@@ -30,15 +30,14 @@ def logs_in(values: Values, contents: Contents, path: Path) -> tuple[RunLog, ...
     runs = [run for run in map(entities.run_of_events, values.chunks) if run is not None]
     if not runs:
         return ()
-    with path.open("rb") as file:
-        digest = file_digest(file, "sha256").hexdigest()
-    logs = [_log(run, values, _source(path, digest, contents)) for run in runs]
+    source = _source(path, contents)
+    logs = [_log(run, values, source) for run in runs]
     return tuple(sorted((log for log in logs if log.events), key=lambda log: (log.began_ns, log.run_id)))
 
 
-def _source(path: Path, digest: str, contents: Contents) -> LogSource:
+def _source(path: Path, contents: Contents) -> LogSource:
     notes = () if contents.complete else ("the recording was not closed: its end may be missing",)
-    return LogSource(path.name, "rrd", digest, messages=contents.total_rows, notes=notes)
+    return LogSource(path.name, "rrd", file_digest(path), messages=contents.total_rows, notes=notes)
 
 
 def _log(run_id: str, values: Values, source: LogSource) -> RunLog:

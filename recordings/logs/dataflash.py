@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, IntArray
@@ -34,7 +35,6 @@ from stopgo.recordings.logs.field_log import (
     fixes_of,
     poses_of,
 )
-from stopgo.recordings.logs.files import digest_of
 
 HEAD = b"\xa3\x95"
 FMT = 0x80
@@ -80,7 +80,7 @@ def read_dataflash(path: Path, reading: Reading) -> FieldLog:
     return FieldLog(
         path=str(path),
         format="ArduPilot BIN",
-        digest=digest_of([path]),
+        digest=file_digest(path),
         messages=sum(scan.counts.values()),
         clock="wall" if tables.offset_ns else "since boot",
         begin_ns=begin,

@@ -1,14 +1,10 @@
-"""Files of a log: checks, first bytes and digest. The files are never changed."""
+"""Files of a log: checks and first bytes. The files are never changed."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
 from pathlib import Path
 
 from stopgo.mission.errors import InputError
-
-CHUNK = 1 << 20
 
 
 def must_be_readable(path: Path) -> None:
@@ -42,13 +38,3 @@ def head(path: Path, count: int) -> bytes:
             return file.read(count)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-
-
-def digest_of(paths: Sequence[Path]) -> str:
-    """Return the sha256 of the files' bytes, one after another, hexadecimal."""
-    digest = hashlib.sha256()
-    for path in paths:
-        with path.open("rb") as file:
-            while chunk := file.read(CHUNK):
-                digest.update(chunk)
-    return digest.hexdigest()

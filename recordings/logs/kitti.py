@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.geometry import FloatArray
 from stopgo.recordings.logs.field_log import LATEST_S, WALL_S, Channel, FieldLog, poses_of
-from stopgo.recordings.logs.files import digest_of
 
 COLUMNS = 12
 LEAST_TURN = 0.05
@@ -50,7 +50,7 @@ def read_kitti(path: Path) -> FieldLog:
     track = poses_of("KITTI", "trajectory", ns, xy, heading, height=height)
     lost = len(rows) - len(pairs)
     return FieldLog(
-        path=str(path), format="KITTI poses", digest=digest_of([path, seconds_file]), messages=len(pairs),
+        path=str(path), format="KITTI poses", digest=file_digest(path, seconds_file), messages=len(pairs),
         clock="wall" if float(ns.max()) / 1e9 > WALL_S else "since boot",
         begin_ns=int(ns.min()), end_ns=int(ns.max()),
         channels=(Channel("pose", "", len(pairs)),), poses=() if track is None else (track,),

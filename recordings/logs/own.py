@@ -15,10 +15,10 @@ import numpy as np
 from stopgo.mission.document import Mission
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.geometry import frozen
 from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, poses_of
-from stopgo.recordings.logs.files import digest_of
 
 SITE = "site"
 """Name of the mission's own frame in a log."""
@@ -110,7 +110,7 @@ def own_log(
     return FieldLog(
         path=str(path),
         format=form,
-        digest=digest_of([path]),
+        digest=file_digest(path),
         messages=len(events) + sum(len(track.ns) for track in poses if track.source != AT_EVENTS),
         clock="wall",
         begin_ns=min(times, default=0),

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.recordings.logs import foxglove
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Sweep, fixes_of, poses_of
-from stopgo.recordings.logs.files import digest_of
 from stopgo.recordings.logs.ros_bag import Bag, Damaged, Topic, UnknownType, files_of, salvaged_bag, whole_bag
 from stopgo.recordings.logs.ros_poses import TYPES, WITH_CHILD, PoseColumns, heading_of
 from stopgo.recordings.logs.ros_sweeps import SWEEPS
@@ -75,7 +75,7 @@ def _read_bag(path: Path, bag: Bag, reading: Reading) -> FieldLog:
     return FieldLog(
         path=str(path),
         format=_format(path, bag),
-        digest=digest_of(files_of(path)),
+        digest=file_digest(*files_of(path)),
         messages=sum(counts.values()),
         clock="simulated" if 0 < end < SIMULATED_BELOW_NS else "wall",
         begin_ns=begin,

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.files.given_file import separator_of
+from stopgo.mission.files.given_file import file_digest, separator_of
 from stopgo.recordings.logs.field_log import (
     LATEST_S,
     WALL_S,
@@ -24,7 +24,6 @@ from stopgo.recordings.logs.field_log import (
     fixes_of,
     poses_of,
 )
-from stopgo.recordings.logs.files import digest_of
 from stopgo.recordings.logs.kitti import COLUMNS as KITTI_COLUMNS
 from stopgo.recordings.logs.kitti import read_kitti
 from stopgo.recordings.logs.ros_poses import headings_of
@@ -211,7 +210,7 @@ def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: n
     return FieldLog(
         path=str(path),
         format=form,
-        digest=digest_of([path]),
+        digest=file_digest(path),
         messages=rows,
         clock="wall" if last > WALL_S else "since boot",
         begin_ns=int(ns.min()),

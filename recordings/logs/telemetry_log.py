@@ -21,6 +21,7 @@ os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.mavlink.autopilots import autopilot_named, autopilot_of
@@ -37,7 +38,6 @@ from stopgo.recordings.logs.field_log import (
     fixes_of,
     poses_of,
 )
-from stopgo.recordings.logs.files import digest_of
 
 FORMAT = "MAVLink tlog"
 STAMP = 8
@@ -93,7 +93,7 @@ def read_telemetry_log(path: Path, reading: Reading) -> FieldLog:
     return FieldLog(
         path=str(path),
         format=FORMAT,
-        digest=digest_of([path]),
+        digest=file_digest(path),
         messages=sum(sorter.counts.values()),
         clock="wall",
         begin_ns=sorter.span[0],

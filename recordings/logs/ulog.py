@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.mavlink.autopilots.kind import Mode
 from stopgo.mission.mavlink.autopilots.px4 import PX4
 from stopgo.mission.mavlink.items import Item
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, fixes_of, poses_of
-from stopgo.recordings.logs.files import digest_of
 
 WANTED = [
     "vehicle_local_position", "vehicle_global_position", "vehicle_gps_position", "vehicle_attitude",
@@ -50,7 +50,7 @@ def read_ulog(path: Path, reading: Reading) -> FieldLog:
     return FieldLog(
         path=str(path),
         format="PX4 ULog",
-        digest=digest_of([path]),
+        digest=file_digest(path),
         messages=sum(len(data.data["timestamp"]) for data in log.data_list),
         clock="wall" if offset else "since boot",
         begin_ns=begin,

@@ -13,12 +13,12 @@ from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.files.sheet import PaperMap
 from stopgo.mission.files.svg import text_width
-from stopgo.mission.geometry import BoolArray, FloatArray, bounds
+from stopgo.mission.geometry import BoolArray, FloatArray, bounds, is_closed
 from stopgo.mission.run.events import Held, LinkLost, Paused
 from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.settings.element_kinds import kind_of
 from stopgo.mission.stages import Targets
-from stopgo.mission.stages.covered_intervals import runs_of
+from stopgo.mission.stages.covered_intervals import lines_along
 from stopgo.mission.stages.network import MagnifiedErrors, magnified_errors
 from stopgo.recordings.page.style import BLUE, ERROR, GREY, INK, PURPLE, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
@@ -107,16 +107,15 @@ class PictureFrame:
         """Return the `d` of a path; lines that end at their first point are closed."""
         return "".join(self._line(line, close) for line in lines if len(line) > 1)
 
+    def along(self, targets: Targets, units: BoolArray) -> str:
+        """Return the path of the units in a mask (n,)."""
+        return self.path(lines_along(targets, units))
+
     def _line(self, line: FloatArray, close: bool) -> str:
         closed = close and is_closed(line)
         points = self.paper.on_paper(line)
         points = points[:-1] if closed else points
         return "M" + "L".join(f"{x:.3f} {y:.3f}" for x, y in points.tolist()) + ("Z" if closed else "")
-
-
-def is_closed(line: FloatArray) -> bool:
-    """True if a line (n, 2) ends where it begins."""
-    return len(line) > 2 and bool(np.allclose(line[0], line[-1]))
 
 
 def _scale_bar(frame: PictureFrame) -> Iterator[str]:
@@ -199,17 +198,9 @@ def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: Pict
     seen = planned if acquired is None else acquired.seen
 
     targets = sight.targets
-    yield stroke(along(targets, ~planned & ~seen, frame), GREY, 1.2, stroke_dasharray="4 3")
-    yield stroke(along(targets, planned & ~seen, frame), VERMILION, 5)
-    yield stroke(along(targets, seen, frame), BLUE, 2.4)
-
-
-def along(targets: Targets, units: BoolArray, frame: PictureFrame) -> str:
-    """Return the path of the units in a mask (n,)."""
-    runs = runs_of(targets, units)
-    a, b = targets.a[runs.segment], targets.b[runs.segment]
-    ends = (a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None])
-    return frame.path(np.stack(ends, axis=1))
+    yield stroke(frame.along(targets, ~planned & ~seen), GREY, 1.2, stroke_dasharray="4 3")
+    yield stroke(frame.along(targets, planned & ~seen), VERMILION, 5)
+    yield stroke(frame.along(targets, seen), BLUE, 2.4)
 
 
 def _paths(mission: Mission, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:

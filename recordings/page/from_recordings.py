@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from hashlib import file_digest
 from typing import Any
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.given_file import file_digest
+from stopgo.mission.floor.polylines import FloorLines
 from stopgo.mission.run.run_log import LogSource
 from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.mission.stages.stop_reasons import StopReason
 from stopgo.recordings.embedded.findings import EmbeddedFindings, findings_in
-from stopgo.recordings.embedded.floor_lines import FloorLines, floor_lines
+from stopgo.recordings.embedded.floor_lines import floor_lines
 from stopgo.recordings.embedded.plan import origin_in
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.embedded.reasons import reasons_in
@@ -96,6 +97,5 @@ def _results(items: Sequence[RecordingReview]) -> PlanResults:
 
 
 def _source(recording: Recording) -> LogSource:
-    with recording.path.open("rb") as file:
-        digest = file_digest(file, "sha256").hexdigest()
-    return LogSource(recording.path.name, "rrd", digest, recording.contents.total_rows)
+    path = recording.path
+    return LogSource(path.name, "rrd", file_digest(path), recording.contents.total_rows)

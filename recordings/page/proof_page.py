@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.floor.polylines import lines_of
 from stopgo.mission.proof.plan_proof import CloudQuality, PlanProof, PromisedCoverage, ScanPair
 from stopgo.mission.proof.proof_text import (
     assumed_words,
@@ -17,12 +17,10 @@ from stopgo.mission.proof.proof_text import (
     verdict,
 )
 from stopgo.mission.stages.figures import percent
-from stopgo.recordings.drawing.strokes import name_point, outlines
-from stopgo.recordings.embedded.floor_lines import FloorLines
+from stopgo.recordings.drawing.strokes import name_point
 from stopgo.recordings.page import whole_page
 from stopgo.recordings.page.floor_picture import (
     PictureFrame,
-    along,
     legend,
     line_sample,
     plan_picture,
@@ -74,7 +72,7 @@ def _tiles(proof: PlanProof) -> str:
 
 
 def _picture(proof: PlanProof, floor: FloorPlan) -> str:
-    subject = ReportSubject((proof.mission,), floor=lines_of(floor))
+    subject = ReportSubject((proof.mission,), floor=lines_of(floor, name_point))
     picture = plan_picture(subject, None, beneath=lambda frame: _layers(proof, frame))
     marks = [
         (line_sample(BLUE, 2.4), "points lie on it"),
@@ -90,9 +88,9 @@ def _layers(proof: PlanProof, frame: PictureFrame) -> Iterator[str]:
     """Draw targets by outcome, and the pairs."""
     promised = proof.seen if proof.promised is None else proof.promised
     missed = promised & ~proof.seen
-    yield stroke(along(proof.targets, ~proof.seen & ~missed, frame), GREY, 1.2, stroke_dasharray="4 3")
-    yield stroke(along(proof.targets, missed, frame), VERMILION, 5)
-    yield stroke(along(proof.targets, proof.seen, frame), BLUE, 2.4)
+    yield stroke(frame.along(proof.targets, ~proof.seen & ~missed), GREY, 1.2, stroke_dasharray="4 3")
+    yield stroke(frame.along(proof.targets, missed), VERMILION, 5)
+    yield stroke(frame.along(proof.targets, proof.seen), BLUE, 2.4)
     position = {stop.id: (stop.x, stop.y) for stop in proof.mission.stops}
 
     def lines(wanted: bool) -> str:
@@ -101,22 +99,6 @@ def _layers(proof: PlanProof, frame: PictureFrame) -> Iterator[str]:
 
     yield stroke(lines(False), VERMILION, 1.5, stroke_dasharray="2 4")
     yield stroke(lines(True), GREEN, 3)
-
-
-def lines_of(floor: FloorPlan) -> FloorLines:
-    """Return the floor as report pictures use it."""
-    kinds: dict[str, list[FloatArray]] = {}
-    for item in floor.elements:
-        kinds.setdefault(item.kind, []).extend([*outlines(item.solids), *item.lines])
-    named = [room for room in floor.rooms if room.polygons]
-    positions = (name_point(max(room.polygons, key=lambda polygon: polygon.area)) for room in named)
-    return FloorLines(
-        outline=tuple(outlines(floor.outline)),
-        rooms=tuple(line for room in floor.rooms for line in outlines(room.polygons)),
-        kinds={kind: tuple(lines) for kind, lines in kinds.items()},
-        openings=tuple(item.line for item in floor.openings),
-        names=tuple((room.label, float(x), float(y)) for room, (x, y) in zip(named, positions, strict=True)),
-    )
 
 
 def _tables(proof: PlanProof) -> Iterator[str]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.run_verdict import Judgement, judge
 from stopgo.mission.document import Mission
+from stopgo.mission.floor.polylines import FloorLines
 from stopgo.mission.run.run_log import LogSource
 from stopgo.mission.stages.figures import CoveragePair
 from stopgo.mission.stages.plan_results import PlanResults
 from stopgo.mission.stages.sight import Sight
 from stopgo.mission.stages.stop_reasons import StopReason
 from stopgo.recordings.embedded.findings import EmbeddedFindings
-from stopgo.recordings.embedded.floor_lines import FloorLines
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from stopgo.mission.floor import Element, Finding, FloorPlan, Room
-from stopgo.mission.geometry import FloatArray, Polygon
+from stopgo.mission.geometry import FloatArray, Polygon, closed, outlines
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
 from stopgo.recordings.drawing.pens import ORDER, THICK, THIN, Pen, draw
@@ -25,10 +25,10 @@ SPANS = {"beams": (CUT, CUT + 0.15), "stairs": (0.0, 0.4), "windows": (0.8, CUT)
 
 def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
     """Draw outline, holes, rooms with names, elements by kind, and openings."""
-    edges = strokes.outlines(floor.outline)
+    edges = outlines(floor.outline)
     draw(canvas, entities.OUTLINE, edges, Pen(palette.OUTLINE, "floor", THICK))
     holes = [hole for polygon in floor.outline for hole in polygon.holes]
-    draw(canvas, entities.HOLES, map(strokes.closed, holes), Pen(palette.HOLE, "line", THICK))
+    draw(canvas, entities.HOLES, map(closed, holes), Pen(palette.HOLE, "line", THICK))
     _draw_rooms(canvas, floor.rooms)
     for kind in palette.KIND_COLOURS:
         _draw_elements(canvas, floor, kind)
@@ -46,7 +46,7 @@ def raise_floor(canvas: Canvas, floor: FloorPlan) -> None:
     for kind, colour in palette.KIND_COLOURS.items():
         solids, lines = _shapes(floor, kind)
         low, high = SPANS.get(kind, (0.0, CUT))
-        sides = strokes.walls(canvas.strips(strokes.outlines(solids) + lines), low=low, high=high)
+        sides = strokes.walls(canvas.strips(outlines(solids) + lines), low=low, high=high)
         top = strokes.level(canvas.local(strokes.triangles(solids)), high)
         _mesh(canvas, entities.child(entities.WORLD_FLOOR, kind), np.concatenate([sides, top]), colour)
 
@@ -59,7 +59,7 @@ def log_findings(canvas: Canvas, findings: Iterable[Finding], *, step: int = sto
 
 def _draw_rooms(canvas: Canvas, rooms: tuple[Room, ...]) -> None:
     polygons = [polygon for room in rooms for polygon in room.polygons]
-    draw(canvas, entities.ROOMS, strokes.outlines(polygons), Pen(palette.ROOM, "room", THIN))
+    draw(canvas, entities.ROOMS, outlines(polygons), Pen(palette.ROOM, "room", THIN))
     named = [room for room in rooms if room.polygons]
     if not named:
         return
@@ -84,7 +84,7 @@ def _draw_elements(canvas: Canvas, floor: FloorPlan, kind: str) -> None:
             canvas.local(filled.lines), radii=filled.radii, colors=colour, draw_order=ORDER["solid"]
         )
         canvas.show(entities.child(element, "fill"), shape)
-    edges = strokes.outlines(solids) + lines
+    edges = outlines(solids) + lines
     draw(canvas, element, edges, Pen(colour, "solid", THIN), names=_names(floor, kind))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import rerun as rr
 
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.geometry import bounds
+from stopgo.mission.geometry import bounds, outlines
 from stopgo.mission.stages import NavigableSpace, OpeningState
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas
@@ -24,7 +24,7 @@ def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
     stop_area = strokes.hatch(stop_polygons, spacing=spacing, angle=-np.pi / 4)
     inside = Pen(palette.STOP_AREA, "area", THIN)
     draw(canvas, entities.STOP_AREA, stop_area, inside, step=SPACE, planning_only=True)
-    edges = strokes.outlines(stop_polygons)
+    edges = outlines(stop_polygons)
     draw(canvas, entities.STOP_AREA_EDGE, edges, Pen(palette.STOP_AREA, "area", THIN), step=SPACE)
     draw(canvas, entities.GAPS, space.gaps, Pen(palette.GAP, "line", THICK), step=SPACE)
     _draw_openings(canvas, space.openings)

@@ -7,7 +7,7 @@ import rerun as rr
 
 from stopgo.mission.geometry import BoolArray, FloatArray
 from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Scanned, Skipped
-from stopgo.mission.stages.covered_intervals import runs_of
+from stopgo.mission.stages.covered_intervals import lines_along
 from stopgo.mission.stages.figures import percent
 from stopgo.mission.stages.sight import SeenFrom, Sight
 from stopgo.recordings.drawing import entities, palette
@@ -79,15 +79,9 @@ class AcquiredDrawing:
             draw(entities.child(names.flat(entities.MISSING), stops[0].id), mark)
 
     def _draw(self, canvas: Canvas, entity: str, units: BoolArray, draw: Draw) -> None:
-        lines = self._lines(units)
+        lines = lines_along(self._sight.targets, units)
         if len(lines):
             draw(entity, rr.LineStrips2D.from_fields(strips=canvas.strips(lines)))
-
-    def _lines(self, units: BoolArray) -> FloatArray:
-        """Return a mask of units (n,) as segments (k, 2, 2)."""
-        targets, runs = self._sight.targets, runs_of(self._sight.targets, units)
-        a, b = targets.a[runs.segment], targets.b[runs.segment]
-        return np.stack([a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None]], axis=1)
 
     def _style(self, canvas: Canvas, names: entities.RunEntities) -> None:
         if not self._styled:

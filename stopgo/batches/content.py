@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings, recorded_values
 
@@ -69,12 +70,6 @@ def reading_key(path: Path, settings: Settings) -> str | None:
     return digest(
         (path.stem, file_digest(path), options_of(settings), settings.targets, schedule, computed_by())
     )
-
-
-def file_digest(path: Path) -> str:
-    """sha256 of a file's bytes, hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @cache

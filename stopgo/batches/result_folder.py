@@ -6,11 +6,11 @@ from pathlib import Path
 
 import msgspec
 
-from stopgo.batches.content import file_digest
 from stopgo.batches.entry_content import ENTRY_FILE, EntryContent
 from stopgo.batches.store import Result
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import replacing, write_atomic
+from stopgo.mission.files.given_file import file_digest
 from stopgo.planner.commands.outputs import NAMES, set_aside_file
 
 LAST = "mission"

@@ -29,9 +29,9 @@ from typing import Any
 
 import msgspec
 
-from stopgo.batches.content import file_digest
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.given_file import file_digest
 
 RESULT = "result.json"
 BEAT_S = 2.0

@@ -16,7 +16,6 @@ from stopgo.batches.content import (
     TARGETS,
     ContentParts,
     computed_by,
-    file_digest,
     floor_parts,
     plan_key,
     reading_key,
@@ -26,6 +25,7 @@ from stopgo.batches.entries import ModelStorey
 from stopgo.batches.entry_content import EntryContent
 from stopgo.batches.store import Result, ResultStore
 from stopgo.mission.errors import StopgoError
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.settings import Settings, recorded_values
 
 LOG = "plan.log"

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
+from stopgo.mission.floor.polylines import FloorLines
 from stopgo.recordings.catalog.run_index import index_of
-from stopgo.site.page_drawing import FloorShapes, mission_drawing_json
+from stopgo.site.page_drawing import mission_drawing_json
 
 if TYPE_CHECKING:
     from stopgo.recordings.embedded.reading import Recording
@@ -98,11 +99,10 @@ def _with_plan(folder: Path, mission: Mission) -> KnownMission:
         return KnownMission(mission, None, str(error))
 
 
-def _shapes(recording: Recording | None) -> FloorShapes | None:
+def _shapes(recording: Recording | None) -> FloorLines | None:
     if recording is None:
         return None
     from stopgo.recordings.embedded.floor_lines import floor_lines
     from stopgo.recordings.embedded.plan import origin_in
 
-    lines = floor_lines(recording.values, origin_in(recording))
-    return None if lines is None else FloorShapes(lines.outline, lines.kinds, lines.names, lines.openings)
+    return floor_lines(recording.values, origin_in(recording))

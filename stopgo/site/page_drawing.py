@@ -6,7 +6,7 @@ Targets are grouped by the stops that see them, so that the page colours them as
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,50 +14,27 @@ import numpy as np
 
 from stopgo.mission.document import Mission
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.geometry import BoolArray, FloatArray, Polygon, bounds
+from stopgo.mission.floor.polylines import FloorLines, lines_of
+from stopgo.mission.geometry import FloatArray, Polygon, bounds, is_closed
 from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.settings.element_kinds import kind_of
-from stopgo.mission.stages.covered_intervals import runs_of
+from stopgo.mission.stages.covered_intervals import lines_along
 from stopgo.mission.stages.sight import Sight
 
 MARGIN = 0.02
 MOST_FINDINGS = 200
 
 
-@dataclass(frozen=True, eq=False)
-class FloorShapes:
-    """Lines of a floor, each (n, 2) in the drawing's metres; an area's line ends where it begins."""
-
-    outline: tuple[FloatArray, ...]
-    kinds: Mapping[str, tuple[FloatArray, ...]]
-    names: tuple[tuple[str, float, float], ...]
-    openings: tuple[FloatArray, ...] = ()
-
-
-def shapes_of(floor: FloorPlan) -> FloorShapes:
+def shapes_of(floor: FloorPlan) -> FloorLines:
     """Return the lines of a floor that was read from a file."""
+    return lines_of(floor, _name_point)
+
+
+def _name_point(polygon: Polygon) -> tuple[float, float]:
     import shapely
 
-    kinds: dict[str, list[FloatArray]] = {}
-    for element in floor.elements:
-        lines = [line for solid in element.solids for line in _rings(solid)]
-        kinds.setdefault(element.kind, []).extend([*lines, *element.lines])
-    names = []
-    for room in floor.rooms:
-        largest = max(room.polygons, key=lambda part: part.area, default=None)
-        if largest is not None:
-            inside = shapely.Polygon(largest.exterior, largest.holes).representative_point()
-            names.append((room.label, inside.x, inside.y))
-    return FloorShapes(
-        outline=tuple(line for part in floor.outline for line in _rings(part)),
-        kinds={kind: tuple(lines) for kind, lines in kinds.items()},
-        names=tuple(names),
-        openings=tuple(opening.line for opening in floor.openings),
-    )
-
-
-def _rings(polygon: Polygon) -> list[FloatArray]:
-    return [np.concatenate([ring, ring[:1]]) for ring in (polygon.exterior, *polygon.holes) if len(ring)]
+    inside = shapely.Polygon(polygon.exterior, polygon.holes).representative_point()
+    return inside.x, inside.y
 
 
 @dataclass(frozen=True)
@@ -83,13 +60,13 @@ class PageFrame:
         return "".join(self._line(np.asarray(line, dtype=np.float64)) for line in lines if len(line) > 1)
 
     def _line(self, line: FloatArray) -> str:
-        closed = len(line) > 2 and bool(np.allclose(line[0], line[-1]))
+        closed = is_closed(line)
         points = np.round((line - (self.left, self.top)) * (1.0, -1.0), 2) + 0.0
         text = "L".join(f"{x:g} {y:g}" for x, y in (points[:-1] if closed else points).tolist())
         return f"M{text}{'Z' if closed else ''}"
 
 
-def floor_drawing_json(shapes: FloorShapes, findings: Sequence[Finding] = ()) -> dict[str, Any]:
+def floor_drawing_json(shapes: FloorLines, findings: Sequence[Finding] = ()) -> dict[str, Any]:
     """Return a floor without a plan, with the findings of reading it."""
     frame = PageFrame.around(_all_lines(shapes))
     return {"frame": frame.as_json(), **_floor(shapes, frame), "findings": findings_json(findings)}
@@ -104,7 +81,7 @@ def findings_json(findings: Sequence[Finding]) -> list[dict[str, Any]]:
 
 
 def mission_drawing_json(
-    mission: Mission, shapes: FloorShapes | None = None, sight: Sight | None = None
+    mission: Mission, shapes: FloorLines | None = None, sight: Sight | None = None
 ) -> dict[str, Any]:
     """Return a mission, on its floor and with its targets as far as they are known."""
     legs = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
@@ -129,16 +106,16 @@ def mission_drawing_json(
     return drawn
 
 
-def _all_lines(shapes: FloorShapes) -> list[FloatArray]:
+def _all_lines(shapes: FloorLines) -> list[FloatArray]:
     return [*shapes.outline, *(line for lines in shapes.kinds.values() for line in lines)]
 
 
-def _floor(shapes: FloorShapes, frame: PageFrame) -> dict[str, Any]:
+def _floor(shapes: FloorLines, frame: PageFrame) -> dict[str, Any]:
     layers = [{"kind": "floor", "d": frame.path(shapes.outline), "fill": "", "stroke": ""}]
     for kind, lines in shapes.kinds.items():
         look = kind_of(kind)
-        areas = [line for line in lines if len(line) > 2 and np.allclose(line[0], line[-1])]
-        open_lines = [line for line in lines if not (len(line) > 2 and np.allclose(line[0], line[-1]))]
+        areas = [line for line in lines if is_closed(line)]
+        open_lines = [line for line in lines if not is_closed(line)]
         layers.append({"kind": kind, "d": frame.path(areas), "fill": look.fill, "stroke": look.colour})
         layers.append({"kind": kind, "d": frame.path(open_lines), "fill": "none", "stroke": look.colour})
     layers.append({"kind": "openings", "d": frame.path(shapes.openings), "fill": "none", "stroke": ""})
@@ -161,16 +138,9 @@ def _targets(sight: Sight, mission: Mission, frame: PageFrame) -> list[dict[str,
     made = []
     for number, unit in enumerate(first.tolist()):
         stops = [one for one, sees in zip(ids, seen[:, unit].tolist(), strict=True) if sees]
+        lines = lines_along(sight.targets, group.reshape(-1) == number)
         made.append({
-            "d": _along(sight, group.reshape(-1) == number, frame), "stops": stops,
+            "d": frame.path(lines), "stops": stops,
             "need": int(asked[unit]), "visible": bool(sight.totals.visible[unit]),
         })  # fmt: skip
     return made
-
-
-def _along(sight: Sight, units: BoolArray, frame: PageFrame) -> str:
-    """Return the path of the units in a mask (n,)."""
-    runs = runs_of(sight.targets, units)
-    a, b = sight.targets.a[runs.segment], sight.targets.b[runs.segment]
-    ends = (a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None])
-    return frame.path(np.stack(ends, axis=1))

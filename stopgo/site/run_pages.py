@@ -14,6 +14,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.file_name import file_name
+from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.files.mission_json import read
 from stopgo.recordings.catalog.run_index import RunIndex, index_of, run_cells, stamp_of
 from stopgo.recordings.page import report_html
@@ -183,12 +184,10 @@ class RunRoom:
         for name in self._folder.floors():
             path = self._folder.root / name
             try:
-                with path.open("rb") as file:
-                    digest = hashlib.file_digest(file, "sha256").hexdigest()
+                if file_digest(path) == mission.origin.floor_digest:
+                    return path
             except OSError:
                 continue
-            if digest == mission.origin.floor_digest:
-                return path
         return None
 
     def _index(self) -> RunIndex:

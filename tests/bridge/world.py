@@ -22,7 +22,8 @@ from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.runner import state_report
-from stopgo.bridge.robot.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
+from stopgo.bridge.robot.simulated_faults import NO_FAULTS, RobotFaults
+from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner, Wear
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import (
     Frame,
@@ -83,7 +84,7 @@ class Field:
     wear: Wear = EXACT
     keep: Path | None = None
     record: Path | None = None
-    faults: Faults = NO_FAULTS
+    faults: RobotFaults = NO_FAULTS
     revisions: RevisionPolicy = "next-stop"
     ids: Any = field(default_factory=count)
 

@@ -19,7 +19,7 @@ from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.bridge.robot.program import clocks
 from stopgo.bridge.robot.robot_hardware import pose_of
-from stopgo.bridge.robot.simulator import Fault, Faults
+from stopgo.bridge.robot.simulated_faults import Fault, Faults
 from stopgo.mission.run.events import Aborted, Finished, Scanned, Skipped, Started
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size

@@ -10,7 +10,7 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.robot.program import RobotOptions, robot_on
 from stopgo.bridge.robot.robot_hardware import SimulatedBody
-from stopgo.bridge.robot.simulator import Faults, read_fault
+from stopgo.bridge.robot.simulated_faults import read_faults
 from stopgo.site.web_server import SiteOptions, serving_site
 from tests.ports import free_port
 from tests.site.chromium import Browser, Tab
@@ -35,7 +35,7 @@ class BrowserWorld:
 
     def add_robot(self, name: str, speed_up: float, *faults: str) -> None:
         state = self._place / name
-        body = SimulatedBody(state, faults=Faults(tuple(map(read_fault, faults))))
+        body = SimulatedBody(state, faults=read_faults(faults))
         options = RobotOptions(name=name, listen="", state=state, body=body, speed_up=speed_up)
         self._robots.enter_context(robot_on(self.board.link(), KeyExpressions(name), options))
 

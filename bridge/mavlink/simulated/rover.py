@@ -9,9 +9,10 @@ from stopgo.bridge.mavlink.simulated.exact_drive import ExactDrive
 from stopgo.bridge.mavlink.simulated.real_drive import RealDrive
 from stopgo.bridge.mavlink.simulated.steering import Course
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.robot.map_frame import turned
 from stopgo.mission.document import Point
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, from_geodetic, from_steps, to_geodetic
-from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin, Transform
 from stopgo.mission.run.events import Pose
 
 STANDING = Pose(x=0.0, y=0.0, heading=math.pi / 2)
@@ -110,13 +111,7 @@ class Rover:
 
 def to_east(pose: Pose, heading_deg: float) -> Pose:
     """A pose of a site whose +y bears `heading_deg`, with x to the east and y to the north."""
-    angle = -math.radians(heading_deg)
-    cos, sin = math.cos(angle), math.sin(angle)
-    return Pose(
-        x=cos * pose.x - sin * pose.y,
-        y=sin * pose.x + cos * pose.y,
-        heading=math.remainder(pose.heading + angle, math.tau),
-    )
+    return turned(pose, Transform(x=0.0, y=0.0, heading=-math.radians(heading_deg)))
 
 
 def bearing(heading: float) -> float:

@@ -23,9 +23,10 @@ from stopgo.bridge.mavlink.simulated.streams import Streams
 from stopgo.bridge.mavlink.simulated.transfers import Transfers
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle_clock import VehicleClock
-from stopgo.bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, Mishaps, VehicleFaults
+from stopgo.bridge.mavlink.simulated.vehicle_faults import Mishaps, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_store import MISSION, Store
 from stopgo.bridge.mavlink.vehicle_link.wire import Who, sender
+from stopgo.bridge.robot.simulated_faults import NO_FAULTS
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Autopilot, ModeName
 from stopgo.mission.mavlink.enums import MessageId

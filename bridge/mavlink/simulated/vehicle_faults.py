@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Literal
 
-import msgspec
-
-from stopgo.mission.errors import InputError
+from stopgo.bridge.robot.simulated_faults import Fault, Faults, read_fault
 
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
@@ -25,14 +23,8 @@ CAUSES = range(6)
 """Causes of a failsafe, in the order of `Autopilot.failsafe_texts`."""
 
 
-@dataclass(frozen=True)
-class VehicleFault:
-    """One fault; `FAULTS` explains `at` and `amount`."""
-
-    kind: VehicleFaultKind
-    at: int
-    amount: float = 0.0
-
+VehicleFault = Fault[VehicleFaultKind]
+VehicleFaults = Faults[VehicleFaultKind]
 
 FAULTS: dict[VehicleFaultKind, str] = {
     "loss": "N percent of the frames are lost in each direction; AMOUNT is the seed",
@@ -61,21 +53,6 @@ FAULTS: dict[VehicleFaultKind, str] = {
 }
 
 
-@dataclass(frozen=True)
-class VehicleFaults:
-    all: tuple[VehicleFault, ...] = ()
-
-    def due(self, kind: VehicleFaultKind, at: int) -> VehicleFault | None:
-        return next((fault for fault in self.all if (fault.kind, fault.at) == (kind, at)), None)
-
-    def any(self, kind: VehicleFaultKind) -> VehicleFault | None:
-        """The first fault of a kind, whenever it is due."""
-        return next((fault for fault in self.all if fault.kind == kind), None)
-
-
-NO_FAULTS = VehicleFaults()
-
-
 class Mishaps:
     """The faults of one vehicle, and which of them have happened."""
 
@@ -102,25 +79,16 @@ class Mishaps:
         return came
 
 
-def read_vehicle_fault(text: str) -> VehicleFault:
-    """A fault from KIND@N or KIND@N=AMOUNT, such as `beside@3=0.4`."""
-    kind, _, rest = text.partition("@")
-    at, _, amount = rest.partition("=")
-    try:
-        fault = VehicleFault(msgspec.convert(kind, VehicleFaultKind), int(at), float(amount or 0.0))
-    except (ValueError, msgspec.ValidationError):
-        kinds = ", ".join(FAULTS)
-        raise InputError(f"--fault {text}: write it KIND@N or KIND@N=AMOUNT, KIND of {kinds}") from None
-    if not (fault.at >= 0 and 0 <= fault.amount < 1e9):
-        raise InputError(f"--fault {text}: N and AMOUNT must be 0 or more")
-    if (wrong := _nonsense(fault)) is not None:
-        raise InputError(f"--fault {text}: {wrong}")
-    return fault
+def read_vehicle_faults(texts: Iterable[str]) -> VehicleFaults:
+    """Read faults of a vehicle."""
+    return Faults(tuple(read_fault(text, FAULTS, _nonsense) for text in texts))
 
 
 def _nonsense(fault: VehicleFault) -> str | None:
     """Rule that a fault breaks, as it could not happen; `None` if it breaks none."""
     kind, at, amount = fault.kind, fault.at, fault.amount
+    if not (at >= 0 and 0 <= amount < 1e9):
+        return "N and AMOUNT must be 0 or more"
     percent = at > 100, f"N is a percentage, 0 to 100, such as {kind}@20"
     counted = at == 0, f"N counts from 1: {kind}@1 is the first"
     metres = amount == 0, f"AMOUNT is metres, more than 0, such as {kind}@{at}=0.4"

@@ -17,7 +17,7 @@ from stopgo.bridge.mavlink.simulated.profiles import profile_named
 from stopgo.bridge.mavlink.simulated.rover import to_east
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_faults import read_vehicle_faults
 from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who, Wire, read_link
@@ -147,7 +147,7 @@ def setup_of(options: VehicleOptions) -> VehicleSetup:
         state=options.state,
         origin=level,
         at=None if options.at is None else to_east(options.at, heading),
-        faults=VehicleFaults(tuple(read_vehicle_fault(text) for text in options.faults)),
+        faults=read_vehicle_faults(options.faults),
         seed=options.seed,
         changed=dict(_read_parameter(autopilot.name, text) for text in options.parameters),
     )

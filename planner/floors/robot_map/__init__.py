@@ -7,7 +7,6 @@ The coordinates are those of the map, so that stops are where the robot takes th
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from scipy import ndimage
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
-from stopgo.mission.geometry import bounds, frozen
+from stopgo.mission.geometry import frozen
 from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.linework import completed
 from stopgo.planner.floors.parts import in_order, parts_of
@@ -32,7 +31,7 @@ from stopgo.planner.floors.robot_map.description import (
     read_description,
 )
 from stopgo.planner.floors.robot_map.grey_picture import read_picture
-from stopgo.planner.floors.survey import FloorChoice, Survey
+from stopgo.planner.floors.survey import Survey, choice_of
 
 LEAST_WALL = 0.5
 """A connected group of occupied cells smaller than this, in metres, is an obstacle and not a wall."""
@@ -87,22 +86,13 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
     description, picture = _opened(file)
     floor = read(file, options)
     cells = description.cells(read_picture(picture, name=description.image))
-    kinds = (*(item.kind for item in floor.elements), *(f"{item.kind}s" for item in floor.openings))
-    choice = FloorChoice(
-        name=floor.name,
-        option="",
-        area_m2=floor.area,
-        bounds=bounds([part.exterior for part in floor.outline]),
-        elements={"rooms": len(floor.rooms), **Counter(kinds)},
-        chosen=True,
-    )
     unknown = int(np.count_nonzero(cells == UNKNOWN))
     return Survey(
         file=file.path.name,
         kind=f"robot map, {cells.shape[1]} x {cells.shape[0]} cells of {description.resolution:g} m",
         digest=file.digest,
         units="metre, in the map's own frame",
-        floors=(choice,),
+        floors=(choice_of(floor),),
         inferred=tuple(item.message for item in floor.findings if item.code.startswith("inferred_")),
         ignored=(f"{unknown} unknown cells ({unknown / cells.size:.0%}) are not floor",),
         findings=tuple(item for item in floor.findings if not item.code.startswith("inferred_")),

@@ -16,7 +16,7 @@ import pytest
 from stopgo.bridge.mavlink.auto.logbook import logbook, remember
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_faults import read_vehicle_faults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import reached
@@ -68,7 +68,7 @@ def vehicle(
     key: bytes | None = None,
 ) -> Iterator[Url]:
     port = free_port()
-    made = VehicleFaults(tuple(read_vehicle_fault(text) for text in faults))
+    made = read_vehicle_faults(faults)
     setup = VehicleSetup(PROFILES[profile], origin=origin, faults=made)
     with vehicle_on(Url("udpin", "127.0.0.1", port), setup, signing_key=key):
         yield Url("udpout", "127.0.0.1", port)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from stopgo.bridge.robot.simulator import Fault, Faults
+from stopgo.bridge.robot.simulated_faults import Fault, Faults
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.battery import battery_shortfall, time_left

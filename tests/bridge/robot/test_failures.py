@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from stopgo.bridge.robot.base import Rest
-from stopgo.bridge.robot.simulator import Fault, Faults, read_fault
+from stopgo.bridge.robot.simulated_faults import Fault, Faults, read_faults
 from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Pose, Scanned
@@ -372,5 +372,5 @@ def test_a_full_disk_rejects_a_mission() -> None:
 @pytest.mark.parametrize("text", ["slip", "slip@x", "melt@1", "slip@1=much", "@1", "slip@1=nan", "slip@-1"])
 def test_a_fault_that_makes_no_sense_is_named(text: str) -> None:
     with pytest.raises(InputError, match="--fault"):
-        read_fault(text)
-    assert read_fault("slip@2=0.2") == Fault("slip", 2, 0.2)
+        read_faults([text])
+    assert read_faults(["slip@2=0.2"]) == Faults((Fault("slip", 2, 0.2),))

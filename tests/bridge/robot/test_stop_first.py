@@ -16,7 +16,7 @@ from stopgo.bridge.link.protocol import Info, Watching, decode, encode
 from stopgo.bridge.link.zenoh_link import connecting, listening
 from stopgo.bridge.robot.agent import Agent, on_link
 from stopgo.bridge.robot.lock_waits import LockWaits
-from stopgo.bridge.robot.simulator import Fault, Faults
+from stopgo.bridge.robot.simulated_faults import Fault, Faults
 from stopgo.bridge.robot.storage_watchdog import ANSWERS_WITHIN_S, LATE, LOOK_EVERY_S, StorageWatchdog
 from stopgo.bridge.robot.work_control import WorkControl
 from stopgo.bridge.station.station import Station

@@ -13,11 +13,12 @@ from stopgo.mission.files.floor_drawing import building
 from stopgo.mission.files.floor_svg import floor_svg
 from stopgo.mission.files.layered_dxf import layered_dxf
 from stopgo.mission.files.sheet import SheetContents, fit
+from stopgo.mission.floor.polylines import lines_of
 from stopgo.mission.settings.element_kinds import KINDS, Kind
 from stopgo.recordings.drawing import palette
 from stopgo.recordings.drawing.blueprint import BACKGROUND
+from stopgo.recordings.drawing.strokes import name_point
 from stopgo.recordings.page.floor_picture import plan_picture
-from stopgo.recordings.page.proof_page import lines_of
 from stopgo.recordings.page.subject import ReportSubject
 from tests.mission.worlds import room_mission, room_route
 from tests.recordings.colours import EYES, contrast, distance
@@ -31,7 +32,7 @@ def test_all_writers_draw_a_kind_in_its_colour(kind: Kind) -> None:
     elements = tuple(replace(item, kind=kind.name) for item in space.floor.elements)
     floor = replace(space.floor, elements=elements)
     plan = "".join(building(replace(space, floor=floor), fit(SheetContents((0, 0, 8, 4), 8.0, 20, 20, 0))))
-    page = plan_picture(ReportSubject((room_mission(),), floor=lines_of(floor)), None)
+    page = plan_picture(ReportSubject((room_mission(),), floor=lines_of(floor, name_point)), None)
     for picture in (plan, floor_svg([floor]).decode(), page):
         assert f'stroke="{kind.colour}"' in picture
         assert f'fill="{kind.fill}"' in picture

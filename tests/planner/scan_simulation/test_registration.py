@@ -1,18 +1,17 @@
-"""Registration of two simulated scans: the coarse stage reaches far, and what it finds is doubted."""
+"""Registration of two simulated scans: the heading is found among those within its error."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 
 import numpy as np
 import pytest
 
 from stopgo.mission.geometry import FloatArray, frozen
-from stopgo.planner.scan_simulation import registration
-from stopgo.planner.scan_simulation.registration import STAGES, OrientedCloud, _CloudPair, _shift
+from stopgo.mission.proof.plan_proof import Simulation, within_tolerance
+from stopgo.planner.scan_simulation.registration import OrientedCloud, _CloudPair, _shift, _turned, surface_of
 
-FAR = 0.64
-"""Metres by which a pose 2° and 5 cm off moves points 17 m away."""
+SIMULATION = Simulation(range_m=20.0, ceiling_m=2.5)
 
 
 def walls(at: FloatArray) -> OrientedCloud:
@@ -24,39 +23,51 @@ def walls(at: FloatArray) -> OrientedCloud:
     return OrientedCloud(frozen(points - at), frozen(normals))
 
 
+def columns(at: FloatArray) -> OrientedCloud:
+    """What a scanner at `at` (3,) sees of a row of square columns of 0.4 m, 0.9 m apart and 18 m away."""
+    along, height = (
+        part.ravel() for part in np.meshgrid(np.arange(-0.2, 0.2, 0.05), np.arange(-1, 1.5, 0.05))
+    )
+    found = []
+    for y in np.arange(-3, 3.5, 0.9):
+        for facing in (np.array([-1.0, 0.0]), np.array([0.0, 1.0]), np.array([0.0, -1.0])):
+            aside = np.array([-facing[1], facing[0]])
+            xy = np.array([18.0, y]) + 0.2 * facing + along[:, None] * aside
+            if ((at[:2] - xy[0]) @ facing) > 0:
+                found.append((np.column_stack([xy, height]), np.tile([*facing, 0.0], (len(along), 1))))
+    points, normals = (np.concatenate(part) for part in zip(*found, strict=True))
+    return OrientedCloud(frozen(points - at), frozen(normals))
+
+
 @pytest.fixture
 def two() -> _CloudPair:
     one, other = np.array([3.0, 2.0, 0.0]), np.array([1.0, 3.0, 0.0])
     return _CloudPair(walls(one), walls(other), _shift(other - one))
 
 
-def aligned(
-    two: _CloudPair, monkeypatch: pytest.MonkeyPatch, *, coarse: FloatArray, fine: FloatArray
-) -> tuple[FloatArray, int]:
-    """The pose that counts, of one found with a coarse stage and one without; and how many were sought."""
-    sought: list[int] = []
-
-    def found(self: _CloudPair, there: FloatArray, stages: Sequence[object]) -> FloatArray:
-        sought.append(len(stages))
-        return coarse if len(stages) > len(STAGES) else fine
-
-    monkeypatch.setattr(registration._CloudPair, "_aligned", found)
-    return two.aligned(two.truth, moved_m=FAR), len(sought)
-
-
-def test_of_two_poses_the_one_that_brings_more_points_together_counts(
-    two: _CloudPair, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("degrees", [-2.0, -0.7, 0.0, 1.3, 2.0])
+def test_the_heading_within_its_error_that_brings_most_points_together_begins(
+    two: _CloudPair, degrees: float
 ) -> None:
-    wrong = _shift(np.array([0.66, 0.3, 0.0])) @ two.truth
-    found, _ = aligned(two, monkeypatch, coarse=wrong, fine=two.truth)
-    assert two.error(found) == (0.0, 0.0)
-    found, _ = aligned(two, monkeypatch, coarse=two.truth, fine=wrong)
-    assert two.error(found) == (0.0, 0.0)
+    """The farthest points lie 3 m away: headings 1° apart move them by less than 0.1 m."""
+    start = _shift(np.array([0.03, -0.04, 0.0])) @ two.truth @ _turned(math.radians(degrees))
+    _, off_deg = two.error(two._headed(start, SIMULATION))
+    assert off_deg <= min(abs(degrees), 1.0) + 1e-9
 
 
-def test_a_pose_that_brings_most_points_together_is_not_doubted(
-    two: _CloudPair, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert aligned(two, monkeypatch, coarse=two.truth, fine=two.truth)[1] == 1
-    far = _shift(np.array([3.0, 3.0, 0.0])) @ two.truth
-    assert aligned(two, monkeypatch, coarse=far, fine=two.truth)[1] == 2
+@pytest.mark.parametrize("shift", [(0.05, 0.0), (-0.03, 0.04)])
+@pytest.mark.parametrize("degrees", [-2.0, 2.0])
+def test_no_column_is_taken_for_the_next_one_of_a_row(shift: tuple[float, float], degrees: float) -> None:
+    """2° move a column 18 m away by more than its own width: the nearest surface is that of another side."""
+    one, other = np.array([0.0, 0.0, 0.0]), np.array([2.0, 0.5, 0.0])
+    two = _CloudPair(columns(one), columns(other), _shift(other - one))
+    start = _shift(np.array([*shift, 0.0])) @ two.truth @ _turned(math.radians(degrees))
+    assert within_tolerance(*two.error(two.aligned(start, SIMULATION)))
+
+
+def test_level_surfaces_are_thinned_and_upright_ones_are_not() -> None:
+    across = np.stack(np.meshgrid(np.arange(-3, 3, 0.02), np.arange(-3, 3, 0.02)), axis=-1).reshape(-1, 2)
+    ground = np.column_stack([across, np.full(len(across), -1.3)])
+    wall = np.column_stack([np.full(len(across), 3.0), across[:, 0], across[:, 1] / 3])
+    surface = surface_of(np.concatenate([ground, wall]))
+    assert surface.upright.sum() > 3 * (~surface.upright).sum() > 0

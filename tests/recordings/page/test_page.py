@@ -15,10 +15,10 @@ from stopgo.command_line import main
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.document import Mission, with_digest
+from stopgo.mission.floor.polylines import FloorLines
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import Finished, Paused, Resumed, Skipped
 from stopgo.mission.run.run_log import Alignment
-from stopgo.recordings.embedded.floor_lines import FloorLines
 from stopgo.recordings.page import report_html
 from stopgo.recordings.page.floor_picture import plan_picture
 from stopgo.recordings.page.from_recordings import subject_of

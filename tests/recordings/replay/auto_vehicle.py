@@ -14,7 +14,7 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import Vehicle, VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_faults import read_vehicle_faults
 from stopgo.mission.document import Mission
 from stopgo.mission.files import mission_json
 from stopgo.mission.frames.transform import SiteOrigin
@@ -61,7 +61,7 @@ def mission(**details: Any) -> Mission:
 
 def rover_setting(folder: Path, faults: tuple[str, ...], autopilot: str = "ardupilot") -> VehicleSetup:
     start = Pose(x=0.0, y=0.0, heading=0.0)
-    found = VehicleFaults(tuple(map(read_vehicle_fault, faults)))
+    found = read_vehicle_faults(faults)
     return VehicleSetup(PROFILES[autopilot], folder, ORIGIN, start, found, seed=1)
 
 

@@ -17,7 +17,8 @@ import shapely
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.base import Outcome
 from stopgo.bridge.robot.journal_file import open_journal
-from stopgo.bridge.robot.simulator import SHAKE_M, Fault, Faults, SimulatedBase, Wear
+from stopgo.bridge.robot.simulated_faults import Fault, Faults
+from stopgo.bridge.robot.simulator import SHAKE_M, SimulatedBase, Wear
 from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.document import Mission, Point, Scan, Stop
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, RevisionTaken

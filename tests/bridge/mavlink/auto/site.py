@@ -17,7 +17,7 @@ from stopgo.bridge.mavlink.auto.vehicle_commands import Consent
 from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_faults import read_vehicle_faults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.mavlink.vehicle_link.url import Url
@@ -81,7 +81,7 @@ class Site:
     @contextmanager
     def up(self) -> Iterator[None]:
         """The vehicle is on."""
-        made = VehicleFaults(tuple(read_vehicle_fault(text) for text in self.faults))
+        made = read_vehicle_faults(self.faults)
         setup = VehicleSetup(
             PROFILES[self.profile], self.folder / "vehicle", self.origin, self.at, made, self.seed,
             {**TUNED.get(self.profile, {}), **self.changed},

@@ -17,12 +17,13 @@ from stopgo.bridge.mavlink.driving.autopilot_body import AutopilotBody
 from stopgo.bridge.mavlink.simulated.profiles import profile_named
 from stopgo.bridge.mavlink.simulated.rover import to_east
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, VehicleFaults
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.program import RobotOptions, robot_on
+from stopgo.bridge.robot.simulated_faults import NO_FAULTS
 from stopgo.bridge.station.follow import Report
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, Scan, with_digest

@@ -12,7 +12,7 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_faults import read_vehicle_faults
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.wire import Who
 from stopgo.mission.frames.transform import SiteOrigin
@@ -59,8 +59,8 @@ class Bench:
     ) -> None:  # fmt: skip
         self.clock, self.wall = SimulatedClock(), SimulatedClock()
         self.all: list[Message] = []
-        made = tuple(read_vehicle_fault(text) for text in faults)
-        setup = VehicleSetup(PROFILES[profile], state, origin, at, VehicleFaults(made), seed, changed)
+        made = read_vehicle_faults(faults)
+        setup = VehicleSetup(PROFILES[profile], state, origin, at, made, seed, changed)
         self.vehicle = complete_vehicle(setup, clock=self.clock, wall=self.wall, send=self._hear)
         self.first = 1 if self.vehicle.autopilot.home_first else 0
         self._wires = {who: dialect.MAVLink(None, *who) for who in (STATION, OTHER)}

@@ -11,7 +11,7 @@ import pytest
 
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import VehicleSetup
-from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_faults import read_vehicle_faults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.url import Url
@@ -44,7 +44,7 @@ def station(port: int, *, way: str = "udpin") -> Iterator[Any]:
 def vehicle(profile: str, *faults: str) -> Iterator[int]:
     """A vehicle that sends to the port it gives."""
     port = free_port()
-    made = VehicleFaults(tuple(read_vehicle_fault(text) for text in faults))
+    made = read_vehicle_faults(faults)
     setup = VehicleSetup(PROFILES[profile], origin=ORIGIN, faults=made)
     with vehicle_on(Url("udpout", "127.0.0.1", port), setup, speed_up=SPEED_UP):
         yield port

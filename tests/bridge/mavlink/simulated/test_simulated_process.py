@@ -22,7 +22,7 @@ from stopgo.bridge.mavlink.simulated.vehicle_faults import (
     FAULTS,
     VehicleFault,
     VehicleFaults,
-    read_vehicle_fault,
+    read_vehicle_faults,
 )
 from stopgo.bridge.mavlink.simulated.vehicle_process import VehicleOptions, setup_of, vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
@@ -235,8 +235,8 @@ def test_a_vehicle_that_should_sign_and_does_not() -> None:
 def test_an_upload_over_a_line_that_loses_doubles_and_delays(profile: str) -> None:
     """The station sends COUNT again until it is heard, answers requests, and waits for an ACCEPTED."""
     port = free_port()
-    faults = tuple(read_vehicle_fault(text) for text in ("loss@5", "duplicates@20=3", "jitter@20"))
-    setup = VehicleSetup(PROFILES[profile], faults=VehicleFaults(faults))
+    faults = read_vehicle_faults(["loss@5", "duplicates@20=3", "jitter@20"])
+    setup = VehicleSetup(PROFILES[profile], faults=faults)
     items = [delay(float(number)) for number in range(10)]
     with vehicle_on(here(port), setup), wire(there(port)) as station:
         assert upload(station, items, home=profile == "ardupilot")
@@ -263,7 +263,7 @@ class Loop:
 
 @pytest.mark.parametrize(("fault", "least", "most"), [("loss@30=1", 50, 85), ("duplicates@30=1", 115, 145)])
 def test_frames_are_lost_and_doubled_by_chance_and_by_seed(fault: str, least: int, most: int) -> None:
-    faults = VehicleFaults((read_vehicle_fault(fault),))
+    faults = read_vehicle_faults([fault])
     loops = [Loop(), Loop()]
     lines = [on_line(loop, faults) for loop in loops]
     read = [line.read(0.0) for line in lines]
@@ -291,11 +291,11 @@ def test_a_line_without_faults_is_the_line() -> None:
 )  # fmt: skip
 def test_a_fault_that_could_not_happen_is_refused_with_one_that_could(text: str, said: str) -> None:
     with pytest.raises(InputError, match=f"{text}: .*{said}.*@"):
-        read_vehicle_fault(text)
+        read_vehicle_faults([text])
 
 
 def test_every_fault_can_be_written_and_is_in_the_guide() -> None:
-    assert {read_vehicle_fault(f"{kind}@1=2").kind for kind in FAULTS} == set(FAULTS)
+    assert [fault.kind for fault in read_vehicle_faults(f"{kind}@1=2" for kind in FAULTS).all] == list(FAULTS)
     guide = (Path(__file__).parents[4] / "docs" / "how-to" / "simulated-vehicle.md").read_text(
         encoding="utf-8"
     )
