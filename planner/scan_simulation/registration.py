@@ -89,8 +89,12 @@ class OrientedCloud:
         return np.hstack([self.points @ turn + there[:3, 3], TURNED_M * self.normals @ turn])
 
 
-def surface_of(cloud: FloatArray) -> OrientedCloud:
-    """A scan's cloud (n, 3), thinned, on level surfaces more than on upright ones, with its normals."""
+def surface_of(cloud: FloatArray, simulation: Simulation) -> OrientedCloud:
+    """A scan's cloud (n, 3), thinned, with its normals.
+
+    Level surfaces are thinned more where registration starts from a pose. Without one, the outlines of the
+    floor and the ceiling help to find it.
+    """
     import small_gicp
 
     if len(cloud) <= NEIGHBOURS:
@@ -101,6 +105,8 @@ def surface_of(cloud: FloatArray) -> OrientedCloud:
     points, normals = thin.points()[:, :3], thin.normals()[:, :3]
     towards = -np.sign(np.einsum("ij,ij->i", points, normals))
     whole = OrientedCloud(frozen(points), frozen(normals * towards[:, None]))
+    if not simulation.poses:
+        return whole
     kept = whole.upright.copy()
     kept[np.flatnonzero(~kept)[::LEVEL_FEW]] = True
     return whole.one_of(1, kept)

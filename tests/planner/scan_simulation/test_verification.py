@@ -203,7 +203,7 @@ def clouds_of(
 
 
 def pair_of(floor: FloorPlan, a: tuple[float, float], b: tuple[float, float], simulation: Simulation):
-    surfaces = [surface_of(cloud) for cloud in clouds_of(floor, [a, b], simulation)]
+    surfaces = [surface_of(cloud, simulation) for cloud in clouds_of(floor, [a, b], simulation)]
     found = registered(("a", "b"), np.array([(*a, 1.3), (*b, 1.3)]), surfaces, simulation)
     return [item.pair for item in found]
 
@@ -247,7 +247,7 @@ def test_a_pair_starts_along_its_weakest_direction_with_every_seed(seed: int) ->
     """A corridor with one step in it: whatever the seed, two starts are 5 cm off along the corridor."""
     simulation = replace(COARSEST, range_m=4.0, joining_m=4.0, seed=seed)
     places = [(13.0, 1.0), (15.0, 1.0)]
-    one, other = (surface_of(cloud) for cloud in clouds_of(hall(30, 2), places, simulation))
+    one, other = (surface_of(cloud, simulation) for cloud in clouds_of(hall(30, 2), places, simulation))
     two = _CloudPair(one, other, _shift(np.array([2.0, 0.0, 0.0])))
     along = [start[0, 3] - 2.0 for start in _starts(two, simulation, (0, 1))]
     assert sorted(np.abs(along))[-2:] == pytest.approx([0.05, 0.05], abs=1e-3)
