@@ -9,7 +9,18 @@ import numpy as np
 
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.sheet import PaperSheet
-from stopgo.mission.files.svg import circle, group, line, line_data, path, polygon, rect, ring_data, text
+from stopgo.mission.files.svg import (
+    circle,
+    group,
+    line,
+    line_data,
+    path,
+    polygon,
+    rect,
+    ring_data,
+    text,
+    text_width,
+)
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages.network import MagnifiedErrors, magnified_errors, network_of, predicted_error_m
 
@@ -72,8 +83,9 @@ def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
     if (weakest := found.weakest) is not None:
         x, y = np.mean([at[weakest.a], at[weakest.b]], axis=0).tolist()
         error = f"{1000 * predicted_error_m(weakest.hold_m):.1f} mm"
-        held = text(x, y + 0.75, error, size=1.9, fill=BRIDGE["stroke"], text_anchor="middle")
-        yield group("weakest", [rect(x - 3.6, y - 1.4, 7.2, 2.8, fill="#ffffff", **THIN), held])
+        held = text(x, y + 0.9, error, size=2.5, fill=BRIDGE["stroke"], text_anchor="middle")
+        wide = text_width(error, 2.5) + 1.0
+        yield group("weakest", [rect(x - wide / 2, y - 1.6, wide, 3.2, fill="#ffffff", **THIN), held])
 
 
 def errors_of(mission: Mission, sheet: PaperSheet) -> MagnifiedErrors | None:

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stopgo.mission.document import Overlap
 from stopgo.mission.errors import InputError
 from stopgo.mission.files import plan_panel
 from stopgo.mission.files.plan_panel import coordinate_ticks
@@ -87,6 +88,13 @@ def test_every_stop_has_a_disc_and_a_row() -> None:
         *("1", "1.200", "2.000", "0.0", "10", "10", "0:04"),
         *("2", "6.800", "2.000", "0.0", "10", "10", "1:15"),
     ]
+
+
+@pytest.mark.parametrize("hold_m", [1e-5, 0.01, 0.7])
+def test_the_error_of_the_weakest_pair_fits_into_its_frame(hold_m: float) -> None:
+    pair = Overlap(*(stop.id for stop in room_mission().stops), common_m=3.0, share=0.2, hold_m=hold_m)
+    frame, error = layer(drawn(network=(pair,)), "weakest")
+    assert float(frame.get("width", 0)) >= text_width(error.text or "", float(error.get("font-size", 0)))
 
 
 def test_names_are_escaped_and_what_xml_cannot_hold_is_replaced() -> None:
