@@ -123,7 +123,7 @@ def surface(found: FloatArray, simulation: Simulation, seed: list[int]) -> regis
     """A scan's cloud as `prove` keeps it, from its points (n, 3) without noise."""
     noise = np.random.default_rng(seed).normal(0.0, simulation.noise_m, len(found))
     noisy = found * (1 + noise / np.linalg.norm(found, axis=1))[:, None]
-    return registration.surface_of(noisy)
+    return registration.surface_of(noisy, simulation)
 
 
 def _hits(

@@ -26,12 +26,12 @@ TURNED_M = 0.5
 """Distance in metres that counts as much as one radian between two surface normals."""
 SAME_M = 0.1
 """Largest distance between points of the same surface under the true poses."""
-STAGES = ((0.35, 0.3), (0.15, 0.1), (0.1, 0.05))
+STAGES = ((0.15, 0.1), (0.1, 0.05))
 """Per stage, distances in metres: for shared surfaces, and for matched points.
 
-The last keeps points at the ends of a few shared surfaces from pulling the pose: 13 mm became 1 mm.
-
-A coarse stage precedes them where the position of the start is so uncertain that they would not reach.
+A stage precedes them that reaches as far as the start may be off, and no farther: one of 0.3 m took points
+of a column for those of another side. The last keeps points at the ends of a few shared surfaces from
+pulling the pose: 13 mm became 1 mm.
 """
 HEADING_M = 0.1
 """Distance by which one of the headings tried moves the farthest shared points from the next one."""
@@ -54,6 +54,8 @@ FINE = 1e-5
 """Step size in metres and radians at which registration ends."""
 GLOBAL_VOXEL_M = 0.15
 """Voxel size for registration without poses."""
+GLOBAL_ERROR_M = 0.25
+"""Distance by which a pose found without a start may be off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +91,12 @@ class OrientedCloud:
         return np.hstack([self.points @ turn + there[:3, 3], TURNED_M * self.normals @ turn])
 
 
-def surface_of(cloud: FloatArray) -> OrientedCloud:
-    """A scan's cloud (n, 3), thinned, on level surfaces more than on upright ones, with its normals."""
+def surface_of(cloud: FloatArray, simulation: Simulation) -> OrientedCloud:
+    """A scan's cloud (n, 3), thinned, with its normals.
+
+    Level surfaces are thinned more where registration starts from a pose. Without one, the outlines of the
+    floor and the ceiling help to find it.
+    """
     import small_gicp
 
     if len(cloud) <= NEIGHBOURS:
@@ -101,6 +107,8 @@ def surface_of(cloud: FloatArray) -> OrientedCloud:
     points, normals = thin.points()[:, :3], thin.normals()[:, :3]
     towards = -np.sign(np.einsum("ij,ij->i", points, normals))
     whole = OrientedCloud(frozen(points), frozen(normals * towards[:, None]))
+    if not simulation.poses:
+        return whole
     kept = whole.upright.copy()
     kept[np.flatnonzero(~kept)[::LEVEL_FEW]] = True
     return whole.one_of(1, kept)
@@ -195,11 +203,10 @@ class _CloudPair:
         An error of the heading moves far points beyond others that look alike: 2° are 0.5 m at 14 m. So the
         headings within that error are compared first.
         """
-        if not simulation.poses:
-            return self._aligned(start, STAGES)
-        left_m = simulation.pose_error_m + HEADING_M / 2
-        coarse = [] if left_m <= STAGES[0][1] else [(left_m + SAME_M, left_m)]
-        return self._aligned(self._headed(start, simulation), (*coarse, *STAGES))
+        left_m = GLOBAL_ERROR_M
+        if simulation.poses:
+            start, left_m = self._headed(start, simulation), simulation.pose_error_m + HEADING_M / 2
+        return self._aligned(start, ((left_m + SAME_M, left_m + SAME_M / 2), *STAGES))
 
     def _headed(self, start: FloatArray, simulation: Simulation) -> FloatArray:
         """The start, with the heading within its error that brings most points together."""

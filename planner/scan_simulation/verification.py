@@ -191,7 +191,7 @@ def _scans(
         say(f"scanning from {stop.id}, {len(clouds) + 1} of {len(poses)}")
         scan = site.scanned(pose)
         tally.take(scan, _sighted(site.space, site.solids, pose, ceiling))
-        surfaces.append(surface_of(scan.cloud))
+        surfaces.append(surface_of(scan.cloud, site.simulation))
         clouds.append(ScanCloud(stop.id, _drawn(pose, scan, MOST_DRAWN // len(poses), ceiling, origin)))
     return surfaces, clouds
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,9 +66,11 @@ def test_no_column_is_taken_for_the_next_one_of_a_row(shift: tuple[float, float]
     assert within_tolerance(*two.error(two.aligned(start, SIMULATION)))
 
 
-def test_level_surfaces_are_thinned_and_upright_ones_are_not() -> None:
+def test_level_surfaces_are_thinned_where_a_pose_is_known() -> None:
     across = np.stack(np.meshgrid(np.arange(-3, 3, 0.02), np.arange(-3, 3, 0.02)), axis=-1).reshape(-1, 2)
     ground = np.column_stack([across, np.full(len(across), -1.3)])
     wall = np.column_stack([np.full(len(across), 3.0), across[:, 0], across[:, 1] / 3])
-    surface = surface_of(np.concatenate([ground, wall]))
-    assert surface.upright.sum() > 3 * (~surface.upright).sum() > 0
+    cloud = np.concatenate([ground, wall])
+    thinned, whole = (surface_of(cloud, replace(SIMULATION, poses=poses)) for poses in (True, False))
+    assert thinned.upright.sum() == whole.upright.sum() > 0
+    assert 0 < (~thinned.upright).sum() <= (~whole.upright).sum() / 9

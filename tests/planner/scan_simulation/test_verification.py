@@ -203,7 +203,7 @@ def clouds_of(
 
 
 def pair_of(floor: FloorPlan, a: tuple[float, float], b: tuple[float, float], simulation: Simulation):
-    surfaces = [surface_of(cloud) for cloud in clouds_of(floor, [a, b], simulation)]
+    surfaces = [surface_of(cloud, simulation) for cloud in clouds_of(floor, [a, b], simulation)]
     found = registered(("a", "b"), np.array([(*a, 1.3), (*b, 1.3)]), surfaces, simulation)
     return [item.pair for item in found]
 
@@ -247,7 +247,7 @@ def test_a_pair_starts_along_its_weakest_direction_with_every_seed(seed: int) ->
     """A corridor with one step in it: whatever the seed, two starts are 5 cm off along the corridor."""
     simulation = replace(COARSEST, range_m=4.0, joining_m=4.0, seed=seed)
     places = [(13.0, 1.0), (15.0, 1.0)]
-    one, other = (surface_of(cloud) for cloud in clouds_of(hall(30, 2), places, simulation))
+    one, other = (surface_of(cloud, simulation) for cloud in clouds_of(hall(30, 2), places, simulation))
     two = _CloudPair(one, other, _shift(np.array([2.0, 0.0, 0.0])))
     along = [start[0, 3] - 2.0 for start in _starts(two, simulation, (0, 1))]
     assert sorted(np.abs(along))[-2:] == pytest.approx([0.05, 0.05], abs=1e-3)
@@ -340,6 +340,7 @@ SMALL: dict[str, Callable[[], FloorPlan]] = {
 READ = {
     "office": Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf",
     **{name: SHARED / "layered" / f"{name}.dxf" for name in ("duplex-l1", "fzk-haus-eg", "office-l1")},
+    "case1_structural": SHARED / "paper" / "synthetic_case1_structural.dxf",
 }
 JOINED = some([*SMALL, *READ], every=2)[: size(short=2, full=99)]
 
@@ -349,8 +350,10 @@ def test_the_components_of_a_plan_are_those_of_its_simulated_scans(name: str) ->
     if name in READ and not READ[name].exists():
         pytest.skip(f"{READ[name]} is not at hand")
     floor = SMALL[name]() if name in SMALL else read_floor(READ[name])
-    settings, step = (Settings(range=4.0), 0.5) if name in SMALL else (Settings(), 0.1)
-    proof = verified(floor, settings, Simulation(range_m=settings.range, step_deg=step))
+    settings = Settings(range=4.0) if name in SMALL else Settings()
+    step, cone = (0.5, 0.0) if name in SMALL else (0.1, 60.0)  # degrees
+    simulation = Simulation(range_m=settings.range, step_deg=step, cone_deg=cone)
+    proof = verified(floor, settings, simulation)
     network = network_of(proof.mission)
     assert network is not None
     planned, simulated = ({frozenset(piece) for piece in item.pieces} for item in (network, proof.network))
