@@ -340,6 +340,7 @@ SMALL: dict[str, Callable[[], FloorPlan]] = {
 READ = {
     "office": Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf",
     **{name: SHARED / "layered" / f"{name}.dxf" for name in ("duplex-l1", "fzk-haus-eg", "office-l1")},
+    "case1_structural": SHARED / "paper" / "synthetic_case1_structural.dxf",
 }
 JOINED = some([*SMALL, *READ], every=2)[: size(short=2, full=99)]
 
@@ -349,8 +350,10 @@ def test_the_components_of_a_plan_are_those_of_its_simulated_scans(name: str) ->
     if name in READ and not READ[name].exists():
         pytest.skip(f"{READ[name]} is not at hand")
     floor = SMALL[name]() if name in SMALL else read_floor(READ[name])
-    settings, step = (Settings(range=4.0), 0.5) if name in SMALL else (Settings(), 0.1)
-    proof = verified(floor, settings, Simulation(range_m=settings.range, step_deg=step))
+    settings = Settings(range=4.0) if name in SMALL else Settings()
+    step, cone = (0.5, 0.0) if name in SMALL else (0.1, 60.0)  # degrees
+    simulation = Simulation(range_m=settings.range, step_deg=step, cone_deg=cone)
+    proof = verified(floor, settings, simulation)
     network = network_of(proof.mission)
     assert network is not None
     planned, simulated = ({frozenset(piece) for piece in item.pieces} for item in (network, proof.network))
