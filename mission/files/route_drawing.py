@@ -10,6 +10,7 @@ import numpy as np
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.sheet import PaperSheet
 from stopgo.mission.files.svg import (
+    SMALLEST_TEXT,
     circle,
     group,
     line,
@@ -83,8 +84,8 @@ def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
     if (weakest := found.weakest) is not None:
         x, y = np.mean([at[weakest.a], at[weakest.b]], axis=0).tolist()
         error = f"{1000 * predicted_error_m(weakest.hold_m):.1f} mm"
-        held = text(x, y + 0.9, error, size=2.5, fill=BRIDGE["stroke"], text_anchor="middle")
-        wide = text_width(error, 2.5) + 1.0
+        held = text(x, y + 0.9, error, size=SMALLEST_TEXT, fill=BRIDGE["stroke"], text_anchor="middle")
+        wide = text_width(error, SMALLEST_TEXT) + 1.0
         yield group("weakest", [rect(x - wide / 2, y - 1.6, wide, 3.2, fill="#ffffff", **THIN), held])
 
 
