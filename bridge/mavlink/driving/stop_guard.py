@@ -6,12 +6,15 @@ after a kill that no program can catch. It does not help where the computer itse
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import socket
 import struct
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.resources import files
@@ -29,6 +32,9 @@ APART_SIGNS = 20
 """Number of signs between two processes, where one after another ends."""
 FRAMES = 40
 """HOLD this often, for four seconds: the link may lose some."""
+FORMER_S = 6.0
+"""Longest wait for the guard of a former program, which stops the same vehicle."""
+FORMER_TICK_S = 0.02
 END_S = 2.0
 STUCK_S = 1
 """Longest time for which a sign of life waits for a process that reads none, in whole seconds."""
@@ -39,14 +45,19 @@ class StopGuard:
     """The process that guards one vehicle; `drives` says whether the vehicle has to be stopped if we end."""
 
     def __init__(self, peer: Peer, drives: Callable[[], bool], stopped: Callable[[], None]) -> None:
-        """`stopped` is called when the process has stopped the vehicle because this program hung."""
+        """`stopped` is called when the process has stopped the vehicle because this program hung.
+
+        A former program's guard that still sends HOLD is waited for: else it would end a drive of this one.
+        """
+        self._name = _name_of(peer)
+        _await_former(self._name)
         self._peer = peer
         self._drives = drives
         self._stopped = stopped
         self._signs = self._replaced_until = 0
         self._frames: list[str] = []
         self._closing = threading.Event()
-        self._line, self._process = _started()
+        self._line, self._process = _started(self._name)
         self._thread = threading.Thread(target=self._show_life, name="stop guard", daemon=True)
         self._thread.start()
 
@@ -89,7 +100,7 @@ class StopGuard:
         self._replaced_until = self._signs + APART_SIGNS
         say(ENDED)
         with suppress(OSError):
-            line, process = _started()
+            line, process = _started(self._name)
             self._line.close()
             self._kill()
             self._line, self._process = line, process
@@ -111,14 +122,30 @@ class StopGuard:
                 self._stopped()
 
 
-def _started() -> tuple[socket.socket, subprocess.Popen[bytes]]:
+def _name_of(peer: Peer) -> str:
+    """Name held by the guard of a program that has ended while it stops this vehicle."""
+    link = f"{os.getuid()} {peer.wire.name} {peer.who.system}"
+    return f"stopgo-stop-{hashlib.sha256(link.encode()).hexdigest()}"
+
+
+def _await_former(name: str) -> None:
+    """Wait until no guard of a former program stops this vehicle any more."""
+    until_s = time.monotonic() + FORMER_S
+    while time.monotonic() < until_s:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe, suppress(OSError):
+            probe.bind(f"\0{name}")
+            return
+        time.sleep(FORMER_TICK_S)
+
+
+def _started(name: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:
     """Start the process, in a session of its own: no signal for this program's group ends it."""
     source = files("stopgo.bridge.mavlink.driving").joinpath(PROGRAM).read_text(encoding="utf-8")
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", STUCK_S, 0))
     with its:
         process = subprocess.Popen(
-            [sys.executable, "-I", "-S", "-c", source, str(its.fileno())],
+            [sys.executable, "-I", "-S", "-c", source, str(its.fileno()), name],
             pass_fds=(its.fileno(),), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             start_new_session=True,
         )  # fmt: skip

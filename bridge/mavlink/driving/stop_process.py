@@ -2,7 +2,8 @@
 
 `StopGuard` starts it, gives it the link's descriptors and frames ready to send, and a sign of life ten times
 a second. When the signs cease while the vehicle drives, it writes the frames to the descriptors. It imports
-nothing but the standard library, so that it starts at once and has little to fail by.
+nothing but the standard library, so that it starts at once and has little to fail by. While it stops the
+vehicle of a program that has ended, it holds a name, for which the next program's guard waits.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import os
 import select
 import socket
 import sys
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from typing import Any
 
 SILENT_S = 0.35
@@ -23,7 +25,7 @@ MOST_BYTES, MOST_ENDS = 65536, 16
 NOTHING: dict[str, Any] = {"drives": False, "frames": [], "to": []}
 
 
-def main(descriptor: int) -> None:
+def main(descriptor: int, name: str) -> None:
     """Watch the program at the other end of this socket until it closes it."""
     line = socket.socket(fileno=descriptor)
     told, is_open = NOTHING, True
@@ -35,8 +37,19 @@ def main(descriptor: int) -> None:
                 os.close(end)
             told, ends = sign
         elif told["drives"]:
-            stop(line, told, ends, is_open=is_open)
+            with held("" if is_open else name):
+                stop(line, told, ends, is_open=is_open)
             told = {**told, "drives": False}  # once: the next sign of life says it again
+
+
+@contextmanager
+def held(name: str) -> Iterator[None]:
+    """Hold this name of an abstract socket for a while, unless it is empty or another process has it."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as holder:
+        with suppress(OSError):
+            if name:
+                holder.bind(f"\0{name}")
+        yield
 
 
 def next_sign(
@@ -74,4 +87,4 @@ def write(end: int, data: bytes, to: list[Any] | None) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), sys.argv[2])

@@ -33,7 +33,7 @@ from stopgo.bridge.mavlink.driving.stop_guard import StopGuard
 from stopgo.bridge.mavlink.vehicle_link.url import read_url
 from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
-def scarce(started):
+def scarce(started, name):
     # The first new process cannot be started.
     stop_guard._started = started
     raise OSError(24, "Too many open files")
@@ -49,7 +49,7 @@ with wire(read_url(sys.argv[1]), me=Who(253, 191), signing_key=key) as opened:
     print("ready", flush=True)
     for line in sys.stdin:
         if line == "scarce\\n":
-            stop_guard._started, started = lambda: scarce(started), stop_guard._started
+            stop_guard._started, started = lambda name: scarce(started, name), stop_guard._started
             print("scarce", flush=True)
             continue
         if line == "close\\n":
@@ -125,6 +125,23 @@ def test_a_program_that_is_killed_or_frozen_while_it_drives_leaves_a_vehicle_on_
         if how == signal.SIGSTOP:
             os.kill(process.pid, signal.SIGCONT)
             assert process.stdout is not None and process.stdout.readline() == "stopped\n"
+
+
+def test_the_next_program_is_ready_once_the_former_guard_has_sent_its_last_hold(
+    vehicle: socket.socket,
+) -> None:
+    with driver(url_of(vehicle), "drives", "") as former:
+        ready(former)
+        former.kill()
+        former.wait()
+        assert is_hold(holds(vehicle, dialect.MAVLink(None))[0])
+        with driver(url_of(vehicle), "stands", "") as process:
+            ready(process)
+            while select.select([vehicle], [], [], 0)[0]:
+                vehicle.recv(2048)
+            vehicle.settimeout(1.0)
+            with pytest.raises(TimeoutError):
+                vehicle.recv(2048)
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
