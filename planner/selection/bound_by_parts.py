@@ -82,7 +82,7 @@ class _Ascent:
             self._demand[demands] = solution.prices[len(part) :] * scale
 
     def _spare(self, rows: IntArray, part: IntArray) -> FloatArray:
-        """What other columns' prices leave of each row's cost (rows,)."""
+        """Rest of each row's cost, at the prices of all other columns (rows,)."""
         others = self._column.copy()
         others[part] = 0.0
         spare = 1.0 - self._cover.sees[rows] @ others

@@ -104,7 +104,7 @@ class PricedCover:
         return max(0.0, float(cost[bought & (self.weight > 0)].max(initial=0.0)))
 
     def _cost(self, prices: FloatArray) -> FloatArray:
-        """What each column costs to be seen, less what it adds to demands (columns,)."""
+        """Cost of seeing each column, less what it adds to demands (columns,)."""
         columns = self.cover.columns
         return np.asarray(self.cover.asks * prices[:columns] - self._rest_of_column @ prices[columns:])
 
