@@ -58,7 +58,7 @@ def _exact(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
 
 QUICK_SWAPS = 20
 """Swaps per removed stop in a plan that only estimates the number of stops."""
-ROUNDS = 6
+ROUNDS = 12
 """Rounds in which the default method adds cuts to connect its selection."""
 EXACT_ROUNDS = 60
 """The same for the exact method."""

@@ -7,8 +7,10 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.selection.bound_by_parts import bound_by_parts
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.linear_programme import minimised
+from stopgo.planner.selection.multiplier_bound import multiplier_bound
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
@@ -20,21 +22,6 @@ FIRST_STEPS = 100
 """Steps of a first bound by the multipliers, for problems that are too large for a relaxation."""
 FIRST_WORK = 40_000_000
 """Entries evaluated in all of them together."""
-STEPS = 1000
-"""Most steps of the multiplier bound; a count, so that no bound depends on speed."""
-WORK = 200_000_000
-"""Entries evaluated in all those steps together, so that large floors get fewer steps."""
-PATIENCE = 20
-"""Steps without a better bound after which steps are halved, besides their shrinking to nothing."""
-LEVEL = 1.1
-"""The best bound so far times this is aimed at, where the best known selection is higher."""
-FIRST_STEP = 2.0
-"""First step as a multiple of Polyak's for the value aimed at."""
-SMOOTHING = 0.2
-"""Weight of the newest slope in the direction of a step.
-
-With a weight of 0.7 and steps that are only halved, the bound of 29 000 m² was 9 % lower.
-"""
 
 
 def counting_bound(cover: Cover) -> int:
@@ -52,17 +39,15 @@ def _fewest(gains: IntArray, needed: int) -> int:
 def lower_bound(cover: Cover, *, found: int, quickly: bool = False) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
-    Small problems use the linear relaxation, large ones the multiplier bound; `quickly`, problems of more
-    than `QUICK` entries a coarse relaxation, or a few steps of the multiplier bound.
+    Small problems use the linear relaxation, large ones that of one part after another; `quickly`, problems
+    of more than `QUICK` entries a coarse relaxation, or a few steps of the multiplier bound.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
         return simple
     if quickly and entries > QUICK:
         return max(simple, coarse_bound(cover)) if entries <= LARGEST else first_bound(cover, found=found)
-    return max(
-        simple, relaxation_bound(cover) if entries <= LARGEST else multiplier_bound(cover, found=found)
-    )
+    return max(simple, relaxation_bound(cover) if entries <= LARGEST else bound_by_parts(cover, found=found))
 
 
 def first_bound(cover: Cover, *, found: int) -> int:
@@ -72,66 +57,6 @@ def first_bound(cover: Cover, *, found: int) -> int:
         return simple
     steps = min(FIRST_STEPS, FIRST_WORK // max(1, cover.sees.nnz))
     return max(simple, multiplier_bound(cover, found=found, steps=steps))
-
-
-def multiplier_bound(cover: Cover, *, found: int, steps: int = STEPS) -> int:
-    """Lagrangian bound: prices u_j on v_j y_j <= Σ x_i, raised where a column is used and not seen.
-
-    For any prices u >= 0 of columns and p >= 0 of all demands but the whole, Σ_i min(0, 1 - Σ_j in i u_j)
-    + Σ_k p_k needed_k + the cheapest way to meet the whole at v_j u_j - Σ_k p_k worth_kj per column is a
-    bound (Geoffrion, 1974); the prices follow Polyak's subgradient rule, smoothed, by shrinking steps.
-    """
-    scale = max(1.0, float((cover.sees @ cover.weight).max(initial=1)))
-    problem = _Priced(cover, scale)
-    prices = np.concatenate([cover.weight / scale, np.zeros(len(cover.needed) - 1)])
-    best, step, waited, direction = 0.0, FIRST_STEP, 0, np.zeros(len(prices))
-    steps = min(steps, max(50, WORK // max(1, cover.sees.nnz)))
-    for k in range(steps):
-        value, slope = problem.value(prices)
-        waited = 0 if value > best + 1e-4 else waited + 1
-        best = max(best, value)
-        direction = slope if not direction.any() else SMOOTHING * slope + (1 - SMOOTHING) * direction
-        norm = float((direction * direction).sum())  # no BLAS: its threads wait for each other for longer
-        if best > found - 1 + 1e-6 or norm == 0.0:
-            break
-        if waited >= PATIENCE:
-            step, waited = step / 2, 0
-        aim = min(found - 0.5, max(LEVEL * best, best + 1.5))
-        prices = np.maximum(0.0, prices + step * (1 - k / steps) * (aim - value) / norm * direction)
-    return int(np.ceil(best - 1e-6))
-
-
-class _Priced:
-    """The problem with weights as fractions of the largest view; gives the dual value at prices."""
-
-    def __init__(self, cover: Cover, scale: float) -> None:
-        self._cover = cover
-        self._sees = cover.sees.astype(float)
-        self._weight = cover.weight / scale
-        self._needed = cover.needed / scale
-        self._rest = cover.worth[1:].astype(float) / scale
-        self._rest_of_column = self._rest.T
-
-    def value(self, prices: FloatArray) -> tuple[float, FloatArray]:
-        """The lower bound at prices of columns, then demands; and its subgradient."""
-        cover = self._cover
-        column, demand = prices[: cover.columns], prices[cover.columns :]
-        spare = 1.0 - self._sees @ column
-        cost = cover.asks * column - self._rest_of_column @ demand
-        bought = self._cheapest(cost)
-        whole = float(np.minimum(spare, 0.0).sum() + demand @ self._needed[1:])
-        value = whole + float((cost * bought).sum())
-        seen = self._sees.T @ (spare < 0).astype(float)
-        return value, np.concatenate([cover.asks * bought - seen, self._needed[1:] - self._rest @ bought])
-
-    def _cheapest(self, cost: FloatArray) -> FloatArray:
-        """Fractions of columns that meet the whole's demand at least cost; negative costs are taken."""
-        worth = np.maximum(self._weight, 1e-300)
-        order = np.argsort(cost / worth, kind="stable")
-        before = np.cumsum(self._weight[order]) - self._weight[order]
-        bought = np.empty(len(cost))
-        bought[order] = np.clip((self._needed[0] - before) / worth[order], 0.0, 1.0)
-        return np.where(cost < 0, 1.0, np.where(self._weight > 0, bought, 0.0))
 
 
 @instance_cached

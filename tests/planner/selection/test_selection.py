@@ -13,18 +13,18 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, weights_of
-from stopgo.planner.selection import METHODS, bound
+from stopgo.planner.selection import METHODS, bound, bound_by_parts
 from stopgo.planner.selection.bound import (
     coarse_bound,
     counting_bound,
     first_bound,
     lower_bound,
-    multiplier_bound,
     relaxation_bound,
 )
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of, needed_of
 from stopgo.planner.selection.greedy import greedy
+from stopgo.planner.selection.multiplier_bound import multiplier_bound
 from tests.faults.sizes import size
 from tests.planner.selection.test_swaps import cover_of_rooms
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms
@@ -99,10 +99,12 @@ def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
 
 def test_no_bound_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bound, "COARSE", 20)
+    monkeypatch.setattr(bound_by_parts, "SIZE", 20)
     for _, cover, optimum in small_covers(range(size(short=5, full=300))):
         assert counting_bound(cover) <= optimum
         assert coarse_bound(cover) <= relaxation_bound(cover) <= optimum
         assert multiplier_bound(cover, found=len(greedy(cover))) <= optimum
+        assert bound_by_parts.bound_by_parts(cover, found=len(greedy(cover))) <= optimum
 
 
 def test_the_first_bound_of_a_large_problem_is_nearly_that_of_its_relaxation(
@@ -207,3 +209,17 @@ def test_one_stop_in_the_middle_of_a_small_hall_is_enough() -> None:
     assert len(mission.stops) == 1
     assert nouns[Selection].bound == 1
     assert mission.return_ is None
+
+
+@pytest.mark.parametrize("views", [1, 2])
+def test_the_bound_by_parts_is_nearly_that_of_the_relaxation(
+    views: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Parts of a twentieth; also where every column needs two views."""
+    once = cover_of_rooms(3, rows=150, columns=450, rooms=20)
+    cover = replace(once, views=views)
+    monkeypatch.setattr(bound_by_parts, "SIZE", cover.sees.nnz // 20)
+    best = relaxation_bound(cover)
+    found = bound_by_parts.bound_by_parts(cover, found=2 * best)
+    assert best - 1 <= found <= best
+    assert found > multiplier_bound(cover, found=2 * best, steps=60)

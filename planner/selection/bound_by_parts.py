@@ -1,0 +1,136 @@
+"""Bound of a large selection: the prices of one part of the columns after another are made the best.
+
+A linear programme of a whole floor takes time that grows with almost the square of its size. Prices that
+are already good are improved part by part instead, while all others stay: a dual block ascent. Each part
+is one programme, with what the other prices leave of each row's cost, and after one pass over overlapping
+parts the bound is within 0.2 % of the whole programme's. The bound is computed from the prices alone, so
+it needs no trust in the solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array, hstack, vstack
+
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.linear_programme import minimised
+from stopgo.planner.selection.multiplier_bound import PricedCover, multiplier_prices, rounded_up
+
+SIZE = 60_000
+"""Entries of the covering matrix in a part, about, without the columns that it shares with others."""
+FIRST_STEPS = 60
+"""Steps of the multiplier bound, for the first prices."""
+
+
+def bound_by_parts(cover: Cover, *, found: int) -> int:
+    """Lower bound on the rows of a selection; `found` rows are known to suffice."""
+    problem = PricedCover(cover)
+    best, prices = multiplier_prices(problem, found=found, steps=FIRST_STEPS)
+    ascent = _Ascent(problem, prices)
+    for part in _parts(cover):
+        ascent.improve(part)
+    return rounded_up(max(best, problem.value(ascent.prices)[0]))
+
+
+class _Ascent:
+    """Prices that are made the best for one part of the columns after another."""
+
+    def __init__(self, problem: PricedCover, prices: FloatArray) -> None:
+        cover = problem.cover
+        self._problem, self._cover = problem, cover
+        self._column = prices[: cover.columns].copy()
+        self._demand = np.concatenate([[problem.price_of_whole(prices)], prices[cover.columns :]])
+        self._worth_of_column = csr_array(problem.worth.T)
+        entries = np.diff(cover.seen_by.indptr)
+        columns = (cover.worth > 0).astype(np.int64)
+        self._is_wide: BoolArray = np.asarray(columns @ entries) > SIZE
+        self._is_wide[0] = True
+
+    @property
+    def prices(self) -> FloatArray:
+        """Prices of columns, then of all demands but the whole."""
+        return np.concatenate([self._column, self._demand[1:]])
+
+    def improve(self, part: IntArray) -> None:
+        """Find the best prices of these columns, and of the demands to which only few columns add."""
+        cover, worth = self._cover, self._problem.worth
+        demands = _marked(cover.adds_to[part].indices, len(cover.needed))
+        demands = demands[~self._is_wide[demands]]
+        others = np.setdiff1d(_marked(worth[demands].indices, cover.columns), part)
+        rows = _marked(cover.seen_by[part].indices, cover.rows)
+        cost = np.concatenate([self._spare(rows, part), *self._gains(part, others, demands)])
+        seen = cover.sees[rows][:, part].T.astype(float)
+        scale = 1.0 / np.maximum(worth[demands].max(axis=1).toarray().ravel(), 1e-300)
+        added = diags_array(scale) @ worth[demands][:, np.concatenate([part, others])]
+        asked = hstack(
+            [seen, diags_array(-cover.asks[part].astype(float)), csr_array((len(part), len(others)))]
+        )
+        most = np.concatenate(
+            [np.full(len(rows), np.inf if cover.once else 1.0), np.ones(len(part) + len(others))]
+        )
+        solution = minimised(
+            cost,
+            vstack([asked, hstack([csr_array((len(demands), len(rows))), added])]),
+            np.concatenate([np.zeros(len(part)), self._problem.needed[demands] * scale]),
+            most,
+        )
+        if solution is not None:
+            self._column[part] = solution.prices[: len(part)]
+            self._demand[demands] = solution.prices[len(part) :] * scale
+
+    def _spare(self, rows: IntArray, part: IntArray) -> FloatArray:
+        """Rest of each row's cost, at the prices of all other columns (rows,)."""
+        others = self._column.copy()
+        others[part] = 0.0
+        spare = 1.0 - self._cover.sees[rows] @ others
+        return np.maximum(spare, 0.0) if self._cover.once else spare
+
+    def _gains(self, part: IntArray, others: IntArray, demands: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Cost of each column of the part, and of others, at the prices of all other demands (n,)."""
+        fixed = self._demand.copy()
+        fixed[demands] = 0.0
+        paid = self._cover.asks[others] * self._column[others]
+        return -(self._worth_of_column[part] @ fixed), paid - self._worth_of_column[others] @ fixed
+
+
+def _parts(cover: Cover) -> Iterator[IntArray]:
+    """Parts of the columns (n,): those seen together, with those that the same rows see besides.
+
+    Together they have every column that has weight. Columns of separators, which rows of many rooms see,
+    lead to no others.
+    """
+    entries = np.diff(cover.seen_by.indptr)
+    counts = cover.weight > 0
+    is_left = counts.copy()
+    for first in range(cover.columns):
+        if not is_left[first]:
+            continue
+        newest, size = np.array([first]), int(entries[first])
+        is_left[first] = False
+        part = [newest]
+        while len(newest) and size < SIZE:
+            seen = _seen_with(cover, newest)
+            newest = seen[is_left[seen]]
+            newest = newest[: 1 + int(np.searchsorted(np.cumsum(entries[newest]), SIZE - size))]
+            is_left[newest] = False
+            size += int(entries[newest].sum())
+            part.append(newest)
+        seen = _seen_with(cover, np.concatenate(part))
+        around = seen[counts[seen]]
+        beyond = _seen_with(cover, around)
+        yield np.union1d(around, beyond[~counts[beyond]])
+
+
+def _seen_with(cover: Cover, columns: IntArray) -> IntArray:
+    """All columns that the rows see which see any of these (n,)."""
+    return _marked(cover.sees[_marked(cover.seen_by[columns].indices, cover.rows)].indices, cover.columns)
+
+
+def _marked(numbers: IntArray, most: int) -> IntArray:
+    """Each of these numbers below `most` once, ascending."""
+    is_marked = np.zeros(most, dtype=bool)
+    is_marked[numbers] = True
+    return np.flatnonzero(is_marked)
