@@ -29,7 +29,7 @@ from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
 from stopgo.planner.candidates import candidates
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.floors import FloorOptions, read_floor
-from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, overlaps_of
+from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, overlaps_of
 from stopgo.planner.scan_simulation import registration
 from stopgo.planner.scan_simulation.casting import SolidScene, distances
 from stopgo.planner.scan_simulation.extrusion import NONE
@@ -234,7 +234,7 @@ class Figures:
     @property
     def registers(self) -> bool:
         """True for a pair that a plan promises."""
-        return self.hold_m >= LEAST_HOLD_M and self.common_m >= LEAST_COMMON_M
+        return self.hold_m >= least_hold_m(Settings()) and self.common_m >= LEAST_COMMON_M
 
 
 def counted(floor: FloorPlan, settings: Settings, rows: list[dict[str, Any]]) -> list[Figures]:

@@ -23,7 +23,7 @@ from stopgo.mission.files.svg import (
     text_width,
 )
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.stages.network import MagnifiedErrors, magnified_errors, network_of, predicted_error_m
+from stopgo.mission.stages.network import MagnifiedErrors, magnified_errors, network_of
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """Line of the leg to each stop."""
@@ -83,7 +83,7 @@ def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
     yield group("bridges", [line(*at[item.a], *at[item.b]) for item in found.bridges], **BRIDGE)
     if (weakest := found.weakest) is not None:
         x, y = np.mean([at[weakest.a], at[weakest.b]], axis=0).tolist()
-        error = f"{1000 * predicted_error_m(weakest.hold_m):.1f} mm"
+        error = found.error_in_words(weakest)
         held = text(x, y + 0.9, error, size=SMALLEST_TEXT, fill=BRIDGE["stroke"], text_anchor="middle")
         wide = text_width(error, SMALLEST_TEXT) + 1.0
         yield group("weakest", [rect(x - wide / 2, y - 1.6, wide, 3.2, fill="#ffffff", **THIN), held])

@@ -38,6 +38,17 @@ class ScannerParameters:
             quiet=True,
         ),
     ] = None
+    range_noise: Annotated[
+        float | None,
+        _scanner(
+            "Noise of a distance that the scanner measures, mm rms",
+            "mm",
+            above=0,
+            most=100,
+            undecided="2",
+            quiet=True,
+        ),
+    ] = None
     scanner_height: Annotated[
         float | None,
         _scanner(

@@ -22,15 +22,29 @@ ELLIPSE_POINTS = 49
 """Points of a drawn ellipse, the first again at the end."""
 FLOOR_M = 0.4e-3
 """Registration error that no length of wall averages out: that of the thinned cloud, metres."""
+SIMULATED_NOISE_MM = 2.0
+"""Range noise with which both were measured, mm rms."""
 CONFIDENCE = 2.576
 """Standard deviations that a normal error exceeds, to either side, once in 100."""
 CONTROL_FRAME = "control points"
 """Name of the frame of errors that control points hold, where a stop's name stands otherwise."""
 
 
-def predicted_error_m(hold_m: float) -> float:
-    """Return the predicted standard deviation of a pair in its weakest direction, metres."""
-    return math.sqrt(FLOOR_M**2 + NOISE_M**2 / max(hold_m, 1e-12))
+def noise_factor(range_noise: Any) -> float:
+    """Return by how much errors are larger with this range noise (mm) than with that of the simulations.
+
+    Less noise counts as that, and so does what is no number: a mission's parameters are only recorded.
+    """
+    known = range_noise if isinstance(range_noise, int | float) and math.isfinite(range_noise) else 0.0
+    return max(1.0, known / SIMULATED_NOISE_MM)
+
+
+def predicted_error_m(hold_m: float, noise: float) -> float:
+    """Return the predicted standard deviation of a pair in its weakest direction, metres.
+
+    `noise` is the `noise_factor` of the scanner.
+    """
+    return noise * math.sqrt(FLOOR_M**2 + NOISE_M**2 / max(hold_m, 1e-12))
 
 
 @dataclass(frozen=True)
@@ -39,6 +53,8 @@ class Network:
 
     stops: tuple[str, ...]
     overlaps: tuple[Overlap, ...]
+    noise: float = 1.0
+    """The `noise_factor` of the scanner."""
 
     @cached_property
     def pieces(self) -> tuple[tuple[str, ...], ...]:
@@ -70,14 +86,26 @@ class Network:
     def renamed(self, names: Mapping[str, str]) -> Network:
         """Return the same network with other names for all stops."""
         pairs = (replace(item, a=names[item.a], b=names[item.b]) for item in self.overlaps)
-        return Network(tuple(names[stop] for stop in self.stops), tuple(pairs))
+        return Network(tuple(names[stop] for stop in self.stops), tuple(pairs), self.noise)
 
     def among(self, stops: Collection[str]) -> Network:
         """Return the network of these stops only."""
         return Network(
             tuple(stop for stop in self.stops if stop in stops),
             tuple(item for item in self.overlaps if item.a in stops and item.b in stops),
+            self.noise,
         )
+
+    def in_words(self, pair: Overlap) -> str:
+        """Return one pair with its figures."""
+        return (
+            f"{pair.a}-{pair.b}: {pair.common_m:.1f} m visible from both, {percent(pair.share)} of a scan, "
+            f"predicted error {self.error_in_words(pair)}"
+        )
+
+    def error_in_words(self, pair: Overlap) -> str:
+        """Return the predicted error of a pair in its weakest direction."""
+        return f"{1000 * predicted_error_m(pair.hold_m, self.noise):.1f} mm"
 
 
 @dataclass(frozen=True)
@@ -143,7 +171,8 @@ def network_of(mission: Mission) -> Network | None:
     """Return the mission's network; None if it was planned without one."""
     if isinstance(mission.network, msgspec.UnsetType):
         return None
-    return Network(tuple(stop.id for stop in mission.stops), mission.network)
+    noise = noise_factor(mission.origin.parameters.get("range_noise"))
+    return Network(tuple(stop.id for stop in mission.stops), mission.network, noise)
 
 
 def apart_in_words(mission: Mission, acquired: Collection[str]) -> str:
@@ -183,7 +212,7 @@ def network_lines(network: Network | None) -> list[str]:
         f"{pairs} pair{'s' * (pairs != 1)} of {len(network.stops)} scans register with one another"
     ]
     if network.weakest is not None:
-        lines.append(f"    weakest   {pair_in_words(network.weakest)}")
+        lines.append(f"    weakest   {network.in_words(network.weakest)}")
     if network.bridges:
         listed = ", ".join(f"{item.a}-{item.b}" for item in network.bridges[:MOST_LISTED])
         more = f" and {len(network.bridges) - MOST_LISTED} more" if len(network.bridges) > MOST_LISTED else ""
@@ -192,14 +221,6 @@ def network_lines(network: Network | None) -> list[str]:
 
 
 MOST_LISTED = 12
-
-
-def pair_in_words(pair: Overlap) -> str:
-    """Return one pair with its figures."""
-    return (
-        f"{pair.a}-{pair.b}: {pair.common_m:.1f} m visible from both, {percent(pair.share)} of a scan, "
-        f"predicted error {1000 * predicted_error_m(pair.hold_m):.1f} mm"
-    )
 
 
 def _root(end_of: dict[str, str], stop: str) -> str:

@@ -16,11 +16,11 @@ from stopgo.mission.document import Mission, Stop, mission_id
 from stopgo.mission.document.problems import Problem
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
-from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of
+from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of, noise_factor
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_of
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
-from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, links_of
+from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
 from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.overlap.network_error import (
@@ -40,7 +40,6 @@ ROUNDED = 1e-5
 ERROR_SLACK, ERROR_SLACK_M = 0.01, 1e-5
 """Tolerance of a predicted error: a fraction of it, and metres, to which missions round it."""
 REQUIRED = "the plan's parameters require scans that register with one another"
-LEAST = {"common_m": LEAST_COMMON_M, "hold_m": LEAST_HOLD_M}
 
 
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
@@ -63,7 +62,12 @@ def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
         return
     overlaps = _overlaps(mission, space)
     row = {stop.id: k for k, stop in enumerate(mission.stops)}
-    least = {**LEAST, "share": space.settings.least_overlap}
+    settings = space.settings
+    least = {
+        "common_m": LEAST_COMMON_M,
+        "hold_m": least_hold_m(settings),
+        "share": settings.least_overlap,
+    }
     for index, pair in enumerate(mission.network):
         pairs = overlaps.of(row[pair.a])
         at = np.flatnonzero(pairs.other == row[pair.b])
@@ -120,7 +124,8 @@ def _covariances(mission: Mission, space: NavigableSpace, anchors: Sequence[int]
     xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - origin
     moments = {pair: overlaps.normal_matrix(*pair) for pair in pairs}
     ends = [pair for pair in pairs if np.linalg.matrix_rank(moments[pair]) == 3]
-    information = [information_of(moments[a, b], xy[b]) for a, b in ends]
+    noise = noise_factor(space.settings.range_noise)
+    information = [information_of(moments[a, b], xy[b], noise) for a, b in ends]
     if anchors:
         return scan_covariances(xy, ends, information, anchors)
     return network_errors(xy, ends, information, seen_control(space, xy))[0]

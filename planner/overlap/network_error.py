@@ -14,9 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.stages.network import FLOOR_M, NOISE_M
 from stopgo.planner.overlap.control import SeenPoint
 from stopgo.planner.overlap.normal_equations import NormalEquations
-from stopgo.planner.overlap.pairs import FLOOR_M, LEVER_M, NOISE_M
+from stopgo.planner.overlap.pairs import LEVER_M
 
 TARGET_M = 2e-3
 """Error of a target's centre in a scan, metres (standard deviation)."""
@@ -24,16 +25,17 @@ MOST_FRAMES = 3
 """Scans tried as the frame of a network, those nearest to its middle."""
 
 
-def information_of(moments: FloatArray, at: FloatArray) -> FloatArray:
+def information_of(moments: FloatArray, at: FloatArray, noise: float) -> FloatArray:
     """Information (3, 3) of a pair from its normal matrix about the origin, for a scan at a point (2,).
 
-    The error that no length of wall averages out is added at that point.
+    The error that no length of wall averages out is added at that point. `noise` is the scanner's
+    `noise_factor`: all errors are larger by it.
     """
     to_point = np.array([[1.0, 0.0, -at[1]], [0.0, 1.0, at[0]], [0.0, 0.0, 1.0]])
     from_point = np.linalg.inv(to_point)
     alone = NOISE_M**2 * np.linalg.inv(moments)
     least = FLOOR_M**2 * np.diag([1.0, 1.0, 1.0 / LEVER_M**2])
-    return np.asarray(np.linalg.inv(alone + from_point @ least @ from_point.T), np.float64)
+    return np.asarray(np.linalg.inv(noise**2 * (alone + from_point @ least @ from_point.T)), np.float64)
 
 
 def network_errors(

@@ -18,7 +18,6 @@ from functools import cached_property
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.stages.network import FLOOR_M, NOISE_M
 from stopgo.planner.overlap.boundary import ShownBoundary
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -187,11 +186,6 @@ class Overlaps:
         for (i, j), entry in entries.items():
             found[:, i, j] = found[:, j, i] = np.bincount(index, entry, many)
         return found
-
-
-def error_of(hold_m: FloatArray) -> FloatArray:
-    """Predicted standard deviation in the weakest direction, metres at a distance of LEVER_M (n,)."""
-    return np.asarray(np.sqrt(FLOOR_M**2 + NOISE_M**2 / np.maximum(hold_m, 1e-12)))
 
 
 def _least_hold(moments: FloatArray, at: FloatArray) -> FloatArray:

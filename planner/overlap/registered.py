@@ -17,25 +17,30 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState, Route
 from stopgo.mission.stages.figures import percent
-from stopgo.mission.stages.network import CONFIDENCE, CONTROL_FRAME, Network
+from stopgo.mission.stages.network import (
+    CONFIDENCE,
+    CONTROL_FRAME,
+    Network,
+    noise_factor,
+    predicted_error_m,
+)
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M, Overlaps, registers
+from stopgo.planner.overlap import LEAST_COMMON_M, Overlaps, least_hold_m, registers
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.overlap.network_error import error_ellipses, information_of, network_errors
-from stopgo.planner.overlap.pairs import error_of
 
 
 @instance_cached
 def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     """Pairs of the route's stops that register with one another, in the order of driving."""
-    overlaps, share = _overlaps_of_stops(route), _settings(route).least_overlap
+    overlaps, settings = _overlaps_of_stops(route), _settings(route)
     names = stop_names(overlaps.rows)
     found = []
     for k in range(overlaps.rows):
         pairs = overlaps.of(k)
-        for at in registers(pairs, share=share):
+        for at in registers(pairs, settings):
             if (later := int(pairs.other[at])) > k:
                 figures = (float(values[at]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
                 found.append(Overlap(names[k], names[later], *map(rounded, figures)))
@@ -64,7 +69,8 @@ def predicted_errors(route: Route) -> PredictedErrors:
     number = {stop: k for k, stop in enumerate(stops)}
     ends = [(number[pair.a], number[pair.b]) for pair in registered_pairs(route)]
     xy = route.xy - local_origin(route.space.floor)
-    information = [information_of(overlaps.normal_matrix(a, b), xy[b]) for a, b in ends]
+    noise = noise_factor(_settings(route).range_noise)
+    information = [information_of(overlaps.normal_matrix(a, b), xy[b], noise) for a, b in ends]
     covariances, frame = network_errors(xy, ends, information, seen_control(route.space, xy))
     ellipses = error_ellipses(covariances)
     return PredictedErrors(ellipses, CONTROL_FRAME if frame is None else stops[frame])
@@ -219,15 +225,16 @@ FREE_M = 0.5
 
 def _reason(route: Route, k: int, j: int) -> str:
     """The reason why two stops that see common boundary do not register."""
-    overlaps, asked = _overlaps_of_stops(route), _settings(route).least_overlap
+    overlaps, settings = _overlaps_of_stops(route), _settings(route)
     pairs = overlaps.of(k)
     at = np.flatnonzero(pairs.other == j)
     common, share, hold = (float(values[at][0]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
     if common < LEAST_COMMON_M:
         return f"they see only {common:.1f} m of boundary in common"
-    if hold >= LEAST_HOLD_M:
+    if hold >= least_hold_m(settings):
+        asked = settings.least_overlap
         return f"they see {percent(share)} of a scan in common, of {percent(asked)} required"
-    error = float(error_of(np.array([hold]))[0])
+    error = predicted_error_m(hold, noise_factor(settings.range_noise))
     x, y, turn = overlaps.weakest_move(k, j)
     direction = math.degrees(math.atan2(y, x)) % 180
     how = "in heading" if abs(turn) > math.hypot(x, y) else f"along {direction:.0f}° from +x"

@@ -90,6 +90,7 @@ def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
     known: dict[str, Any] = {
         "step_deg": settings.angular_step,
         "near_m": settings.near,
+        "noise_m": None if settings.range_noise is None else settings.range_noise / 1000,
     }
     simulation = replace(
         simulation,

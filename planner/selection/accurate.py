@@ -12,7 +12,7 @@ import numpy as np
 
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.stages import Selection
-from stopgo.mission.stages.network import CONFIDENCE
+from stopgo.mission.stages.network import CONFIDENCE, noise_factor
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap import overlaps_of, registers
 from stopgo.planner.overlap.control import seen_control
@@ -53,7 +53,8 @@ class _RowNetwork:
     def __init__(self, selection: Selection) -> None:
         candidates = selection.candidates
         self._space, self._overlaps = candidates.space, overlaps_of(candidates)
-        self._share = selection.settings.least_overlap
+        self._settings = selection.settings
+        self._noise = noise_factor(selection.settings.range_noise)
         self._xy = candidates.xy[candidates.kept] - local_origin(candidates.floor)
         self._information: dict[tuple[int, int], FloatArray] = {}
 
@@ -79,11 +80,11 @@ class _RowNetwork:
 
     def _registering(self, row: int) -> list[int]:
         pairs = self._overlaps.of(row)
-        found: list[int] = pairs.other[registers(pairs, share=self._share)].tolist()
+        found: list[int] = pairs.other[registers(pairs, self._settings)].tolist()
         return found
 
     def _of(self, a: int, b: int) -> FloatArray:
         if (a, b) not in self._information:
             moments = self._overlaps.normal_matrix(a, b)
-            self._information[a, b] = information_of(moments, self._xy[b])
+            self._information[a, b] = information_of(moments, self._xy[b], self._noise)
         return self._information[a, b]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.geometry import FloatArray, bounds
-from stopgo.mission.stages.network import magnified_errors, network_of, pair_in_words
+from stopgo.mission.stages.network import magnified_errors, network_of
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.blueprint import Bounds
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
@@ -129,7 +129,7 @@ def _draw_network(canvas: Canvas, mission: Mission) -> None:
     lines = rr.LineStrips2D(
         canvas.strips([np.array([at[item.a], at[item.b]]) for item in network.overlaps]),
         colors=[palette.BRIDGE if item in bridges else palette.PAIR for item in network.overlaps],
-        labels=[pair_in_words(item) for item in network.overlaps],
+        labels=[network.in_words(item) for item in network.overlaps],
         show_labels=False,
         radii=on_screen(1.0),
         draw_order=ORDER["route"] + 0.5,

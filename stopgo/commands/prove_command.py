@@ -51,7 +51,14 @@ StepOption = Annotated[
     ),
 ]
 NoiseOption = Annotated[
-    float, typer.Option(min=0.0, max=100.0, rich_help_panel="Simulation", help="Noise of a distance, mm rms.")
+    float | None,
+    typer.Option(
+        min=0.0,
+        max=100.0,
+        rich_help_panel="Simulation",
+        help="Noise of a distance, mm rms.",
+        show_default="the plan's range_noise, else 2",
+    ),
 ]
 HeightOption = Annotated[
     float | None,
@@ -123,7 +130,7 @@ def prove_command(
     coverage: CoverageOption = None,
     *,
     step: StepOption = None,
-    noise: NoiseOption = 2.0,
+    noise: NoiseOption = None,
     height: HeightOption = None,
     blind_cone: BlindConeOption = None,
     ceiling: CeilingOption = None,
@@ -149,7 +156,7 @@ def prove_command(
     for path in files.values():
         must_be_writable(path)
     given = {"step_deg": step, "height_m": height, "cone_deg": blind_cone, "ceiling_m": ceiling}
-    given |= {"noise_m": noise / 1000, "slant": slant, "seed": seed, "poses": not without_poses}
+    given |= {"noise_m": noise and noise / 1000, "slant": slant, "seed": seed, "poses": not without_poses}
     assumed = {key: value for key, value in {**given, "solids": solids.value}.items() if value is not None}
     proof, on_floor = _simulated(mission, floor, coverage, assumed)
     with running("writing the proof"):

@@ -57,6 +57,7 @@ OTHER: dict[str, Any] = {
     "near": 0.6,
     "angular_step": 0.036,
     "blind_cone": 60.0,
+    "range_noise": 6.0,
     "scanner_height": 1.8,
     "wall_height": 2.7,
     "further_starts": ((5.0, 6.0, 0.0),),

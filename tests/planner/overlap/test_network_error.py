@@ -10,10 +10,11 @@ import pytest
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages.network import FLOOR_M, NOISE_M, predicted_error_m
 from stopgo.planner import plan
 from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.overlap.network_error import information_of, scan_covariances, worst_errors
-from stopgo.planner.overlap.pairs import FLOOR_M, LEVER_M, NOISE_M, error_of
+from stopgo.planner.overlap.pairs import LEVER_M
 from stopgo.planner.overlap.registered import predicted_errors, registered_pairs
 from tests.planner.worlds import two_rooms
 
@@ -65,8 +66,10 @@ def test_the_information_of_a_pair_is_that_of_its_walls_wherever_the_origin_is(
     about = np.diag([9.0, 9.0, 9.0 * LEVER_M**2])
     to_point = np.array([[1.0, 0.0, -at[1]], [0.0, 1.0, at[0]], [0.0, 0.0, 1.0]])
     moments: FloatArray = to_point.T @ about @ to_point
-    errors = errors_of(np.array([point, point]), [(0, 1)], [information_of(moments, point)], [0])
+    errors = errors_of(np.array([point, point]), [(0, 1)], [information_of(moments, point, 1.0)], [0])
     assert errors[1] == pytest.approx(math.hypot(NOISE_M / 3, FLOOR_M), rel=1e-6)
+    noisy = errors_of(np.array([point, point]), [(0, 1)], [information_of(moments, point, 3.0)], [0])
+    assert noisy[1] == pytest.approx(3 * errors[1], rel=1e-6)
 
 
 def test_a_plan_reports_the_worst_predicted_error() -> None:
@@ -74,6 +77,6 @@ def test_a_plan_reports_the_worst_predicted_error() -> None:
     errors = predicted_errors(made.route).m
     (pair,) = registered_pairs(made.route)
     assert sorted(errors > 0) == [False, True]
-    assert errors.max() < 2 * float(error_of(np.array([pair.hold_m]))[0])
+    assert errors.max() < 2 * predicted_error_m(pair.hold_m, 1.0)
     line = f"at s0{int(np.argmax(errors)) + 1}: {1000 * errors.max():.1f} mm (standard deviation)"
     assert line in PlanReport(made, {}, {}).as_text()

@@ -13,13 +13,13 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
-from stopgo.mission.stages.network import CONFIDENCE
+from stopgo.mission.stages.network import CONFIDENCE, predicted_error_m
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
-from stopgo.planner.overlap import ACCURACY_M, LEAST_HOLD_M, links_by_kernel, links_of, overlaps_of
+from stopgo.planner.overlap import ACCURACY_M, least_hold_m, links_by_kernel, links_of, overlaps_of
 from stopgo.planner.overlap.boundary import MOST_SPACING_M
 from stopgo.planner.overlap.pair_kernel import firm_pairs
-from stopgo.planner.overlap.pairs import EDGE_M, LEVER_M, error_of
+from stopgo.planner.overlap.pairs import EDGE_M, LEVER_M
 from stopgo.planner.space.navigable import navigable
 from tests.planner.kernels import interpret, machine_code
 from tests.planner.worlds import LAYERED, SHARED, box, column, door, floor_of, shell, wall
@@ -130,10 +130,15 @@ def test_a_wall_counts_as_far_as_its_points_have_a_direction(step: float) -> Non
 
 
 def test_the_least_strength_is_that_of_the_accuracy() -> None:
-    """With the least strength 99 of 100 errors are within the accuracy; with more they are smaller."""
-    least, more = error_of(np.array([LEAST_HOLD_M, 4 * LEAST_HOLD_M]))
-    assert least * CONFIDENCE == pytest.approx(ACCURACY_M, rel=0.01)
-    assert more == pytest.approx(least / 2, rel=0.05)
+    """With the least strength 99 of 100 errors are within the accuracy, whatever the scanner's noise."""
+    least = least_hold_m(Settings())
+    assert predicted_error_m(least, 1.0) * CONFIDENCE == pytest.approx(ACCURACY_M, rel=0.01)
+    assert predicted_error_m(4 * least, 1.0) == pytest.approx(predicted_error_m(least, 1.0) / 2, rel=0.05)
+    noisy = least_hold_m(Settings(range_noise=6.0))
+    assert noisy > 9 * least
+    assert predicted_error_m(noisy, 3.0) * CONFIDENCE == pytest.approx(ACCURACY_M, rel=0.01)
+    assert least_hold_m(Settings(range_noise=0.5)) == least
+    assert least_hold_m(Settings(range_noise=50.0)) == math.inf
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])
@@ -144,7 +149,7 @@ def test_links_are_the_same_in_numpy_as_written_and_compiled(
     found = candidates(navigable(read_floor(SAMPLE), Settings(overlap=share, grid=1.0)))
     fast = links_of(found)
     pairs = [
-        links_by_kernel(kernel, overlaps_of(found), share)
+        links_by_kernel(kernel, overlaps_of(found), found.settings)
         for kernel in (firm_pairs, machine_code(firm_pairs))
     ]
     written, built = (sorted(zip(*map(np.concatenate, zip(*one, strict=True)), strict=True)) for one in pairs)

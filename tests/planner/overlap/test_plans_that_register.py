@@ -59,6 +59,23 @@ def test_the_plan_is_one_network_and_its_pairs_are_counted_again(made: PlanRepor
     assert "network     connected" in made.as_text()
 
 
+def test_errors_grow_with_the_noise_of_the_scanner(made: PlanReport) -> None:
+    """Three times as much noise predicts three times the errors; `check` knows."""
+    noisy = PlanReport(plan(three_rooms(), replace(ASKED, range_noise=6.0)).first, {}, {})
+    few, many = network_of(made.mission), network_of(noisy.mission)
+    assert few is not None and many is not None
+    one, other = (float(network.error_in_words(few.overlaps[0]).split()[0]) for network in (few, many))
+    assert other == pytest.approx(3 * one, abs=0.2)
+    assert len(many.stops) >= len(few.stops)
+    assert not list(network_overclaims(noisy.mission, noisy.part.space))
+    assert list(network_overclaims(made.mission, noisy.part.space))  # a third of the errors is claimed
+
+
+def test_a_scanner_of_much_noise_joins_no_scans() -> None:
+    settings = replace(ASKED, range_noise=50.0)
+    assert not links_of(candidates(navigable(three_rooms(), settings))).nnz
+
+
 def test_a_pair_that_says_more_than_is_counted_is_a_problem(made: PlanReport) -> None:
     pairs = made.mission.network
     assert not isinstance(pairs, msgspec.UnsetType)
