@@ -34,7 +34,10 @@ of a column for those of another side. The last keeps points at the ends of a fe
 pulling the pose: 13 mm became 1 mm.
 """
 HEADING_M = 0.1
-"""Distance by which one of the headings tried moves the farthest shared points from the next one."""
+"""Distance by which one of the headings tried moves the farthest shared points from the next one.
+
+Points that are so near to the other scan count as brought together.
+"""
 HEADING_FEW = 3
 """One of so many points of upright surfaces compares the headings."""
 LEVEL_FEW = 10

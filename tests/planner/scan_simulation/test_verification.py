@@ -359,3 +359,14 @@ def test_the_components_of_a_plan_are_those_of_its_simulated_scans(name: str) ->
     planned, simulated = ({frozenset(piece) for piece in item.pieces} for item in (network, proof.network))
     assert planned == simulated
     assert not [line for line in proof.unmet if "planned to register" in line]
+
+
+def test_scans_of_a_real_floor_register_without_the_robots_poses() -> None:
+    """Five of the six pairs of duplex do; the two stops of the other one share no second direction."""
+    if not READ["duplex-l1"].exists():
+        pytest.skip(f"{READ['duplex-l1']} is not at hand")
+    simulation = Simulation(range_m=Settings().range, poses=False)
+    proof = verified(read_floor(READ["duplex-l1"]), Settings(), simulation)
+    assert proof.network.closed
+    registered = [pair for pair in proof.network.pairs if pair.registered]
+    assert (len(registered), len(proof.network.pairs)) == (5, 6)
