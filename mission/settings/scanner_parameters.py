@@ -41,10 +41,10 @@ class ScannerParameters:
     range_noise: Annotated[
         float | None,
         _scanner(
-            "Noise of a distance that the scanner measures, mm rms",
+            "Noise of a distance that the scanner measures, rms",
             "mm",
             above=0,
-            most=100,
+            most=15,
             undecided="2",
             quiet=True,
         ),

@@ -23,7 +23,9 @@ ELLIPSE_POINTS = 49
 FLOOR_M = 0.4e-3
 """Registration error that no length of wall averages out: that of the thinned cloud, metres."""
 SIMULATED_NOISE_MM = 2.0
-"""Range noise with which both were measured, mm rms."""
+"""Range noise with which NOISE_M and FLOOR_M were measured, mm rms."""
+MOST_NOISE_MM = 15.0
+"""Range noise of a plan, at most: with 20 mm no pair is within 1 cm."""
 CONFIDENCE = 2.576
 """Standard deviations that a normal error exceeds, to either side, once in 100."""
 CONTROL_FRAME = "control points"
@@ -36,7 +38,7 @@ def noise_factor(range_noise: Any) -> float:
     Less noise counts as that, and so does what is no number: a mission's parameters are only recorded.
     """
     known = range_noise if isinstance(range_noise, int | float) and math.isfinite(range_noise) else 0.0
-    return max(1.0, known / SIMULATED_NOISE_MM)
+    return max(1.0, min(known, MOST_NOISE_MM) / SIMULATED_NOISE_MM)
 
 
 def predicted_error_m(hold_m: float, noise: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -29,11 +28,10 @@ ROUNDING = 0.5 * 10.0**-DIGITS
 def least_hold_m(settings: Settings) -> float:
     """Least registration strength of a pair: metres of wall that face its weakest direction.
 
-    With it 99 of 100 errors are within `ACCURACY_M`. No strength suffices for a scanner of much noise.
+    With it 99 of 100 errors are within `ACCURACY_M`.
     """
     noise = CONFIDENCE * noise_factor(settings.range_noise)
-    left = ACCURACY_M**2 - (noise * FLOOR_M) ** 2
-    return round((noise * NOISE_M) ** 2 / left, 4) if left > 0 else math.inf
+    return round((noise * NOISE_M) ** 2 / (ACCURACY_M**2 - (noise * FLOOR_M) ** 2), 4)
 
 
 @instance_cached

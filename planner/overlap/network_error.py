@@ -29,7 +29,7 @@ def information_of(moments: FloatArray, at: FloatArray, noise: float) -> FloatAr
     """Information (3, 3) of a pair from its normal matrix about the origin, for a scan at a point (2,).
 
     The error that no length of wall averages out is added at that point. `noise` is the scanner's
-    `noise_factor`: all errors are larger by it.
+    `noise_factor`: the pair's errors are larger by it.
     """
     to_point = np.array([[1.0, 0.0, -at[1]], [0.0, 1.0, at[0]], [0.0, 0.0, 1.0]])
     from_point = np.linalg.inv(to_point)

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.selection.bound_by_parts import bound_by_parts
+from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.linear_programme import minimised
 from stopgo.planner.selection.multiplier_bound import multiplier_bound
@@ -39,7 +39,8 @@ def _fewest(gains: IntArray, needed: int) -> int:
 def lower_bound(cover: Cover, *, found: int, quickly: bool = False) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
-    Small problems use the linear relaxation, large ones that of one part after another; `quickly`, problems
+    Small problems use the linear relaxation, large ones that of one part after another, or the multiplier
+    bound where the range is long; `quickly`, problems
     of more than `QUICK` entries a coarse relaxation, or a few steps of the multiplier bound.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
@@ -47,7 +48,10 @@ def lower_bound(cover: Cover, *, found: int, quickly: bool = False) -> int:
         return simple
     if quickly and entries > QUICK:
         return max(simple, coarse_bound(cover)) if entries <= LARGEST else first_bound(cover, found=found)
-    return max(simple, relaxation_bound(cover) if entries <= LARGEST else bound_by_parts(cover, found=found))
+    if entries <= LARGEST:
+        return max(simple, relaxation_bound(cover))
+    large = bound_by_parts if has_parts(cover) else multiplier_bound
+    return max(simple, large(cover, found=found))
 
 
 def first_bound(cover: Cover, *, found: int) -> int:

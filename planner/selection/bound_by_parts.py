@@ -21,8 +21,19 @@ from stopgo.planner.selection.multiplier_bound import PricedCover, multiplier_pr
 
 SIZE = 60_000
 """Entries of the covering matrix in a part, about, without the columns that it shares with others."""
+MOST_AROUND = 300_000
+"""Entries around a column, by the mean numbers of rows and columns, up to which parts save time."""
 FIRST_STEPS = 60
 """Steps of the multiplier bound, for the first prices."""
+
+
+def has_parts(cover: Cover) -> bool:
+    """True if rows see so few columns that parts are much smaller than the whole.
+
+    On open floors of long range each part is nearly all that a row sees, several times over.
+    """
+    entries = cover.sees.nnz
+    return entries**3 <= MOST_AROUND * cover.columns**2 * cover.rows
 
 
 def bound_by_parts(cover: Cover, *, found: int) -> int:

@@ -18,6 +18,10 @@ LEVEL = 1.1
 """The best bound so far times this is aimed at, where the best known selection is higher."""
 FIRST_STEP = 2.0
 """First step as a multiple of Polyak's for the value aimed at."""
+LEAST_NORM = 1e-12
+"""Square of a slope below which it is rounding, and a step along it would be of any length."""
+ROUNDING = 1e-12
+"""Rounding error of a bound, as a fraction of all amounts that it sums up."""
 SMOOTHING = 0.2
 """Weight of the newest slope in the direction of a step.
 
@@ -55,7 +59,7 @@ def multiplier_prices(problem: PricedCover, *, found: int, steps: int) -> tuple[
             best, best_prices = value, prices
         direction = slope if not direction.any() else SMOOTHING * slope + (1 - SMOOTHING) * direction
         norm = float((direction * direction).sum())  # no BLAS: its threads wait for each other for longer
-        if best > found - 1 + 1e-6 or norm == 0.0:
+        if best > found - 1 + 1e-6 or norm < LEAST_NORM:
             break
         if waited >= PATIENCE:
             step, waited = step / 2, 0
@@ -89,28 +93,25 @@ class PricedCover:
         """The lower bound at these prices, and its subgradient."""
         cover = self.cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
-        spare = 1.0 - self._sees @ column
-        cost = self._cost(prices)
+        paid_to, paid, gained = self._sees @ column, cover.asks * column, self._rest_of_column @ demand
+        spare, cost = 1.0 - paid_to, paid - gained
         bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self.needed[1:])
-        value = whole + float((cost * bought).sum())
+        amounts = paid_to.sum() + paid.sum() + gained.sum() + demand @ self.needed[1:]
+        value = whole + float((cost * bought).sum()) - ROUNDING * float(amounts)
         seen = self._sees.T @ (spare < 0).astype(float)
         return value, np.concatenate([cover.asks * bought - seen, self.needed[1:] - self._rest @ bought])
 
     def price_of_whole(self, prices: FloatArray) -> float:
         """Highest cost, per weight, of what is bought to meet the whole's demand at these prices."""
-        cost = self._cost(prices) / np.maximum(self.weight, 1e-300)
-        bought = self._cheapest(self._cost(prices)) > 0
-        return max(0.0, float(cost[bought & (self.weight > 0)].max(initial=0.0)))
-
-    def _cost(self, prices: FloatArray) -> FloatArray:
-        """Cost of seeing each column, less what it adds to demands (columns,)."""
         columns = self.cover.columns
-        return np.asarray(self.cover.asks * prices[:columns] - self._rest_of_column @ prices[columns:])
+        cost = self.cover.asks * prices[:columns] - self._rest_of_column @ prices[columns:]
+        bought = (self._cheapest(cost) > 0) & (self.weight > 0)
+        return float((cost[bought] / self.weight[bought]).max(initial=0.0))
 
     def _cheapest(self, cost: FloatArray) -> FloatArray:
         """Fractions of columns that meet the whole's demand at least cost; negative costs are taken."""
-        worth = np.maximum(self.weight, 1e-300)
+        worth = np.where(self.weight > 0, self.weight, 1.0)
         order = np.argsort(cost / worth, kind="stable")
         before = np.cumsum(self.weight[order]) - self.weight[order]
         bought = np.empty(len(cost))

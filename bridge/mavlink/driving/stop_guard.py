@@ -6,6 +6,7 @@ after a kill that no program can catch. It does not help where the computer itse
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -35,6 +36,7 @@ FRAMES = 40
 FORMER_S = 6.0
 """Longest wait for the guard of a former program, which stops the same vehicle."""
 FORMER_TICK_S = 0.02
+FORMER = "the guard of a former program still stops the vehicle; waiting for its end"
 END_S = 2.0
 STUCK_S = 1
 """Longest time for which a sign of life waits for a process that reads none, in whole seconds."""
@@ -130,12 +132,21 @@ def _name_of(peer: Peer) -> str:
 
 def _await_former(name: str) -> None:
     """Wait until no guard of a former program stops this vehicle any more."""
+    if _is_held(name):
+        say(FORMER)
     until_s = time.monotonic() + FORMER_S
-    while time.monotonic() < until_s:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe, suppress(OSError):
-            probe.bind(f"\0{name}")
-            return
+    while _is_held(name) and time.monotonic() < until_s:
         time.sleep(FORMER_TICK_S)
+
+
+def _is_held(name: str) -> bool:
+    """Return True if another process holds this name."""
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe:
+            probe.bind(f"\0{name}")
+    except OSError as error:
+        return error.errno == errno.EADDRINUSE
+    return False
 
 
 def _started(name: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:

@@ -13,8 +13,7 @@ import os
 import select
 import socket
 import sys
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, suppress
 from typing import Any
 
 SILENT_S = 0.35
@@ -37,19 +36,8 @@ def main(descriptor: int, name: str) -> None:
                 os.close(end)
             told, ends = sign
         elif told["drives"]:
-            with held("" if is_open else name):
-                stop(line, told, ends, is_open=is_open)
+            stop(line, told, ends, name="" if is_open else name)
             told = {**told, "drives": False}  # once: the next sign of life says it again
-
-
-@contextmanager
-def held(name: str) -> Iterator[None]:
-    """Hold this name of an abstract socket for a while, unless it is empty or another process has it."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as holder:
-        with suppress(OSError):
-            if name:
-                holder.bind(f"\0{name}")
-        yield
 
 
 def next_sign(
@@ -65,15 +53,37 @@ def next_sign(
     return (True, (json.loads(data), descriptors)) if data else (False, None)
 
 
-def stop(line: socket.socket, told: dict[str, Any], ends: list[int], *, is_open: bool) -> None:
-    """Write the frames, one after another, until the program shows a sign of life again."""
+def stop(line: socket.socket, told: dict[str, Any], ends: list[int], *, name: str) -> None:
+    """Write the frames, one after another, until the program shows a sign of life again.
+
+    `name` is held meanwhile, and empty if the program hangs; one that has ended shows no sign.
+    """
+    holder = None
     for frame in told["frames"]:
         for end, to in zip(ends, told["to"], strict=True):
             write(end, bytes.fromhex(frame), to)
-        if select.select([line] if is_open else [], [], [], AGAIN_S)[0]:
+        holder = holder or bound(name)
+        if select.select([] if name else [line], [], [], AGAIN_S)[0]:
             break
+    if holder is not None:
+        holder.close()
     with suppress(OSError):
         line.send(b"stopped")
+
+
+def bound(name: str) -> socket.socket | None:
+    """Return an abstract socket of this name; None without one, or while another process has it."""
+    if not name:
+        return None
+    with suppress(OSError):
+        holder = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            holder.bind(f"\0{name}")
+        except OSError:
+            holder.close()
+        else:
+            return holder
+    return None
 
 
 def write(end: int, data: bytes, to: list[Any] | None) -> None:

@@ -11,9 +11,9 @@ import pytest
 
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import frozen
-from stopgo.mission.settings import Settings
+from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
-from stopgo.mission.stages.network import CONFIDENCE, predicted_error_m
+from stopgo.mission.stages.network import CONFIDENCE, MOST_NOISE_MM, predicted_error_m
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
 from stopgo.planner.overlap import ACCURACY_M, least_hold_m, links_by_kernel, links_of, overlaps_of
@@ -138,7 +138,8 @@ def test_the_least_strength_is_that_of_the_accuracy() -> None:
     assert noisy > 9 * least
     assert predicted_error_m(noisy, 3.0) * CONFIDENCE == pytest.approx(ACCURACY_M, rel=0.01)
     assert least_hold_m(Settings(range_noise=0.5)) == least
-    assert least_hold_m(Settings(range_noise=50.0)) == math.inf
+    most = PARAMETERS["range_noise"].most
+    assert most == MOST_NOISE_MM and least_hold_m(Settings(range_noise=most)) < 1.1
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])

@@ -71,11 +71,6 @@ def test_errors_grow_with_the_noise_of_the_scanner(made: PlanReport) -> None:
     assert list(network_overclaims(made.mission, noisy.part.space))  # a third of the errors is claimed
 
 
-def test_a_scanner_of_much_noise_joins_no_scans() -> None:
-    settings = replace(ASKED, range_noise=50.0)
-    assert not links_of(candidates(navigable(three_rooms(), settings))).nnz
-
-
 def test_a_pair_that_says_more_than_is_counted_is_a_problem(made: PlanReport) -> None:
     pairs = made.mission.network
     assert not isinstance(pairs, msgspec.UnsetType)

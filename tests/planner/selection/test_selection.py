@@ -107,6 +107,15 @@ def test_no_bound_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
         assert bound_by_parts.bound_by_parts(cover, found=len(greedy(cover))) <= optimum
 
 
+@pytest.mark.parametrize(("seed", "found"), [(102, 4), (1088, 2), (1088, 3)])
+def test_a_slope_of_rounding_raises_no_bound(seed: int, found: int) -> None:
+    """A step along it made prices of 1e18, whose sums differ by more than any bound."""
+    for views in (1, 2, 3):
+        cover, optimum = asking(small_cover(seed), views), optimum_of(seed, views)
+        assert bound_by_parts.bound_by_parts(cover, found=found) <= optimum
+        assert multiplier_bound(cover, found=found, steps=60) <= optimum
+
+
 def test_the_first_bound_of_a_large_problem_is_nearly_that_of_its_relaxation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
