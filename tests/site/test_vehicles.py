@@ -63,6 +63,7 @@ def test_a_vehicle_is_pushed_to_started_stopped_and_resumed(site: Site, fleet: S
         pushed = orders.push("rover", PushRequest(id="1", file="m"), site.mission).result()
         assert pushed.outcome == "ok", pushed.message
         wait_until(lambda: feed.value("mission", "rover"))
+        wait_until(lambda: feed.value("pose", "rover"))  # it has an origin, and so a position, since the push
         started = orders.order("rover", OrderRequest(id="2", verb="start")).result()
         assert started.state == "RUNNING", started.message
         wait_until(lambda: (feed.value("pose", "rover") or {"speed": 0})["speed"] > 0.1)
