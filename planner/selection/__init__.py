@@ -60,6 +60,8 @@ QUICK_SWAPS = 20
 """Swaps per removed stop in a plan that only estimates the number of stops."""
 ROUNDS = 12
 """Rounds in which the default method adds cuts to connect its selection."""
+PATIENCE = 3
+"""Rounds without fewer stops after which it adds no more."""
 EXACT_ROUNDS = 60
 """The same for the exact method."""
 METHODS: dict[str, Selector] = {"default": _default, "greedy": _greedy, "exact": _exact, "anywhere": _default}
@@ -138,7 +140,7 @@ def _connected(
     if method.name == "exact":
         rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
     elif method.name == "default":
-        rows, bound = connected(task, Searches.default(task), rounds=ROUNDS)
+        rows, bound = connected(task, Searches.default(task), rounds=ROUNDS, patience=PATIENCE)
     else:
         rows, bound = connected(task, lambda cover, *_: _solved(method, cover, settings), rounds=1)
     if method.ours and bound < len(rows):

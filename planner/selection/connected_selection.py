@@ -117,16 +117,22 @@ class ConnectedCover:
         return len(parts.whole) + min(1, len(parts.last)) > 1
 
 
-def connected(task: ConnectedCover, search: Search, *, rounds: int) -> tuple[IntArray, int]:
-    """Rows that meet every demand and are connected as far as links allow, and a lower bound."""
+def connected(
+    task: ConnectedCover, search: Search, *, rounds: int, patience: int | None = None
+) -> tuple[IntArray, int]:
+    """Rows that meet every demand and are connected as far as links allow, and a lower bound.
+
+    It ends after so many rounds, or before, once `patience` of them brought no better rows.
+    """
     best = _by_greedy(task)
-    bound, conditions = 0, Conditions(task.cover.rows)
+    bound, conditions, waited = 0, Conditions(task.cover.rows), 0
     for _ in range(rounds):
         rows, at_least = search(task.problem, best, conditions)
         bound = max(bound, at_least)
         found = connected_rows(task, rows)
-        best = found if len(found) < len(best) else best
-        if len(best) <= bound or not task.parts(rows):
+        waited = 0 if len(found) < len(best) else waited + 1
+        best = found if waited == 0 else best
+        if len(best) <= bound or waited == patience or not task.parts(rows):
             break
         if not task.take_cuts(rows) and not conditions.take(task.separating.conditions(rows)):
             break
