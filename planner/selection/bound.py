@@ -10,7 +10,7 @@ from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.linear_programme import minimised
-from stopgo.planner.selection.multiplier_bound import multiplier_bound
+from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_up
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
@@ -73,7 +73,7 @@ def relaxation_bound(cover: Cover) -> int:
     from the solver's.
     """
     prices = _relaxation_prices(cover) if cover.needed.any() else None
-    return 0 if prices is None else int(np.ceil(_dual_value(cover, *prices) - 1e-6))
+    return 0 if prices is None else rounded_up(_dual_value(cover, *prices))
 
 
 @instance_cached
@@ -91,7 +91,7 @@ def coarse_bound(cover: Cover) -> int:
     prices = _relaxation_prices(coarse)
     if prices is None:
         return 0
-    return int(np.ceil(_dual_value(cover, fraction @ prices[0], prices[1]) - 1e-6))
+    return rounded_up(_dual_value(cover, fraction @ prices[0], prices[1]))
 
 
 def _group_fractions(cover: Cover, size: int) -> csr_array:

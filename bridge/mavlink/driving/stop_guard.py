@@ -36,6 +36,7 @@ FRAMES = 40
 FORMER_S = 6.0
 """Longest wait for the guard of a former program, which stops the same vehicle."""
 FORMER_TICK_S = 0.02
+"""Interval between two looks if it has ended: no message says so."""
 FORMER = "the guard of a former program still stops the vehicle; waiting for its end"
 END_S = 2.0
 STUCK_S = 1
