@@ -22,7 +22,7 @@ LIKELY = 60
 """Changes of a long tour that are timed, the best by driving time."""
 
 Tours = tuple[Tour, ...]
-Change = dict[int, Tour]
+NewTours = dict[int, Tour]
 """New tours, by their number."""
 
 
@@ -81,7 +81,7 @@ def _times(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> list[float]
 
 
 def _worths(
-    clock: TourTimes, changes: Sequence[Change], times: Sequence[float], starts: Sequence[int]
+    clock: TourTimes, changes: Sequence[NewTours], times: Sequence[float], starts: Sequence[int]
 ) -> list[tuple[float, float]]:
     """Seconds of the longest tour, and of all tours, after each change of tours that take `times`."""
     alike: dict[tuple[int, int], dict[Tour, float]] = {}
@@ -101,7 +101,7 @@ def _worths(
 
 def _exchanged(
     clock: TourTimes, tours: Tours, times: Sequence[float], starts: Sequence[int]
-) -> Iterator[Change]:
+) -> Iterator[NewTours]:
     """Changes that move a stop of the longest tour to another, or exchange it for one of another."""
     longest = times.index(max(times))
     if len(tours[longest]) > LONG:
@@ -138,7 +138,7 @@ def _inserted(tour: Tour, stop: int, at: int) -> Tour:
 
 def _likely_exchanges(
     clock: TourTimes, tours: Tours, times: Sequence[float], starts: Sequence[int]
-) -> Iterator[Change]:
+) -> Iterator[NewTours]:
     """Moves and exchanges of a stop of a long longest tour, the best by estimated driving time."""
     longest = times.index(max(times))
     own, leaving = np.array(tours[longest]), _left_out(clock, tours[longest], starts[longest])
