@@ -25,6 +25,7 @@ from stopgo.mission.document.schedule import straight_time
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.covering_tour.zones import Zone
 from stopgo.planner.routing import Ends, far_edge, tour_matrix
+from stopgo.planner.routing.assemble import ROUNDING_M, ROUNDING_RAD
 from stopgo.planner.routing.tour import NANOMETRES, best_of_all, length_of, nanometres
 from stopgo.planner.routing.tour_bound import one_tree_bound
 
@@ -32,10 +33,6 @@ APART_M = (0.0, 1.0, 3.0, 6.0)
 """Least distances between zones, one per set of zones; the set with the highest bound counts."""
 DETOURS = (4.0, 0.0, 2.0, 8.0, 16.0, 32.0)
 """Allowed detours in seconds; the one with the highest bound counts. The first compares sets of zones."""
-ROUNDING_M = 4e-6
-"""Metres by which a leg of a mission may be shorter than planned, because its points are rounded."""
-ROUNDING_RAD = 1e-4
-"""Radians by which the leg may turn less."""
 STEP_S = 1e-4
 """Step in seconds to which detours are rounded down."""
 MOST_POINTS = 1600

@@ -44,6 +44,11 @@ from stopgo.planner.routing import GRAPHS
 from stopgo.planner.space.gaps import CLEAR_SLACK, Walls, keeps_clear
 from stopgo.planner.space.reach import walls_of
 
+ROUNDING_M = 4e-6
+"""Metres by which a leg of a mission may be shorter than planned, because its points are rounded."""
+ROUNDING_RAD = 1e-4
+"""Radians by which a turn of a mission may be smaller than planned, for the same reason."""
+
 
 def assemble(
     route: Route, *, part: int = 0, revision: int = 1, allocation: MissionAllocation | UnsetType = UNSET

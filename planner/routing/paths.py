@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -14,6 +14,8 @@ from stopgo.planner.geometry.shapes import SLACK
 
 CHUNK = 256
 """Points whose distances to all nodes are in memory at a time."""
+MOST_KEPT = 32_000_000
+"""Nodes of all the trees of paths that are kept, 128 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +28,29 @@ class Paths:
     """(points, points) in metres; infinite where there is no path."""
     graph: csr_array
     """(nodes, nodes): lengths of the straight pieces."""
+    _trees: dict[int, IntArray | None] = field(default_factory=dict)
+    """By point: the node before each node (nodes,), once a second path from the point was asked for."""
 
     def path(self, start: int, end: int) -> FloatArray:
         """The polyline (n, 2) from one point to another, both included."""
-        limit = float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
-        before = dijkstra(self.graph, False, start, return_predecessors=True, limit=limit)[1]
+        before = self._tree(start, end)
         nodes = [end]
         while nodes[-1] != start:
             if before[nodes[-1]] < 0:
                 raise ValueError(f"no path from point {start} to point {end}")
             nodes.append(int(before[nodes[-1]]))
         return straightened(self.xy[nodes[::-1]])
+
+    def _tree(self, start: int, end: int) -> IntArray:
+        """The node before each node on its shortest path from `start` (nodes,), or only to `end`."""
+        kept = self._trees.get(start)
+        if kept is not None:
+            return kept
+        again = start in self._trees and len(self.xy) * len(self._trees) <= MOST_KEPT
+        limit = np.inf if again else float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
+        found: IntArray = dijkstra(self.graph, False, start, return_predecessors=True, limit=limit)[1]
+        self._trees[start] = found if again else None
+        return found
 
     way = path  # its name in 0.1; ends with 0.3
 

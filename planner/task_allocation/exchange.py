@@ -6,7 +6,6 @@ Of long tours only those changes are timed that are the best by driving time alo
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -23,25 +22,25 @@ LIKELY = 60
 """Changes of a long tour that are timed, the best by driving time."""
 
 Tours = tuple[Tour, ...]
+NewTours = dict[int, Tour]
+"""New tours, by their number."""
 
 
 def shorter_longest(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Tours:
     """Tours, none without a stop, with a shorter longest tour, then with a shorter total; else the same."""
     tours = tuple(shorter(clock, tour, start) for tour, start in zip(tours, starts, strict=True))
-    worth = _worth(clock, tours, starts)
+    times = _times(clock, tours, starts)
     for _ in range(ROUNDS):
-        found = None
-        for other in _exchanged(clock, tours, starts):
-            its = _worth(clock, other, starts)
+        changes = list(_exchanged(clock, tours, times, starts))
+        worths = _worths(clock, changes, times, starts)
+        best, worth = None, (max(times), sum(times))
+        for change, its in zip(changes, worths, strict=True):
             if its[0] < worth[0] - GAIN or (its[0] < worth[0] + GAIN and its[1] < worth[1] - GAIN):
-                found, worth = other, its
-        if found is None:
+                best, worth = change, its
+        if best is None:
             return tours
-        tours = tuple(
-            tour if tour is before else shorter(clock, tour, start)
-            for tour, before, start in zip(found, tours, starts, strict=True)
-        )
-        worth = _worth(clock, tours, starts)
+        tours = _with(tours, {k: shorter(clock, tour, starts[k]) for k, tour in best.items()})
+        times = _times(clock, tours, starts)
     return tours
 
 
@@ -61,54 +60,85 @@ def shorter(clock: TourTimes, tour: Tour, start: int) -> Tour:
     """The same stops in an order that no reversal, and no move of up to three stops, makes shorter."""
     best = clock.seconds(tour, start)
     for _ in range(ROUNDS):
-        order, seconds = min(
-            ((other, clock.seconds(other, start)) for other in _orders_to_try(clock, tour, start)),
-            key=lambda found: found[1], default=(tour, best),
-        )  # fmt: skip
-        if seconds > best - GAIN:
+        orders = list(_orders_to_try(clock, tour, start))
+        seconds = clock.seconds_of(orders, start) if orders else np.array([best])
+        least = int(np.argmin(seconds))
+        if seconds[least] > best - GAIN:
             return tour
-        tour, best = order, seconds
+        tour, best = orders[least], float(seconds[least])
     return tour
 
 
 def _worth(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> tuple[float, float]:
     """Seconds of the longest tour, and of all tours."""
-    times = [clock.seconds(tour, start) for tour, start in zip(tours, starts, strict=True)]
+    times = _times(clock, tours, starts)
     return max(times), sum(times)
 
 
-def _exchanged(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> Iterator[Tours]:
-    """Tours with a stop of the longest tour moved to another, or exchanged for one of another."""
-    times = [clock.seconds(tour, start) for tour, start in zip(tours, starts, strict=True)]
+def _times(clock: TourTimes, tours: Tours, starts: Sequence[int]) -> list[float]:
+    """Seconds of each tour."""
+    return [clock.seconds(tour, start) for tour, start in zip(tours, starts, strict=True)]
+
+
+def _worths(
+    clock: TourTimes, changes: Sequence[NewTours], times: Sequence[float], starts: Sequence[int]
+) -> list[tuple[float, float]]:
+    """Seconds of the longest tour, and of all tours, after each change of tours that take `times`."""
+    alike: dict[tuple[int, int], dict[Tour, float]] = {}
+    for change in changes:
+        for k, tour in change.items():
+            alike.setdefault((starts[k], len(tour)), {})[tour] = 0.0
+    for (start, _), known in alike.items():
+        known.update(zip(known, clock.seconds_of(list(known), start).tolist(), strict=True))
+    found = []
+    for change in changes:
+        after = list(times)
+        for k, tour in change.items():
+            after[k] = alike[starts[k], len(tour)][tour]
+        found.append((max(after), sum(after)))
+    return found
+
+
+def _exchanged(
+    clock: TourTimes, tours: Tours, times: Sequence[float], starts: Sequence[int]
+) -> Iterator[NewTours]:
+    """Changes that move a stop of the longest tour to another, or exchange it for one of another."""
     longest = times.index(max(times))
     if len(tours[longest]) > LONG:
-        yield from _likely_exchanges(clock, tours, starts, times)
+        yield from _likely_exchanges(clock, tours, times, starts)
         return
-    for stop in tours[longest]:
-        rest = _without(tours[longest], stop)
-        for k, tour in enumerate(tours):
-            if k == longest:
-                continue
-            if rest:
-                yield _with(tours, {longest: rest, k: _inserted(clock, tour, stop, starts[k])})
-            for other in tour:
-                back = _inserted(clock, rest, other, starts[longest])
-                there = _inserted(clock, _without(tour, other), stop, starts[k])
-                yield _with(tours, {longest: back, k: there})
+    own = tours[longest]
+    rests = [_without(own, stop) for stop in own]
+    for k, tour in enumerate(tours):
+        if k == longest:
+            continue
+        entered = _places(clock, tour, own, starts[k])
+        back = [_places(clock, rest, tour, starts[longest]) for rest in rests]
+        left = [_without(tour, other) for other in tour]
+        there = [_places(clock, rest, own, starts[k]) for rest in left]
+        for i, stop in enumerate(own):
+            if rests[i]:
+                yield {longest: rests[i], k: _inserted(tour, stop, entered[i])}
+            for j, other in enumerate(tour):
+                yield {
+                    longest: _inserted(rests[i], other, back[i][j]),
+                    k: _inserted(left[j], stop, there[j][i]),
+                }
 
 
-def _inserted(clock: TourTimes, tour: Tour, stop: int, start: int) -> Tour:
-    """The tour with one more stop, where the driving time grows least."""
-    least, depot = clock.least, clock.stops + start
-    line = (depot, *tour, depot)
-    added = [(least[a, stop] + least[stop, b] - least[a, b], k) for k, (a, b) in enumerate(pairwise(line))]
-    at = min(added)[1]
+def _places(clock: TourTimes, tour: Tour, stops: Sequence[int], start: int) -> list[int]:
+    """Index in a tour at which each stop adds the least driving time."""
+    line = np.array([clock.stops + start, *tour, clock.stops + start])
+    return [int(k) for k in np.argmin(_added_at(clock, np.array(stops), line), axis=1)]
+
+
+def _inserted(tour: Tour, stop: int, at: int) -> Tour:
     return (*tour[:at], stop, *tour[at:])
 
 
 def _likely_exchanges(
-    clock: TourTimes, tours: Tours, starts: Sequence[int], times: list[float]
-) -> Iterator[Tours]:
+    clock: TourTimes, tours: Tours, times: Sequence[float], starts: Sequence[int]
+) -> Iterator[NewTours]:
     """Moves and exchanges of a stop of a long longest tour, the best by estimated driving time."""
     longest = times.index(max(times))
     own, leaving = np.array(tours[longest]), _left_out(clock, tours[longest], starts[longest])
@@ -125,12 +155,11 @@ def _likely_exchanges(
         found.append(_rated(back, there, own[:, None], k, others))
     for stop, k, other in _likeliest(np.concatenate([np.empty((0, 5)), *found])):
         rest = _without(tours[longest], stop)
-        if other < 0:
-            yield _with(tours, {longest: rest, k: _inserted(clock, tours[k], stop, starts[k])})
-            continue
-        back_in = _inserted(clock, rest, other, starts[longest])
-        there_in = _inserted(clock, _without(tours[k], other), stop, starts[k])
-        yield _with(tours, {longest: back_in, k: there_in})
+        left = tours[k] if other < 0 else _without(tours[k], other)
+        there = _inserted(left, stop, *_places(clock, left, [stop], starts[k]))
+        if other >= 0:
+            rest = _inserted(rest, other, *_places(clock, rest, [other], starts[longest]))
+        yield {longest: rest, k: there}
 
 
 def _rated(one: FloatArray, other: FloatArray, stop: IntArray, tour: int, back: IntArray | int) -> FloatArray:
@@ -158,9 +187,13 @@ def _left_out(clock: TourTimes, tour: Tour, start: int) -> FloatArray:
 def _added(clock: TourTimes, stops: IntArray, tour: Tour, start: int) -> FloatArray:
     """Driving time that each stop adds to a tour where it adds least, about (stops,)."""
     line = np.array([clock.stops + start, *tour, clock.stops + start])
-    least = clock.least
-    added = least[stops[:, None], line[:-1]] + least[stops[:, None], line[1:]] - least[line[:-1], line[1:]]
-    return np.asarray(added.min(axis=1))
+    return np.asarray(_added_at(clock, stops, line).min(axis=1))
+
+
+def _added_at(clock: TourTimes, stops: IntArray, line: IntArray) -> FloatArray:
+    """Driving time that each stop adds in each leg of a line (stops, legs), about."""
+    least, a, b = clock.least, line[:-1], line[1:]
+    return np.asarray(least[stops[:, None], a] + least[stops[:, None], b] - least[a, b])
 
 
 def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
@@ -192,6 +225,9 @@ def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
 
 def _best(change: FloatArray, first: IntArray, second: IntArray) -> Iterator[tuple[float, int, int]]:
     """The changes with the least driving time, LIKELY of them, with their two places."""
+    if len(change) > LIKELY:
+        likely = np.flatnonzero(change <= np.partition(change, LIKELY - 1)[LIKELY - 1])
+        change, first, second = change[likely], first[likely], second[likely]
     for k in np.argsort(change, kind="stable")[:LIKELY].tolist():
         yield float(change[k]), int(first[k]), int(second[k])
 

@@ -1,7 +1,7 @@
 """Lower bounds on every division of the stops: on the longest tour's seconds, and on the number of tours.
 
-Every bound counts paths by `TourTimes.least`, a metric below every path's time, and does not count turns
-at stops.
+Most bounds count paths by `TourTimes.least`, a metric below every path's time, without turns at stops. The
+time of closed tours together counts these turns too (`TourTimes.turned_s`).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.routing.assemble import ROUNDING_M, ROUNDING_RAD
 from stopgo.planner.routing.proof import tour_proof
 from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from stopgo.planner.task_allocation.tour_times import TourTimes
@@ -29,6 +30,8 @@ def least_makespan(clock: TourTimes, starts: IntArray) -> float:
     times = clock.least
     tours, stops = len(starts), clock.stops
     together = stops * clock.pause_s + driven_together(times, stops, closed=clock.closed)
+    if clock.closed:
+        together = max(together, stops * clock.pause_s + driven_and_turned(clock, tours))
     even = seconds_of(clock, times, math.ceil(stops / tours))
     farthest = float(alone(clock, times).max()) + clock.pause_s
     return max(together / tours, even, farthest) - NOISE
@@ -38,12 +41,15 @@ def least_tours(clock: TourTimes, limit_s: float) -> int:
     """Lower bound on the number of closed tours within the limit.
 
     It follows from the time of all tours together, and from the most stops that fit in one tour by the
-    shortest paths.
+    shortest paths. The time of so many tours together, turns included, then rules out further numbers.
     """
     times, stops = clock.least, clock.stops
     together = stops * clock.pause_s + driven_together(times, stops, closed=True) - NOISE
     most = next((n for n in range(stops, 1, -1) if seconds_of(clock, times, n) - NOISE <= limit_s), 1)
-    return max(1, math.ceil(together / limit_s), math.ceil(stops / most))
+    count = max(1, math.ceil(together / limit_s), math.ceil(stops / most))
+    while count < stops and stops * clock.pause_s + driven_and_turned(clock, count) > count * limit_s:
+        count += 1
+    return count
 
 
 def alone(clock: TourTimes, times: FloatArray) -> FloatArray:
@@ -79,3 +85,23 @@ def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:
         return max(0.0, float(minimum_spanning_tree(whole + 1e-9).sum()) - 1e-9 * (stops + 1))
     order = shortest_tour(whole, seed=1)
     return tour_proof(nanometres(whole), order).bound / NANOMETRES
+
+
+def driven_and_turned(clock: TourTimes, tours: int) -> float:
+    """Lower bound in seconds on driving and turning of so many closed tours together.
+
+    One closed tour over the stops and over as many copies of the nearest start as there are tours, no two
+    copies next to each other, takes as long. It is bounded by the legs' times with their shares of turns.
+    """
+    stops, robot = clock.stops, clock.robot
+    among = clock.turned_s[:stops, :stops]
+    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
+    apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
+    whole = np.block([[among, there], [there.T, apart]])
+    lowest = min(0.0, float(whole.min()))  # below 0 where a leg's share is
+    whole -= lowest
+    np.fill_diagonal(whole, 0.0)
+    legs = stops + tours
+    least = tour_proof(nanometres(whole), shortest_tour(whole, seed=1)).bound / NANOMETRES
+    rounding = ROUNDING_M / robot.speed + 2 * ROUNDING_RAD / robot.turn_rate
+    return least + legs * (lowest - rounding)

@@ -7,41 +7,50 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from stopgo.mission.document import RobotSpec
-from stopgo.mission.document.schedule import leg_times, turn_time
+from stopgo.mission.document.schedule import leg_times
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.document.straight_times import straight_times
-from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.stages import Selection
 from stopgo.planner.routing import legs_between
 from stopgo.planner.routing.legs import Legs
+from stopgo.planner.task_allocation.turn_shares import turn_shares
 
 Tour = tuple[int, ...]
 """Stops in the order of driving."""
 
+MICROSECONDS = 1e6
+"""Per second."""
 NEAR = 30
 """Nearest points of each point to which corners of paths are counted in advance."""
 
 
-@dataclass(frozen=True)
-class LegFacts:
-    """A path between two points: seconds from rest to rest, and the headings at its ends.
+class _LegTimes(NamedTuple):
+    """Microseconds and headings of legs (n, n), -1 if a leg is not timed yet, and if it has no length."""
 
-    A path without length has no headings.
-    """
+    spent: IntArray
+    leaving: IntArray
+    arriving: IntArray
 
-    seconds: float
-    ends: tuple[float, float] | None
+    @classmethod
+    def unknown(cls, points: int) -> _LegTimes:
+        return cls(*(np.full((points, points), -1, dtype=np.int64) for _ in range(3)))
 
 
 @dataclass(frozen=True, eq=False)
 class TourTimes:
-    """Times of tours from the starts (points `stops` and up)."""
+    """Times of tours from the starts (points `stops` and up).
+
+    Times are counted in whole microseconds, and headings too: those of turning from +x. Sums are therefore
+    the same on every machine.
+    """
 
     legs: Legs
     points: FloatArray
@@ -54,8 +63,11 @@ class TourTimes:
     start_heading: tuple[float, ...]
     """In radians."""
     closed: bool
-    _facts: dict[tuple[int, int], LegFacts] = field(default_factory=dict)
-    """Cache by points."""
+
+    @cached_property
+    def _table(self) -> _LegTimes:
+        """The legs timed so far."""
+        return _LegTimes.unknown(len(self.points))
 
     @property
     def starts(self) -> range:
@@ -63,47 +75,72 @@ class TourTimes:
 
     def seconds(self, tour: Sequence[int], start: int = 0) -> float:
         """Seconds of a tour from the start of this number, and back to it if tours are closed."""
-        heading = self.start_heading[start]
-        here, total = self.stops + start, len(tour) * self.pause_s
-        for stop in tour:
-            spent, heading = self._driven(here, stop, heading)
-            total += spent
-            if len(self.heading):
-                wanted = float(self.heading[stop])
-                total += self._turn(wanted, heading)
-                heading = wanted
-            here = stop
-        return total + (self._driven(here, self.stops + start, heading)[0] if self.closed else 0.0)
+        return float(self.seconds_of([tour], start)[0])
 
-    def _driven(self, a: int, b: int, heading: float) -> tuple[float, float]:
-        """Seconds to turn into a leg and drive it, and the heading at its end."""
-        facts = self.facts(a, b)
-        if facts.ends is None:
-            return 0.0, heading
-        return facts.seconds + self._turn(facts.ends[0], heading), facts.ends[1]
+    def seconds_of(self, tours: Sequence[Sequence[int]], start: int = 0) -> FloatArray:
+        """Seconds (tours,) of tours over the same number of stops each."""
+        stops = np.array(tours, dtype=np.int64).reshape(len(tours), -1)
+        ends = np.full((len(stops), 1), self.stops + start)
+        line = np.concatenate([ends, stops, ends] if self.closed else [ends, stops], axis=1)
+        a, b = line[:, :-1], line[:, 1:]
+        self._time_legs(a, b)
+        spent = self._table.spent[a, b].sum(axis=1) + self._turned(a, b, start)
+        seconds: FloatArray = spent / MICROSECONDS + stops.shape[1] * self.pause_s
+        return seconds
 
-    def _turn(self, wanted: float, heading: float) -> float:
-        return turn_time(wanted - heading, turn_rate=self.robot.turn_rate)
+    def _turned(self, a: IntArray, b: IntArray, start: int) -> IntArray:
+        """Microseconds (tours,) of turning into legs and to the headings of scans."""
+        leaving, arriving = self._table.leaving[a, b], self._table.arriving[a, b]
+        first = np.full((len(a), 1), self._heading_of(self.start_heading[start]))
+        if not len(self.heading):
+            before = _last_known(np.concatenate([first, arriving[:, :-1]], axis=1))
+            return self._turns(before, leaving).sum(axis=1)
+        wanted = np.array([self._heading_of(float(heading)) for heading in self.heading])
+        before = np.concatenate([first, wanted[a[:, 1:]]], axis=1)
+        come = np.where(arriving < 0, before, arriving)
+        scanned = self._turns(come, wanted[np.minimum(b, self.stops - 1)]) * (b < self.stops)
+        return self._turns(before, leaving).sum(axis=1) + scanned.sum(axis=1)
 
-    def facts(self, a: int, b: int) -> LegFacts:
-        """The path from point a to point b."""
-        if (a, b) not in self._facts:
-            self._facts[a, b] = self._facts_of(self.line(a, b))
-        return self._facts[a, b]
+    def _turns(self, a: IntArray, b: IntArray) -> IntArray:
+        """Microseconds between headings the short way round, 0 to none."""
+        apart = np.abs(a - b)
+        turned: IntArray = np.where(b < 0, 0, np.minimum(apart, self._whole_turn - apart))
+        return turned
+
+    @cached_property
+    def _whole_turn(self) -> int:
+        """Microseconds of a full turn."""
+        return round(math.tau / self.robot.turn_rate * MICROSECONDS)
+
+    def _heading_of(self, radians: float) -> int:
+        return round(radians / math.tau * self._whole_turn) % self._whole_turn
+
+    def _time_legs(self, a: IntArray, b: IntArray) -> None:
+        """Time the legs from `a` to `b` that were not timed before."""
+        unknown = self._table.spent[a, b] < 0
+        if unknown.any():
+            for pair in np.unique(np.stack([a[unknown], b[unknown]], axis=1), axis=0).tolist():
+                self._time_leg(*pair)
+
+    def _time_leg(self, a: int, b: int) -> None:
+        """Time a leg from rest to rest, with its headings; in the other direction it takes as long."""
+        line = self.line(a, b)
+        steps = np.diff(line, axis=0)
+        steps = steps[np.any(steps != 0, axis=1)]
+        spent, leaving, arriving = self._table
+        if not len(steps):
+            spent[a, b] = spent[b, a] = 0
+            return
+        first, last = (math.atan2(y, x) for x, y in (steps[0], steps[-1]))
+        drive, turn, _ = leg_times([(x, y) for x, y in line.tolist()], heading=first, robot=self.robot)
+        spent[a, b] = spent[b, a] = round((drive + turn) * MICROSECONDS)
+        leaving[a, b], arriving[a, b] = self._heading_of(first), self._heading_of(last)
+        leaving[b, a], arriving[b, a] = self._heading_of(last + math.pi), self._heading_of(first + math.pi)
 
     def line(self, a: int, b: int) -> FloatArray:
         """The polyline (n, 2) from point a to point b: the same in both directions."""
         line = self.legs.path(min(a, b), max(a, b))
         return line if a <= b else frozen(line[::-1])
-
-    def _facts_of(self, line: FloatArray) -> LegFacts:
-        steps = np.diff(line, axis=0)
-        steps = steps[np.any(steps != 0, axis=1)]
-        if not len(steps):
-            return LegFacts(0.0, None)
-        first, last = (math.atan2(y, x) for x, y in (steps[0], steps[-1]))
-        drive, turn, _ = leg_times([(x, y) for x, y in line.tolist()], heading=first, robot=self.robot)
-        return LegFacts(drive + turn, (first, last))
 
     @cached_property
     def least(self) -> FloatArray:
@@ -124,19 +161,46 @@ class TourTimes:
         """
         speed, acceleration = self.robot.speed, self.robot.acceleration
         times = straight_times(self.legs.lengths, speed=speed, acceleration=acceleration)
-        for a, near in enumerate(self._near()):
-            for b in (*near.tolist(), *self.starts):
-                if a != b:
-                    times[a, b] = times[b, a] = self.facts(min(a, b), max(a, b)).seconds
+        a, b = np.nonzero(self._counted)
+        self._time_legs(a, b)
+        times[a, b] = self._table.spent[a, b] / MICROSECONDS
         return frozen(times)
+
+    @cached_property
+    def turned_s(self) -> FloatArray:
+        """Lower bounds in seconds (n, n) on paths, with their shares of the turns at both ends.
+
+        The turn at a stop takes at least the sum of the shares of the two legs that a tour uses there. A
+        start has no shares. Legs whose corners were not counted may leave in any direction, so that their
+        share is the negative of the largest other one.
+        """
+        self._time_legs(*np.nonzero(self._counted))
+        shares = np.zeros((len(self.points), len(self.points)))
+        for stop in range(self.stops):
+            near = np.flatnonzero(self._counted[stop] & (self._table.leaving[stop] >= 0))
+            near = near[np.argsort(self.legs.lengths[stop, near], kind="stable")]
+            away = self._table.leaving[stop, near] / MICROSECONDS * self.robot.turn_rate
+            scan = float(self.heading[stop]) if len(self.heading) else None
+            found = turn_shares(away, turn_rate=self.robot.turn_rate, scan=scan)
+            shares[stop] = -found.max(initial=0.0)
+            shares[stop, near] = found
+        return frozen(self._driven_s + (shares + shares.T))
 
     def estimate(self, turning: float) -> FloatArray:
         """Seconds (n, n) of every path, and of a fraction of half a turn before it."""
         turn = turning * math.pi / self.robot.turn_rate
         return frozen(np.where(self.legs.lengths > 0, self._driven_s + turn, 0.0))
 
-    def _near(self) -> IntArray:
-        return np.argsort(self.legs.lengths, axis=1, kind="stable")[:, 1 : NEAR + 1]
+    @cached_property
+    def _counted(self) -> BoolArray:
+        """True (n, n) between points if corners of the path are counted: the nearest ones, and starts."""
+        near = np.argsort(self.legs.lengths, axis=1, kind="stable")[:, 1 : NEAR + 1]
+        counted = np.zeros(self.legs.lengths.shape, dtype=bool)
+        counted[np.arange(len(self.points))[:, None], near] = True
+        counted[:, self.stops :] = True
+        counted |= counted.T
+        np.fill_diagonal(counted, False)
+        return frozen(counted, np.bool_)
 
 
 def tour_times(
@@ -158,3 +222,10 @@ def tour_times(
         start_heading=headings,
         closed=closed,
     )
+
+
+def _last_known(headings: IntArray) -> IntArray:
+    """The headings (tours, legs), each that is missing replaced by the one before it; the first is known."""
+    known = np.where(headings >= 0, np.arange(headings.shape[1]), 0)
+    found: IntArray = np.take_along_axis(headings, np.maximum.accumulate(known, axis=1), axis=1)
+    return found

@@ -14,10 +14,10 @@ import numpy as np
 
 from stopgo.mission.geometry import FloatArray
 
-ITERATIONS = 100
-"""Iterations of each search."""
-PER_STOP = 5
-"""Additional iterations per stop."""
+ITERATIONS = 200
+"""Iterations of each search, one more per stop, and at most as many as WORK allows."""
+WORK = 150_000
+"""Iterations times stops."""
 MILLISECONDS = 1_000
 
 
@@ -46,7 +46,11 @@ def vehicle_tours(
         duration_matrices=[whole],
     )
     found = pyvrp.solve(
-        data, MaxIterations(ITERATIONS + PER_STOP * stops), seed=seed, collect_stats=False, display=False
+        data,
+        MaxIterations(min(ITERATIONS + stops, max(1, WORK // stops))),
+        seed=seed,
+        collect_stats=False,
+        display=False,
     )
     return [_tour_of(route, stops) for route in found.best.routes()] if found.is_feasible() else None
 

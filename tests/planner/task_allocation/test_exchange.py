@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from stopgo.mission.geometry import FloatArray
 from stopgo.planner.task_allocation.exchange import LONG, _reordered, shorter, shorter_longest
 from stopgo.planner.task_allocation.tour_times import Tour, TourTimes
 
@@ -26,6 +28,9 @@ class StraightDrives:
         self.timed += 1
         line = (self.stops, *tour, self.stops)
         return len(tour) * self.pause_s + float(sum(self.least[a, b] for a, b in pairwise(line)))
+
+    def seconds_of(self, tours: Sequence[Tour], start: int = 0) -> FloatArray:
+        return np.array([self.seconds(tour, start) for tour in tours])
 
 
 def clock_of(stops: int, seed: int) -> tuple[StraightDrives, TourTimes]:
