@@ -15,13 +15,14 @@ The tour over the zones uses Held and Karp's bound. Turns at stops do not count.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from stopgo.mission.document import RobotSpec
 from stopgo.mission.document.schedule import straight_time
+from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.covering_tour.zones import Zone
 from stopgo.planner.routing import Ends, far_edge, tour_matrix
@@ -45,8 +46,8 @@ class RouteRequirements:
 
     lengths: FloatArray
     """(points, points) in metres."""
-    seconds: FloatArray
-    """Seconds from rest to rest, without turns at the ends (points, points)."""
+    seconds: FloatArray | None
+    """Seconds from rest to rest, without turns at the ends (points, points); None: of straight paths."""
     offered: IntArray
     """Points where there may be a stop."""
     zones: Sequence[Zone]
@@ -97,9 +98,8 @@ class _StopTimes:
 
 def _beyond_length(route: RouteRequirements, ends: IntArray) -> float:
     """Least seconds of a leg from one of these points above its length at full speed."""
-    away = route.lengths[np.ix_(ends, route.offered)].copy()
-    away[ends[:, None] == route.offered[None, :]] = np.inf
-    nearest = max(0.0, float(away.min(initial=np.inf)) - ROUNDING_M)
+    others = (route.lengths[end, route.offered[route.offered != end]] for end in ends)
+    nearest = max(0.0, min(float(away.min(initial=np.inf)) for away in others) - ROUNDING_M)
     robot = route.robot
     if not np.isfinite(nearest):
         return 0.0
@@ -110,20 +110,38 @@ def _beyond_length(route: RouteRequirements, ends: IntArray) -> float:
 
 
 class _PathTimes:
-    """Seconds of paths at full speed, with their corners; and of the quickest detours."""
+    """Seconds of paths at full speed, with their corners; and of the quickest detours.
+
+    Of very many points only the asked rows are computed, as a whole matrix is a large part of the memory.
+    """
 
     def __init__(self, route: RouteRequirements, between: float, outside: dict[int, float]) -> None:
-        driven = route.lengths / route.robot.speed
-        begin = np.full(len(driven), between)
-        begin[list(outside)] = list(outside.values())
-        self._direct = np.maximum(route.seconds - np.minimum(begin[:, None], begin[None, :]), 0.0)
-        np.fill_diagonal(self._direct, 0.0)
-        self._detour = driven if len(driven) > MOST_POINTS else _quickest(self._direct)
+        self._route = route
+        self._begin = np.full(len(route.lengths), between)
+        self._begin[list(outside)] = list(outside.values())
+        few = len(route.lengths) <= MOST_POINTS
+        self._quickest = _quickest(self._direct(np.arange(len(route.lengths)))) if few else None
 
-    def up_to(self, detour: float) -> FloatArray:
-        """The direct times, at most `detour` above the quickest detour."""
-        paths: FloatArray = np.minimum(self._direct, self._detour + detour)
-        np.fill_diagonal(paths, 0.0)
+    def _direct(self, points: IntArray) -> FloatArray:
+        """Seconds of the paths from these points, without a detour (points, all points)."""
+        route, robot = self._route, self._route.robot
+        if route.seconds is None:
+            lengths = route.lengths[points]
+            spent = straight_times(lengths, speed=robot.speed, acceleration=robot.acceleration)
+        else:
+            spent = route.seconds[points]
+        direct = np.maximum(spent - np.minimum(self._begin[points, None], self._begin), 0.0)
+        direct[np.arange(len(points)), points] = 0.0
+        return direct
+
+    def up_to(self, detour: float, points: IntArray) -> FloatArray:
+        """The direct times from these points, at most `detour` above the quickest detour."""
+        if self._quickest is None:
+            around = self._route.lengths[points] / self._route.robot.speed
+        else:
+            around = self._quickest[points]
+        paths = np.minimum(self._direct(points), around + detour)
+        paths[np.arange(len(points)), points] = 0.0
         return paths
 
 
@@ -143,15 +161,17 @@ def _by_zones(
         return 0.0  # one more stop might save time
     apart = len(zones) - len(route.outer)
     stops = max(route.stops, apart)
-    driven = _tour_over(route, zones, paths.up_to(detour)) - (stops - apart) * detour
+    driven = _tour_over(route, zones, lambda zone: paths.up_to(detour, zone)) - (stops - apart) * detour
     return alone.seconds(stops) + max(0.0, driven)
 
 
-def _tour_over(route: RouteRequirements, zones: list[IntArray], seconds: FloatArray) -> float:
-    """Lower bound in seconds on a tour over the zones, ends included."""
+def _tour_over(
+    route: RouteRequirements, zones: list[IntArray], seconds: Callable[[IntArray], FloatArray]
+) -> float:
+    """Lower bound in seconds on a tour over the zones, ends included; `seconds` are from points to all."""
     if len(zones) < 2:
         return 0.0
-    between = np.array([seconds[zone].min(axis=0) for zone in zones])
+    between = np.array([seconds(zone).min(axis=0) for zone in zones])
     between = np.array([between[:, zone].min(axis=1) for zone in zones])
     np.fill_diagonal(between, 0.0)
     between = np.minimum(between, between.T)

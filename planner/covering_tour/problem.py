@@ -41,7 +41,6 @@ from functools import cached_property
 import numpy as np
 
 from stopgo.mission.document.specs import robot_of
-from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Route, Visibility
@@ -227,17 +226,18 @@ class TourProblem:
             robot=robot_of(settings),
         )
 
-    def _paths_over(self, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Metres and seconds between rows, start and end; for very many rows in a straight line."""
+    def _paths_over(self, rows: IntArray) -> tuple[FloatArray, FloatArray | None]:
+        """Metres and seconds between rows, start and end; for very many rows straight, without seconds."""
         given = len(self._ends) - (self.begin is not None)
         if len(rows) == len(self.rows):
             points = len(rows) + given
             seconds = self.times.table.spent[:points, :points] / MICROSECONDS
             return self.legs.lengths[:points, :points], seconds
         xy = np.concatenate([self.candidates.xy[self.candidates.kept[rows]], self._ends[:given]])
-        lengths = np.hypot(*(np.subtract.outer(axis, axis) for axis in xy.T))
-        robot = robot_of(self.settings)
-        return lengths, straight_times(lengths, speed=robot.speed, acceleration=robot.acceleration)
+        lengths = np.empty((len(xy), len(xy)))
+        for k, point in enumerate(xy):
+            lengths[k] = np.hypot(*(xy - point).T)
+        return lengths, None
 
 
 def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:

@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+import stopgo.planner.covering_tour.least_time_bound
 import stopgo.planner.covering_tour.problem
 from stopgo.mission.document.schedule import leg_times, schedule, turn_time
 from stopgo.mission.document.specs import robot_of
+from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route
 from stopgo.planner.covering_tour import least_time_route
+from stopgo.planner.covering_tour.least_time_bound import least_time
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import problem_of
 from stopgo.planner.overlap import links_of
@@ -288,6 +291,18 @@ def test_of_very_many_candidates_the_nearest_are_tried_and_the_bound_is_lower(
     assert every is not None and some is not None
     assert 0 < some.bound <= every.bound
     assert some.seconds <= some.two_step_s
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_straight_paths_give_the_same_bound_with_and_without_a_matrix_of_times(
+    world: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = problem_of(two_step(world)).bound_problem
+    times = straight_times(asked.lengths, speed=asked.robot.speed, acceleration=asked.robot.acceleration)
+    known, straight = replace(asked, seconds=times), replace(asked, seconds=None)
+    assert least_time(straight) == least_time(known)
+    monkeypatch.setattr(stopgo.planner.covering_tour.least_time_bound, "MOST_POINTS", 0)
+    assert least_time(straight) == least_time(known)
 
 
 def test_one_stop_stays_one() -> None:
