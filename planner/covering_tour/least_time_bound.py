@@ -99,7 +99,8 @@ class _StopTimes:
 def _beyond_length(route: RouteRequirements, ends: IntArray) -> float:
     """Least seconds of a leg from one of these points above its length at full speed."""
     others = (route.lengths[end, route.offered[route.offered != end]] for end in ends)
-    nearest = max(0.0, min(float(away.min(initial=np.inf)) for away in others) - ROUNDING_M)
+    least = min((float(away.min(initial=np.inf)) for away in others), default=np.inf)
+    nearest = max(0.0, least - ROUNDING_M)
     robot = route.robot
     if not np.isfinite(nearest):
         return 0.0

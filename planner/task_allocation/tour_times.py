@@ -95,10 +95,9 @@ class TourTimes:
         if not len(self.heading):
             before = _last_known(np.concatenate([first, arriving[:, :-1]], axis=1))
             return self._turns(before, leaving).sum(axis=1)
-        wanted = np.array([self._heading_of(float(heading)) for heading in self.heading])
-        before = np.concatenate([first, wanted[a[:, 1:]]], axis=1)
+        before = np.concatenate([first, self._scanned[a[:, 1:]]], axis=1)
         come = np.where(arriving < 0, before, arriving)
-        scanned = self._turns(come, wanted[np.minimum(b, self.stops - 1)]) * (b < self.stops)
+        scanned = self._turns(come, self._scanned[np.minimum(b, self.stops - 1)]) * (b < self.stops)
         return self._turns(before, leaving).sum(axis=1) + scanned.sum(axis=1)
 
     def _turns(self, a: IntArray, b: IntArray) -> IntArray:
@@ -106,6 +105,11 @@ class TourTimes:
         apart = np.abs(a - b)
         turned: IntArray = np.where(b < 0, 0, np.minimum(apart, self._whole_turn - apart))
         return turned
+
+    @cached_property
+    def _scanned(self) -> IntArray:
+        """Heading of the scan at each stop, counted as others are."""
+        return np.array([self._heading_of(heading) for heading in self.heading.tolist()], dtype=np.int64)
 
     @cached_property
     def _whole_turn(self) -> int:
@@ -174,7 +178,7 @@ class TourTimes:
         start has no shares. Legs whose corners were not counted may leave in any direction, so that their
         share is the negative of the largest other one.
         """
-        self._time_legs(*np.nonzero(self._counted))
+        driven = self._driven_s  # which times the legs counted
         shares = np.zeros((len(self.points), len(self.points)))
         for stop in range(self.stops):
             near = np.flatnonzero(self._counted[stop] & (self._table.leaving[stop] >= 0))
@@ -184,7 +188,7 @@ class TourTimes:
             found = turn_shares(away, turn_rate=self.robot.turn_rate, scan=scan)
             shares[stop] = -found.max(initial=0.0)
             shares[stop, near] = found
-        return frozen(self._driven_s + (shares + shares.T))
+        return frozen(driven + (shares + shares.T))
 
     def estimate(self, turning: float) -> FloatArray:
         """Seconds (n, n) of every path, and of a fraction of half a turn before it."""

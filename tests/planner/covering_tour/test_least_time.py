@@ -305,6 +305,12 @@ def test_straight_paths_give_the_same_bound_with_and_without_a_matrix_of_times(
     assert least_time(straight) == least_time(known)
 
 
+def test_a_route_without_a_possible_stop_has_a_bound() -> None:
+    asked = problem_of(two_step("rooms")).bound_problem
+    nowhere = replace(asked, offered=np.empty(0, dtype=np.int64), zones=[], stops=1)
+    assert least_time(nowhere) == pytest.approx(nowhere.pause_s, abs=1e-3)
+
+
 def test_one_stop_stays_one() -> None:
     _, nouns = planned(hall(4, 3), Settings(range=8, grid=2.0, minimise="time"))
     made: Route = nouns[Route]
