@@ -21,9 +21,9 @@ export function makeStopBar(bar, me) {
   fill(bar, button, list, h("p", { id: "stop-help", class: "hidden-text" }, t("stop_help")));
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Escape" || event.repeat) return;
-    const now = performance.now();
-    if (now - escaped < TWICE_MS) pressed();
-    escaped = now - escaped < TWICE_MS ? -Infinity : now;
+    const at = event.timeStamp; // when the key went down: a busy page handles it later
+    if (at - escaped < TWICE_MS) pressed();
+    escaped = at - escaped < TWICE_MS ? -Infinity : at;
   });
   setInterval(() => show(list), 100);
 }
