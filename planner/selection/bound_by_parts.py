@@ -4,8 +4,8 @@ A linear programme of a whole floor takes time that grows with almost the square
 are already good are improved part by part instead, while all others stay: a dual block ascent. Each part
 is one programme, with what the other prices leave of each row's cost, and after one pass over overlapping
 parts the bound is within 0.2 % of the whole programme's. Two parts that have little in common are solved at
-a time, from the same prices, so that the solver uses two cores. The bound is computed from the prices alone, so it
-needs no trust in the solver.
+a time, from the same prices, so that the solver uses two cores. The bound is computed from the prices
+alone, so it needs no trust in the solver.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import Any
 
 import numpy as np
