@@ -42,7 +42,7 @@ def label_components(first: Any, to: Any, inside: Any, label: Any, stack: Any) -
 
 def grow_parts(
     first: Any, to: Any, inside: Any, seeds: Any, label: Any, parent: Any, head: Any, tail: Any,
-    following: Any, met: Any,
+    turn: Any, following: Any, met: Any,
 ) -> int:  # fmt: skip
     """Grow a part from each seed, by turns, until all but one are whole; return the number of rows met.
 
@@ -51,40 +51,45 @@ def grow_parts(
 
     The arguments are as for `label_components`, and: `seeds` from which parts grow (n,); `label`, -1, which
     receives the part of each row met, and `met`, the rows met (rows,); `parent`, `head` and `tail`, which
-    receive what each part became, and from and to which row it has yet to grow, or -1 (n,); `following`,
-    scratch, the next such row after each (rows,).
+    receive what each part became, and from and to which row it has yet to grow, or -1, and `turn`, scratch
+    (n,); `following`, scratch, the next such row after each (rows,).
     """
-    parts = plant(inside, seeds, label, parent, head, tail, following, met)
-    growing, count, part = parts, parts, 0
+    count = plant(inside, seeds, label, parent, head, tail, turn, following, met)
+    growing, turns = count, count
     while growing > 1:
-        if parent[part] == part and head[part] >= 0:
-            here = head[part]
+        parts, turns = turns, 0
+        for k in range(parts):
+            part = turn[k]
+            if growing == 1 or parent[part] != part or head[part] < 0:
+                continue
+            turn[turns], here = part, head[part]
+            turns += 1
             head[part] = following[here]
             for link in range(first[here], first[here + 1]):
-                if inside[to[link]] == 0:
-                    continue
-                if label[to[link]] < 0:
-                    label[to[link]], met[count], following[to[link]] = part, to[link], -1
-                    append(part, to[link], to[link], head, tail, following)
+                there = to[link]
+                if label[there] >= 0:
+                    if parent[label[there]] != part:
+                        growing -= join(root(label[there], parent), part, parent, head, tail, following)
+                elif inside[there] == 1:
+                    label[there], met[count], following[there] = part, there, -1
+                    append(part, there, there, head, tail, following)
                     count += 1
-                else:
-                    growing -= join(root(label[to[link]], parent), part, parent, head, tail, following)
             growing -= head[part] < 0
-        part = (part + 1) % parts
     for k in range(count):
         label[met[k]] = root(label[met[k]], parent)
     return count
 
 
 def plant(
-    inside: Any, seeds: Any, label: Any, parent: Any, head: Any, tail: Any, following: Any, met: Any
-) -> int:
+    inside: Any, seeds: Any, label: Any, parent: Any, head: Any, tail: Any, turn: Any, following: Any,
+    met: Any,
+) -> int:  # fmt: skip
     """Begin a part with each seed that is inside; return their number."""
     parts = 0
     for k in range(len(seeds)):
         if inside[seeds[k]] == 1 and label[seeds[k]] < 0:
             label[seeds[k]], parent[parts], head[parts], tail[parts] = parts, parts, seeds[k], seeds[k]
-            following[seeds[k]], met[parts] = -1, seeds[k]
+            turn[parts], following[seeds[k]], met[parts] = parts, -1, seeds[k]
             parts += 1
     return parts
 

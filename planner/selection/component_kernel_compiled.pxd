@@ -9,17 +9,20 @@ cpdef void label_components(
     const whole[::1] first, const whole[::1] to, const whole[::1] inside, whole[::1] label, whole[::1] stack
 ) noexcept nogil
 
-@cython.locals(count=whole, growing=whole, here=whole, k=whole, link=whole, part=whole, parts=whole)
+@cython.locals(
+    count=whole, growing=whole, here=whole, k=whole, link=whole, part=whole, parts=whole,
+    there=whole, turns=whole,
+)
 cpdef whole grow_parts(
     const whole[::1] first, const whole[::1] to, const whole[::1] inside, const whole[::1] seeds,
-    whole[::1] label, whole[::1] parent, whole[::1] head, whole[::1] tail, whole[::1] following,
-    whole[::1] met
+    whole[::1] label, whole[::1] parent, whole[::1] head, whole[::1] tail, whole[::1] turn,
+    whole[::1] following, whole[::1] met
 ) noexcept nogil
 
 @cython.locals(k=whole, parts=whole)
 cdef whole plant(
     const whole[::1] inside, const whole[::1] seeds, whole[::1] label, whole[::1] parent,
-    whole[::1] head, whole[::1] tail, whole[::1] following, whole[::1] met
+    whole[::1] head, whole[::1] tail, whole[::1] turn, whole[::1] following, whole[::1] met
 ) noexcept nogil
 
 cdef whole join(

@@ -60,8 +60,9 @@ class LinkGraph:
         if kernel is None:
             return self._all_parts(seeds, inside)
         seeds = np.ascontiguousarray(seeds, np.int64)
-        parent, head, tail = (np.zeros(len(seeds), dtype=np.int64) for _ in range(3))
-        tables = (self._label, parent, head, tail, self._following, self._met)
+        parts = (np.zeros(len(seeds), dtype=np.int64) for _ in range(4))
+        parent, head, tail, turn = parts
+        tables = (self._label, parent, head, tail, turn, self._following, self._met)
         met = self._met[: kernel(self._first, self._to, inside, seeds, *tables)].copy()
         label = self._label[met]
         self._label[met] = -1

@@ -33,10 +33,10 @@ def graph_of(seed: int, rows: int = 60, share: float = 0.04) -> csr_array:
 def _as_written(graph: LinkGraph, seeds: IntArray, inside: IntArray) -> int:
     """Number of rows met by the kernel as it is written."""
     label, following, met = (np.full(len(inside), -1, np.int64) for _ in range(3))
-    parent, head, tail = (np.zeros(len(seeds), np.int64) for _ in range(3))
+    parent, head, tail, turn = (np.zeros(len(seeds), np.int64) for _ in range(4))
     links = graph.links
     return grow_parts(
-        links.indptr, links.indices, inside, seeds, label, parent, head, tail, following, met
+        links.indptr, links.indices, inside, seeds, label, parent, head, tail, turn, following, met
     )  # fmt: skip
 
 
