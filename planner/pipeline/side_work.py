@@ -1,4 +1,4 @@
-"""Work beside a plan's main way, in a process forked from this one: two cores, and nothing is copied first.
+"""Second process for a part of the work, forked from this one: nothing is copied to it first.
 
 The result is the same with and without a second process. Where none can be forked, or it has ended without
 a result, the work is done when its result is asked for.
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class SideWork(Generic[T]):
-    """Work that goes on beside other work until its result is asked for; the block ends it at its end."""
+    """Work that goes on at the same time as other work; the end of the block ends it."""
 
     def __init__(self, work: Callable[[], T], *, forked: bool) -> None:
         """Begin the work in a process of its own if `forked`, and if this process can be forked."""

@@ -1,4 +1,4 @@
-"""Work beside a plan's main way: the same result with a second process, without one, and after its death."""
+"""Work in a second process: the same result with it, without it, and after its death."""
 
 from __future__ import annotations
 
