@@ -1,7 +1,7 @@
 """Second process for a part of the work, forked from this one: nothing is copied to it first.
 
 The result is the same with and without a second process. Where none can be forked, or it has ended without
-a result, the work is done when its result is asked for.
+a result, the work is done when its result is needed.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class SideWork(Generic[T]):
             self._fork()
 
     def result(self) -> T:
-        """The result, also when it is asked for again; an error of the work is raised."""
+        """The result, also when it is requested again; an error of the work is raised."""
         if not self._found:
             data = self._answered()
             self._found.append(pickle.loads(data) if data else self._work())
