@@ -17,6 +17,8 @@ INTERVAL_S = 1.0
 PATIENCE_S = 5.0
 """Duration after which a step is named where stderr is no terminal."""
 WIPE = "\r\033[K"
+TICKING = "running step"
+"""Name of the thread that writes it; it holds nothing that other work needs."""
 
 
 class RunningStep:
@@ -93,7 +95,7 @@ def running(name: str) -> Iterator[RunningStep]:
 
     if step.isatty():
         sys.stderr = step
-    thread = threading.Thread(target=tick, daemon=True)
+    thread = threading.Thread(target=tick, name=TICKING, daemon=True)
     thread.start()
     try:
         yield step

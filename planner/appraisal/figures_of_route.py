@@ -3,53 +3,80 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from stopgo.mission.floor import Finding, Rank
-from stopgo.mission.stages import Candidates, Route, Selection
+from stopgo.mission.stages import Candidates, Route, Selection, Unreached, Visibility
 from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.covered_intervals import seen_units
 from stopgo.mission.stages.figures import CoverageByGroup, Figures
-from stopgo.planner.appraisal.plausibility import floor_of_rooms, near_legs, plausibility_findings
-from stopgo.planner.appraisal.quality import FEWER_VIEWS, NOT_MET, fewer_views, not_met, quality_of
+from stopgo.planner.appraisal.plausibility import floor_doubts, floor_of_rooms, leg_doubts, near_legs
+from stopgo.planner.appraisal.quality import (
+    FEWER_VIEWS,
+    NOT_MET,
+    LimitEstimates,
+    fewer_views,
+    limit_estimates,
+    not_met,
+    quality_of,
+)
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.overlap.registered import SCANS_APART, inaccurate, scans_apart
 from stopgo.planner.space.reach import room_areas_by_part
 
 
-def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figures:
-    """Return the figures of a plan; `planned` are the parts of the floor that any plan enters."""
+@dataclass(frozen=True)
+class FiguresBefore:
+    """Figures of a plan that come from its visibility alone: no stop and no leg changes them."""
+
+    unreached: tuple[Unreached, ...]
+    reached_m2: float
+    rooms_m2: float
+    doubts: tuple[Finding, ...]
+    views: tuple[Finding, ...]
+    estimates: LimitEstimates | None
+
+    @classmethod
+    def of(cls, seen: Visibility, planned: frozenset[int] | None = None) -> FiguresBefore:
+        """`planned` are the parts of the floor that any plan enters."""
+        candidates = seen.candidates
+        space, parts = candidates.space, planned or frozenset([candidates.chosen_part])
+        reached = _reached_m2(candidates, parts)
+        return cls(
+            unreached=unreached(candidates, parts),
+            reached_m2=reached,
+            rooms_m2=sum(floor_of_rooms(space)),
+            doubts=floor_doubts(space, reached_m2=reached),
+            views=tuple(not_met(seen)),
+            estimates=limit_estimates(seen),
+        )
+
+
+def figures_of(route: Route, before: FiguresBefore | None = None) -> Figures:
+    """Return the figures of a plan; without those `before`, the plan enters one part of the floor."""
     selection = route.selection
-    candidates = selection.candidates
-    space, settings = candidates.space, candidates.settings
-    parts = planned or frozenset([candidates.chosen_part])
-    left_out = unreached(candidates, parts)
-    reached = _reached_m2(candidates, parts)
-    views = (*not_met(selection), *fewer_views(selection))
-    network = (*scans_apart(route), *inaccurate(route))
-    doubts = (*plausibility_findings(route, reached_m2=reached), *views, *network)
-    findings = (*space.findings, *doubts)
-    groups = coverage_by_group(selection, why={item.room: item.why for item in left_out})
+    before = before or FiguresBefore.of(selection.visibility)
+    doubts = (*leg_doubts(route), *before.doubts, *before.views, *fewer_views(selection))
+    findings = (*route.space.findings, *doubts, *scans_apart(route), *inaccurate(route))
+    groups = coverage_by_group(selection, why={item.room: item.why for item in before.unreached})
     return Figures(
-        rule=settings.coverage_rule,
+        rule=route.space.settings.coverage_rule,
         whole=groups.whole,
         rooms=groups.rooms,
         kinds=groups.kinds,
-        rooms_m2=sum(floor_of_rooms(space)),
-        reached_m2=reached,
-        unreached=left_out,
+        rooms_m2=before.rooms_m2,
+        reached_m2=before.reached_m2,
+        unreached=before.unreached,
         findings=ranked(findings, near_legs(findings, route)),
-        quality=quality_of(selection),
+        quality=quality_of(selection, before.estimates),
     )
 
 
-def figures_of_share(route: Route, whole: Figures) -> Figures:
+def figures_of_share(route: Route, whole: Figures, before: FiguresBefore) -> Figures:
     """Return the figures of one of several missions; the required coverage applies to all together."""
     groups = coverage_by_group(route.selection, why={item.room: item.why for item in whole.unreached})
-    space = route.space
-    doubts = plausibility_findings(route, reached_m2=whole.reached_m2)
     of_all = (item for item in whole.findings if item.code in (NOT_MET, FEWER_VIEWS, *SCANS_APART))
-    findings = (*space.findings, *doubts, *of_all)
+    findings = (*route.space.findings, *leg_doubts(route), *before.doubts, *of_all)
     return replace(
         whole,
         whole=replace(groups.whole, required=None),

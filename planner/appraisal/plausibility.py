@@ -37,15 +37,21 @@ NEAR_LEG = 0.15
 """A finding this close (m) to the driven strip concerns the drive."""
 
 
-def plausibility_findings(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
-    """Return the findings about a plan as a whole."""
-    space = route.space
+def floor_doubts(space: NavigableSpace, *, reached_m2: float) -> tuple[Finding, ...]:
+    """Return the doubts about a plan that no stop and no leg changes."""
     return (
-        *over_ignored(space.floor, legs_of(route), stops=len(route.approaches), radius=space.settings.radius),
         *_little_reached(space, reached_m2),
         *_missing_walls(space),
         *_stray_elements(space.floor),
         *_wall_gaps(space),
+    )
+
+
+def leg_doubts(route: Route) -> tuple[Finding, ...]:
+    """Return the doubts about the legs of a route."""
+    space = route.space
+    return tuple(
+        over_ignored(space.floor, legs_of(route), stops=len(route.approaches), radius=space.settings.radius)
     )
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,26 +25,42 @@ MOST_NAMED = 5
 """Rooms and kinds that a finding names."""
 
 
-def quality_of(selection: Selection) -> Quality | None:
-    """Return the cost of the limits on views, each switched off alone; None if there are no limits.
+@dataclass(frozen=True)
+class LimitEstimates:
+    """Numbers of stops of fast selections, with all limits and without each alone."""
 
-    The cost is the difference of two fast selections on the known visibility, with and without the limit. It
-    is approximate: their scans need not register.
+    limited: int
+    free: Mapping[str, tuple[int, int]]
+    """By limit: the number without it, and a lower bound."""
+
+
+def limit_estimates(seen: Visibility) -> LimitEstimates | None:
+    """Return fast selections on the known visibility; None if there are no limits.
+
+    They are approximate: their scans need not register.
     """
-    seen = selection.visibility
     settings = seen.settings
     limits = limits_in_words(limits_spec_of(settings))
     if not limits:
         return None
     in_sight = _in_sight(seen)
-    stops, costs = len(selection.chosen), []
     limited, _ = quick_estimate(_under(in_sight, settings))
-    for key, words in limits.items():
-        free, bound = quick_estimate(_under(in_sight, without_limit(settings, key)))
-        without = max(bound, stops - max(0, limited - free))
+    free = {key: quick_estimate(_under(in_sight, without_limit(settings, key))) for key in limits}
+    return LimitEstimates(limited, free)
+
+
+def quality_of(selection: Selection, estimates: LimitEstimates | None) -> Quality | None:
+    """Return the cost of the limits on views, each switched off alone; None if there are no limits."""
+    if estimates is None:
+        return None
+    seen, stops = selection.visibility, len(selection.chosen)
+    costs = []
+    for key, words in limits_in_words(limits_spec_of(seen.settings)).items():
+        free, bound = estimates.free[key]
+        without = max(bound, stops - max(0, estimates.limited - free))
         costs.append(LimitCost(key, words, stops=stops, without=without, bound=bound))
     totals = totals_of_plan(seen)
-    return Quality(tuple(costs), totals.amount(in_sight.visible), totals.amount(_possible(seen)))
+    return Quality(tuple(costs), totals.amount(_in_sight(seen).visible), totals.amount(_possible(seen)))
 
 
 def _in_sight(seen: Visibility) -> Visibility:
@@ -64,9 +80,8 @@ def _possible(seen: Visibility) -> BoolArray:
     return frozen(seen.visible & (seen.asked >= required), np.bool_)
 
 
-def not_met(selection: Selection) -> Iterator[Finding]:
+def not_met(seen: Visibility) -> Iterator[Finding]:
     """A finding if no stops can reach the required coverage within the limits."""
-    seen = selection.visibility
     limits = limits_in_words(limits_spec_of(seen.settings))
     if not limits:
         return

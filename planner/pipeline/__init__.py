@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
-    from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection
+    from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
     from stopgo.mission.stages.division import DividedRoute
+    from stopgo.planner.appraisal.figures_of_route import FiguresBefore
 
 Observe = Callable[[Any], None]
 
@@ -54,24 +56,53 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
     from stopgo.planner.routing import route
 
-    selection = _selected(found, observe)
-    settings = found.space.settings
-    driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
-    observe(selection if driven is None else driven.selection)
-    return _part(driven or route(selection), number, planned, observe)
+    seen = _seen(found, observe)
+    with _figures_before(seen, planned) as before:
+        selection = _selected(seen)
+        settings = found.space.settings
+        driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
+        observe(selection if driven is None else driven.selection)
+        driven = driven or route(selection)
+        observe(driven)
+        return _part(driven, number, before(driven), observe)
 
 
-def _selected(found: Candidates, observe: Observe) -> Selection:
-    """Select the fewest stops, and more where the accuracy required needs them."""
-    from stopgo.planner.selection.accurate import accurate
-    from stopgo.planner.selection.continuous_selection import SELECTOR, select_anywhere
-    from stopgo.planner.selection.refine import select_refined
+def _seen(found: Candidates, observe: Observe) -> Visibility:
     from stopgo.planner.visibility import visibility
 
     observe(found)
     seen = visibility(found)
     observe(seen)
-    return accurate((select_anywhere if found.space.settings.selector == SELECTOR else select_refined)(seen))
+    return seen
+
+
+MANY = 5000
+"""Candidates from which the figures that need no route are made in a process of their own."""
+
+
+@contextmanager
+def _figures_before(seen: Visibility, planned: frozenset[int]) -> Iterator[Callable[[Route], FiguresBefore]]:
+    """Begin with the figures that need no route, and yield a function that waits for those of one."""
+    from stopgo.planner.appraisal.figures_of_route import FiguresBefore
+    from stopgo.planner.pipeline.side_work import SideWork
+
+    with SideWork(lambda: FiguresBefore.of(seen, planned), forked=seen.rows >= MANY) as work:
+
+        def before(route: Route) -> FiguresBefore:
+            if route.visibility is seen:
+                return work.result()
+            return FiguresBefore.of(route.visibility, planned)  # with candidates of its own
+
+        yield before
+
+
+def _selected(seen: Visibility) -> Selection:
+    """Select the fewest stops, and more where the accuracy required needs them."""
+    from stopgo.planner.selection.accurate import accurate
+    from stopgo.planner.selection.continuous_selection import SELECTOR, select_anywhere
+    from stopgo.planner.selection.refine import select_refined
+
+    return accurate((select_anywhere if seen.settings.selector == SELECTOR else select_refined)(seen))
 
 
 def _in_least_time(route: Route) -> Route:
@@ -80,14 +111,13 @@ def _in_least_time(route: Route) -> Route:
     return least_time_route(route)
 
 
-def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
+def _part(driven: Route, number: int, before: FiguresBefore, observe: Observe) -> PartPlan:
     """Return the plan of a route."""
     from stopgo.mission.plan import PartPlan
     from stopgo.planner.appraisal.figures_of_route import figures_of
     from stopgo.planner.routing.assemble import assemble
 
-    observe(driven)
-    figures = figures_of(driven, planned=planned)
+    figures = figures_of(driven, before)
     observe(figures)
     mission = assemble(driven, part=number)
     observe(mission)
@@ -105,15 +135,18 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     from stopgo.planner.appraisal.figures_of_route import figures_of_share
     from stopgo.planner.routing.assemble import assemble
 
-    selection = _selected(found, observe)
-    driven, division = _divided(selection)
-    observe(driven.selection)
-    whole = _part(driven, UNDIVIDED, planned, observe)
+    seen = _seen(found, observe)
+    with _figures_before(seen, planned) as figures_before:
+        driven, division = _divided(_selected(seen))
+        observe(driven.selection)
+        observe(driven)
+        before = figures_before(driven)
+    whole = _part(driven, UNDIVIDED, before, observe)
     shares = []
     for k, route in enumerate(division.routes):
         allocation = MissionAllocation(kind=division.kind, number=k + 1, of=len(division.routes))
         mission = assemble(route, part=k, allocation=allocation)
-        shares.append(PartPlan(route, figures_of_share(route, whole.figures), mission))
+        shares.append(PartPlan(route, figures_of_share(route, whole.figures, before), mission))
     made = DividedPlan(division.kind, whole, tuple(shares), division.limit_s, division.bound, division.method)
     observe(made)
     return Plan(made.shares, made)

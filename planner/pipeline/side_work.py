@@ -1,0 +1,97 @@
+"""Second process for a part of the work, forked from this one: nothing is copied to it first.
+
+The result is the same with and without a second process. Where none can be forked, or it has ended without
+a result, the work is done when its result is needed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Generic, TypeVar
+
+from stopgo.mission.console.running_step import TICKING
+
+T = TypeVar("T")
+
+
+class SideWork(Generic[T]):
+    """Work that goes on at the same time as other work; the end of the block ends it."""
+
+    def __init__(self, work: Callable[[], T], *, forked: bool) -> None:
+        """Begin the work in a process of its own if `forked`, and if this process can be forked."""
+        self._work, self._process, self._answer = work, 0, -1
+        self._found: list[T] = []
+        if forked and _can_fork():
+            self._fork()
+
+    def result(self) -> T:
+        """The result, also when it is requested again; an error of the work is raised."""
+        if not self._found:
+            data = self._answered()
+            self._found.append(pickle.loads(data) if data else self._work())
+        return self._found[0]
+
+    def __enter__(self) -> SideWork[T]:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._end()
+
+    def _fork(self) -> None:
+        self._answer, end = os.pipe()
+        process = 0
+        with contextlib.suppress(OSError):  # too many processes, or too little memory
+            process = os.fork()
+            if not process:
+                os.close(self._answer)
+                self._serve(end)
+        os.close(end)
+        self._process = process
+
+    def _serve(self, end: int) -> None:
+        """In the other process: do the work, and answer; it never returns."""
+        try:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
+                data = pickle.dumps(self._work())  # a thread may have held the lock of the real one
+            with open(end, "wb") as answer:
+                answer.write(data)
+        finally:
+            os._exit(0)  # an error is raised again where the work is then done
+
+    def _answered(self) -> bytes:
+        """The answer of the other process, once it has ended; empty if there is none or it has failed."""
+        if not self._process:
+            return b""
+        with open(self._answer, "rb", closefd=False) as answer:
+            data = answer.read()
+        self._end()
+        return data
+
+    def _end(self) -> None:
+        if self._answer >= 0:
+            os.close(self._answer)
+        if self._process:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self._process, signal.SIGKILL)
+            os.waitpid(self._process, 0)
+        self._process, self._answer = 0, -1
+
+
+def _can_fork() -> bool:
+    """True on Linux with several cores, for a process whose threads hold nothing that the work needs.
+
+    Other threads do not outlive a fork, and their locks are never released.
+    """
+    others = [thread for thread in threading.enumerate() if thread.name != TICKING]
+    alone = others == [threading.main_thread()]
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and alone

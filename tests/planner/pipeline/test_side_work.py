@@ -1,0 +1,95 @@
+"""Work in a second process: the same result with it, without it, and after its death."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from stopgo.mission.errors import InputError
+from stopgo.mission.settings import Settings
+from stopgo.planner import pipeline
+from stopgo.planner.pipeline.side_work import SideWork
+from tests.planner.worlds import two_rooms
+
+
+@pytest.fixture(autouse=True)
+def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
+
+
+def _noted(place: Path) -> str:
+    """Note the process that works."""
+    with open(place, "a") as file:
+        file.write(f"{os.getpid()}\n")
+    return "done"
+
+
+def _workers(place: Path) -> list[int]:
+    return [int(line) for line in place.read_text().split()] if place.exists() else []
+
+
+@pytest.mark.parametrize("forked", [True, False])
+def test_work_is_done_once_in_the_process_asked_for(tmp_path: Path, *, forked: bool) -> None:
+    place = tmp_path / "workers"
+    with SideWork(partial(_noted, place), forked=forked) as work:
+        assert [work.result(), work.result()] == ["done", "done"]
+    (worker,) = _workers(place)
+    assert (worker != os.getpid()) == forked
+
+
+def test_work_is_done_here_if_its_process_dies(tmp_path: Path) -> None:
+    def die_in_another_process() -> str:
+        if os.getpid() != here:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return _noted(tmp_path / "workers")
+
+    here = os.getpid()
+    with SideWork(die_in_another_process, forked=True) as work:
+        assert work.result() == "done"
+    assert _workers(tmp_path / "workers") == [here]
+
+
+def test_an_error_of_the_work_is_raised_where_its_result_is_asked_for() -> None:
+    def fail() -> str:
+        raise InputError("no floor")
+
+    with SideWork(fail, forked=True) as work, pytest.raises(InputError, match="no floor"):
+        work.result()
+
+
+def test_the_end_of_the_block_ends_the_work(tmp_path: Path) -> None:
+    def work_for_ever() -> None:
+        _noted(tmp_path / "workers")
+        threading.Event().wait()
+
+    with SideWork(work_for_ever, forked=True):
+        while not _workers(tmp_path / "workers"):
+            pass
+    with pytest.raises(ProcessLookupError):
+        os.kill(_workers(tmp_path / "workers")[0], 0)
+
+
+def test_a_process_with_other_threads_is_not_forked(tmp_path: Path) -> None:
+    ended = threading.Event()
+    other = threading.Thread(target=ended.wait)
+    other.start()
+    with SideWork(partial(_noted, tmp_path / "workers"), forked=True) as work:
+        assert work.result() == "done"
+    ended.set()
+    other.join()
+    assert _workers(tmp_path / "workers") == [os.getpid()]
+
+
+def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    plans = []
+    for many in (0, 10**9):
+        monkeypatch.setattr(pipeline, "MANY", many)
+        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False)))
+    forked, alone = plans
+    assert forked.figures == alone.figures
+    assert forked.mission == alone.mission
