@@ -96,13 +96,12 @@ def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
     if len(polygon.exterior) < 3:
         return shapely.Polygon()
     holes = [hole - origin for hole in polygon.holes if len(hole) >= 3]
-    drawn = shapely.Polygon(polygon.exterior - origin, holes)
-    return drawn if drawn.is_valid else mended(drawn)
+    return mended(shapely.Polygon(polygon.exterior - origin, holes))
 
 
 def mended(shape: BaseGeometry) -> BaseGeometry:
-    """The valid part of a polygonal geometry; empty if it has no area."""
-    return shapely.union_all(polygon_parts(shapely.make_valid(shape)))
+    """The valid part of a polygonal geometry, itself if it is valid; empty if it has no area."""
+    return shape if shape.is_valid else shapely.union_all(polygon_parts(shapely.make_valid(shape)))
 
 
 def to_polygons(shape: BaseGeometry, origin: FloatArray) -> tuple[Polygon, ...]:
@@ -130,32 +129,46 @@ def snapped(shape: BaseGeometry) -> BaseGeometry:
 
     So snapping it again changes nothing, and operations on its whole steps find no new crossing.
     """
-    return _in_metres(_settled(_in_steps(shape)))
+    return snapped_each([shape])[0]
 
 
-def snapped_union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
+def snapped_each(shapes: Sequence[BaseGeometry]) -> NDArray[np.object_]:
+    """Every shape `snapped` by itself."""
+    return _in_metres(_settled(_in_steps(np.array(shapes, dtype=object))))
+
+
+def snapped_union(shapes: Sequence[BaseGeometry]) -> BaseGeometry:
     """The union of shapes, `snapped`, with every crossing a vertex."""
-    found = np.array([_in_steps(snapped(shape)) for shape in shapes], dtype=object)
+    return union_of_snapped(snapped_each(shapes))
+
+
+def union_of_snapped(shapes: NDArray[np.object_]) -> BaseGeometry:
+    """The same, of shapes that are each `snapped` already."""
+    found = _in_steps(shapes)
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
-    return shapely.normalize(_in_metres(_settled(shapely.union_all(ordered, grid_size=1.0))))
+    whole = np.array([shapely.union_all(ordered, grid_size=1.0)], dtype=object)
+    return shapely.normalize(_in_metres(_settled(whole))[0])
 
 
-def _in_steps(shape: BaseGeometry) -> BaseGeometry:
-    """The shape in grid steps, not rounded to whole ones."""
-    return shapely.transform(shape, lambda xy: xy / GRID)
+def _in_steps(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
+    """The shapes in grid steps, not rounded to whole ones."""
+    return shapely.transform(shapes, lambda xy: xy / GRID)
 
 
-def _in_metres(steps: BaseGeometry) -> BaseGeometry:
+def _in_metres(steps: NDArray[np.object_]) -> NDArray[np.object_]:
     return shapely.transform(steps, lambda xy: np.rint(xy) / round(1 / GRID))  # 0.3, not 0.30000000000000004
 
 
-def _settled(steps: BaseGeometry) -> BaseGeometry:
-    """Round the shape to whole steps, until no line moved by rounding meets another vertex."""
+def _settled(steps: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Round each shape to whole steps, until no line moved by rounding meets another vertex."""
+    settled, moving = steps.copy(), np.arange(len(steps))
     for _ in range(SETTLING):
-        before, steps = steps, shapely.normalize(shapely.set_precision(shapely.set_precision(steps, 1.0), 0))
-        if shapely.equals_exact(before, steps):
-            return steps
-    x, y = shapely.get_coordinates(steps).mean(axis=0) * GRID
+        before = settled[moving]
+        settled[moving] = shapely.normalize(shapely.set_precision(shapely.set_precision(before, 1.0), 0))
+        moving = moving[~shapely.equals_exact(before, settled[moving])]
+        if not len(moving):
+            return settled
+    x, y = shapely.get_coordinates(settled[moving[0]]).mean(axis=0) * GRID
     raise StopgoError(f"outlines near ({x:.3f}, {y:.3f}) cannot be rounded to {GRID:g} m; draw them again")
 
 

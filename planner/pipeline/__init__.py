@@ -84,7 +84,7 @@ MANY = 5000
 def _figures_before(seen: Visibility, planned: frozenset[int]) -> Iterator[Callable[[Route], FiguresBefore]]:
     """Begin with the figures that need no route, and yield a function that waits for those of one."""
     from stopgo.planner.appraisal.figures_of_route import FiguresBefore
-    from stopgo.planner.pipeline.side_work import SideWork
+    from stopgo.planner.geometry.side_work import SideWork
 
     with SideWork(lambda: FiguresBefore.of(seen, planned), forked=seen.rows >= MANY) as work:
 

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.stages import RoomSpace, Targets
-from stopgo.planner.geometry.shapes import boundary_lines, to_shape
+from stopgo.planner.geometry.shapes import SLACK, boundary_lines, to_shape
 from stopgo.planner.space.ground import Ground
 
 AHEAD = (0.02, 0.1, 0.25)
@@ -23,16 +23,18 @@ AT_ONCE = 50_000
 
 def faced_rooms(targets: Targets, rooms: Sequence[RoomSpace], ground: Ground) -> IntArray:
     """Index of the room in front of each unit (units,); -1 where there is none, as on a facade."""
-    faced = _RoomEdges([to_shape(room.area, ground.origin) for room in rooms])
+    faced = RoomEdges([to_shape(room.area, ground.origin) for room in rooms])
     middle, normal = targets.unit_xy - ground.origin, _normals(targets)
+    segment = targets.unit_segment
     found = np.full(targets.total, -1, dtype=np.int64)
     for ahead in AHEAD:
         unassigned = np.flatnonzero(found < 0)
-        found[unassigned] = faced.nearest(middle[unassigned] + ahead * normal[unassigned], 0.0)
+        front = middle[unassigned] + ahead * normal[unassigned]
+        found[unassigned] = faced.nearest_to_rows(front, segment[unassigned], 0.0)
     front = middle + AHEAD[0] * normal
     unassigned = np.flatnonzero(found < 0)
     unassigned = unassigned[shapely.intersects_xy(ground.outline, *front[unassigned].T)]
-    found[unassigned] = faced.nearest(front[unassigned], JAMB_DISTANCE)
+    found[unassigned] = faced.nearest_to_rows(front[unassigned], segment[unassigned], JAMB_DISTANCE)
     return frozen(found, np.int64)
 
 
@@ -43,7 +45,7 @@ def _normals(targets: Targets) -> FloatArray:
     return np.where(targets.occluding[:, None], out, 0.0)[targets.unit_segment]
 
 
-class _RoomEdges:
+class RoomEdges:
     """Rooms, prepared for many points."""
 
     def __init__(self, shapes: Sequence[BaseGeometry]) -> None:
@@ -51,6 +53,24 @@ class _RoomEdges:
         edges = [boundary_lines(shape) for shape in shapes]
         self._edge_room = np.repeat(np.arange(len(shapes)), [len(lines) for lines in edges])
         self._edges = shapely.STRtree(np.concatenate(edges))
+
+    def nearest_to_rows(self, points: FloatArray, row: IntArray, distance: float) -> IntArray:
+        """The same as `nearest`, of points that lie in straight rows, row by row.
+
+        A row has one answer if it is farther than the distance from every edge of a room.
+        """
+        begin = np.flatnonzero(np.diff(row, prepend=-1))
+        count = np.diff(begin, append=len(row))
+        lines = shapely.linestrings(np.stack([points[begin], points[begin + count - 1]], axis=1))
+        crossed, _ = self._edges.query(lines, predicate="dwithin", distance=distance + SLACK)
+        alike = np.ones(len(begin), dtype=bool)
+        alike[crossed] = False
+        asked = np.repeat(~alike, count)
+        asked[begin] = True
+        found = np.empty(len(points), dtype=np.int64)
+        found[asked] = self.nearest(points[asked], distance)
+        found[~asked] = np.repeat(found[begin[alike]], count[alike] - 1)
+        return found
 
     def nearest(self, points: FloatArray, distance: float) -> IntArray:
         """The nearest room within a distance of each point, of several the first; -1 where there is none."""

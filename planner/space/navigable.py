@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.frames.geodesy import out_of_reach
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import NavigableSpace
+from stopgo.mission.stages import NavigableSpace, Targets
 from stopgo.planner.geometry.shapes import local_origin, to_polygons
+from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
 from stopgo.planner.space.opening_joins import Crossing, barrier
 from stopgo.planner.space.opening_states import opening_states
 from stopgo.planner.space.room_spaces import room_spaces
 from stopgo.planner.space.targets import occluders_of, targets_of
+
+MANY = 1000
+"""Elements from which targets are found in a process of their own."""
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
@@ -25,18 +32,19 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
     ground = Ground.of(floor, settings)
-    drive_area, gaps = drivable(ground, settings)
-    states, findings = opening_states(ground, drive_area, gaps, settings)
     closed = np.array(
         [line for c in ground.crossings if (line := _closed_door(c, settings, ground)) is not None]
     )
-    occluders = occluders_of(floor, closed)
-    targets = targets_of(floor, occluders, d_dis=settings.d_dis)
+    scanned = partial(_occluders_and_targets, floor, closed, settings)
+    with SideWork(scanned, forked=len(floor.elements) >= MANY) as work:
+        drive_area, gaps = drivable(ground, settings)
+        states, findings = opening_states(ground, drive_area, gaps, settings)
+        rooms = room_spaces(floor, ground, drive_area, settings)
+        occluders, targets = work.result()
     if targets.total == 0:
         raise NegativeResult(
             f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
         )
-    rooms = room_spaces(floor, ground, drive_area, settings)
     return NavigableSpace(
         floor=floor,
         settings=settings,
@@ -52,6 +60,13 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         ground=to_polygons(ground.outline, origin),
         findings=(*floor.findings, *findings),
     )
+
+
+def _occluders_and_targets(
+    floor: FloorPlan, closed: FloatArray, settings: Settings
+) -> tuple[BaseGeometry, Targets]:
+    occluders = occluders_of(floor, closed)
+    return occluders, targets_of(floor, occluders, d_dis=settings.d_dis)
 
 
 def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings) -> None:

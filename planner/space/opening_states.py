@@ -129,17 +129,24 @@ def _limiting_gap(
 ) -> str:
     """Describe the gap near an opening that limits the robot's size most."""
     window = shapely.Point(middle_and_normal(crossing.clear)[0]).buffer(NEAR_OPENING)
+    cells = [_cells_of(parts, side, window) for side in sides]
+    obstacles = around.ground.obstacle_rings.around(window.bounds)
+    free = window.intersection(around.outline_rings.around(window.bounds)).difference(obstacles)
+    no_room = f"no room for a robot of radius {around.settings.radius:.3f} m next to it"
+    if not _joins(free, crossing, cells):
+        return no_room
     walls = around.walls.near(window)
     gaps = gaps_between(walls, short=-2 * float(walls.clearance.max(initial=0.0)) + 0.05, long=-SLACK)
-    cells = [_cells_of(parts, side, window) for side in sides]
     gaps = sorted(gaps, key=lambda item: -item.width)
+    edges = boundary_lines(obstacles.intersection(window))
 
     def opens(gap: Gap) -> bool:
-        return _opens(crossing, cells, around, window, gap.width / 2 - SLACK)
+        """True if a robot that just fits through the gap can drive from the opening to both sides."""
+        return _joins(free.difference(widened(edges, gap.width / 2 - SLACK, quad_segs=16)), crossing, cells)
 
     widest = bisect_left(gaps, True, key=opens)  # a robot can reach every point that a wider robot reaches
     if widest == len(gaps):
-        return f"no room for a robot of radius {around.settings.radius:.3f} m next to it"
+        return no_room
     gap = gaps[widest]
     names = " and ".join(dict.fromkeys(around.owner(walls.segments[k]) for k in gap.walls))
     need = float(walls.clearance[list(gap.walls)].sum())
@@ -152,17 +159,7 @@ def _cells_of(parts: Parts, side: OpeningSide, window: BaseGeometry) -> NDArray[
     return parts.cells[near[np.isin(parts.cell_part[near], sorted(side.main))]]
 
 
-def _opens(
-    crossing: Crossing,
-    cells: list[NDArray[np.object_]],
-    around: Surroundings,
-    window: BaseGeometry,
-    radius: float,
-) -> bool:
-    """True if a robot of this radius can drive from the opening to the cells on both sides."""
-    obstacles = around.ground.obstacle_rings.around(window.bounds)
-    near = boundary_lines(obstacles.intersection(window))
-    free = window.intersection(around.outline_rings.around(window.bounds)).difference(obstacles)
-    free = free.difference(widened(near, radius, quad_segs=16))
+def _joins(free: BaseGeometry, crossing: Crossing, cells: list[NDArray[np.object_]]) -> bool:
+    """True if free floor leads from the opening to the cells on both sides."""
     here = [piece for piece in polygon_parts(free) if piece.intersects(crossing.clear)]
     return all(any(np.any(shapely.intersects(some, piece)) for piece in here) for some in cells if len(some))

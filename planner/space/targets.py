@@ -22,8 +22,9 @@ from stopgo.planner.geometry.shapes import (
     one_shape,
     polygon_parts,
     snapped,
-    snapped_union,
+    snapped_each,
     to_grid,
+    union_of_snapped,
 )
 
 CRACK = 2e-4
@@ -47,8 +48,9 @@ def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
     A wall drawn as a single line is LINE_WALL thick, so that it has two faces. `closed` are openings that
     block the laser too, as segments (k, 2, 2) in the local frame.
     """
-    doors = [thin_solid(segment, LINE_WALL) for segment in closed]
-    return without_needless_vertices(without_cracks(snapped_union([*_occluding(floor)[1], *doors])), floor)
+    doors = snapped_each([thin_solid(segment, LINE_WALL) for segment in closed])
+    solids = np.concatenate([_occluding(floor)[1], doors])
+    return without_needless_vertices(without_cracks(union_of_snapped(solids)), floor)
 
 
 @instance_cached
@@ -57,7 +59,7 @@ def _occluding(floor: FloorPlan) -> tuple[list[int], NDArray[np.object_]]:
     origin = local_origin(floor)
     indices = [k for k, item in enumerate(floor.elements) if item.occludes]
     solids = [solid_of(floor.elements[k], origin, LINE_WALL) for k in indices]
-    return indices, np.array([snapped(solid) for solid in solids], dtype=object)
+    return indices, snapped_each(solids)
 
 
 def without_cracks(shape: BaseGeometry) -> BaseGeometry:
@@ -68,7 +70,12 @@ def without_cracks(shape: BaseGeometry) -> BaseGeometry:
     wide = shape.buffer(CRACK / 2, join_style="mitre", mitre_limit=100.0)
     closed = mended(wide.buffer(-CRACK / 2, join_style="mitre", mitre_limit=100.0))
     cracks = polygon_parts(shapely.difference(closed, shape, grid_size=NOISE))
-    return snapped(shapely.union_all([shape, *cracks], grid_size=NOISE)) if cracks else shape
+    if not cracks:
+        return shape
+    parts = np.array(polygon_parts(shape), dtype=object)
+    near = np.unique(shapely.STRtree(parts).query(cracks, predicate="dwithin", distance=CRACK)[1])
+    filled = shapely.union_all([*parts[near], *cracks], grid_size=NOISE)
+    return snapped(shapely.MultiPolygon([*np.delete(parts, near), *polygon_parts(filled)]))
 
 
 def solid_of(element: Element, origin: FloatArray, thickness: float) -> BaseGeometry:

@@ -13,7 +13,8 @@ import pytest
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import Settings
 from stopgo.planner import pipeline
-from stopgo.planner.pipeline.side_work import SideWork
+from stopgo.planner.geometry.side_work import SideWork
+from stopgo.planner.space import navigable
 from tests.planner.worlds import two_rooms
 
 
@@ -89,7 +90,9 @@ def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatc
     plans = []
     for many in (0, 10**9):
         monkeypatch.setattr(pipeline, "MANY", many)
+        monkeypatch.setattr(navigable, "MANY", many)
         plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False)))
     forked, alone = plans
     assert forked.figures == alone.figures
     assert forked.mission == alone.mission
+    assert not forked.space.targets.a.flags.writeable

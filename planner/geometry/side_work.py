@@ -7,6 +7,7 @@ a result, the work is done when its result is needed.
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import pickle
 import signal
@@ -14,9 +15,12 @@ import sys
 import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
+
+import numpy as np
 
 from stopgo.mission.console.running_step import TICKING
+from stopgo.mission.geometry import frozen
 
 T = TypeVar("T")
 
@@ -62,7 +66,7 @@ class SideWork(Generic[T]):
         try:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
             with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
-                data = pickle.dumps(self._work())  # a thread may have held the lock of the real one
+                data = _pickled(self._work())  # a thread may have held the lock of the real one
             with open(end, "wb") as answer:
                 answer.write(data)
         finally:
@@ -85,6 +89,21 @@ class SideWork(Generic[T]):
                 os.kill(self._process, signal.SIGKILL)
             os.waitpid(self._process, 0)
         self._process, self._answer = 0, -1
+
+
+class _ResultPickler(pickle.Pickler):
+    """Pickles results; arrays that are read-only stay so."""
+
+    def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, np.ndarray) and not value.flags.writeable:
+            return frozen, (value.copy(), value.dtype)
+        return NotImplemented
+
+
+def _pickled(value: object) -> bytes:
+    file = io.BytesIO()
+    _ResultPickler(file, protocol=pickle.HIGHEST_PROTOCOL).dump(value)
+    return file.getvalue()
 
 
 def _can_fork() -> bool:
