@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
@@ -29,7 +29,11 @@ WIDER = (
     "C:/Windows/Fonts/arial.ttf",
 )
 """Fonts with more letters than Helvetica's, for names that need them; the first that is there is embedded."""
-_LETTER = re.compile(r"([MLlZ])")
+_WRITTEN = re.compile("[ -~¡-ÿ…]+")
+"""Words that are written here; reportlab writes any others."""
+_ESCAPES = {ord(letter): f"\\{letter}" for letter in "\\()"} | {
+    ord(bytes([code]).decode("cp1252")): f"\\{code:03o}" for code in (0x85, *range(0xA1, 0x100))
+}
 _TURN = re.compile(r"rotate\((\S+) (\S+) (\S+)\)")
 
 Style = Mapping[str, str]
@@ -62,7 +66,7 @@ def pdf_of(pages: Sequence[PdfPage], *, title: str, shared: Mapping[str, str] | 
 
     file = BytesIO()
     rl_config.useA85 = 0  # streams of bytes, a fifth shorter than the letters of them
-    canvas = Canvas(file, invariant=1, pageCompression=1)
+    canvas = Canvas(file, invariant=1, pageCompression=1, pdfVersion=(1, 4))
     canvas.setTitle(title)
     canvas.setCreator("stopgo")
     for name, content in (shared or {}).items():
@@ -91,6 +95,7 @@ class _Pen:
     def __init__(self, canvas: Any, frame: PaperBox | None = None) -> None:
         self._canvas = canvas
         self._frame = frame
+        self._fonts: dict[tuple[str, float], str] = {}
 
     def draw(self, element: ET.Element, inherited: Style) -> None:
         style = {**inherited, **element.attrib}
@@ -119,54 +124,55 @@ class _Pen:
         self._canvas.doForm(style["href"].removeprefix("#"))
         self._canvas.restoreState()
 
-    def _inked(self, style: Style) -> tuple[int, int]:
-        """Set colours and line; whether to stroke and whether to fill."""
-        fill, stroke = style.get("fill", "#000000"), style.get("stroke", "none")
-        if fill != "none":
-            self._canvas.setFillColor(_colour(fill))
-        if stroke != "none":
-            self._canvas.setStrokeColor(_colour(stroke))
-            self._canvas.setLineWidth(float(style.get("stroke-width", 1)))
-            self._canvas.setDash([float(x) for x in style.get("stroke-dasharray", "").split()])
-            self._canvas.setLineJoin(1 if style.get("stroke-linejoin") == "round" else 0)
-        return int(stroke != "none"), int(fill != "none")
+    def _write(self, *operators: str) -> None:
+        """Write operators; reportlab would take several times as long to check and format their numbers."""
+        if written := "\n".join(filter(None, operators)):
+            self._canvas.addLiteral(written)
 
     def _path(self, element: ET.Element, style: Style) -> None:
-        stroke, fill = self._inked(style)
-        mode = 0 if style.get("fill-rule") == "evenodd" else 1
-        path = _WrittenPath(" ".join(_operators(style.get("d", ""))))
-        self._canvas.drawPath(path, stroke=stroke, fill=fill, fillMode=mode)
+        ink = _ink_of(style)
+        paint = ink.paint(even_odd=style.get("fill-rule") == "evenodd")
+        self._write(ink.operators, _operators(style.get("d", "")), paint)
 
     def _line(self, element: ET.Element, style: Style) -> None:
-        self._inked(style)
-        self._canvas.line(*(float(style[key]) for key in ("x1", "y1", "x2", "y2")))
+        x1, y1, x2, y2 = (_word(style[key]) for key in ("x1", "y1", "x2", "y2"))
+        self._write(_ink_of(style).operators, f"n {x1} {y1} m {x2} {y2} l S")
 
     def _rect(self, element: ET.Element, style: Style) -> None:
-        stroke, fill = self._inked(style)
-        box = (float(style[key]) for key in ("x", "y", "width", "height"))
-        self._canvas.rect(*box, stroke=stroke, fill=fill)
+        ink, box = _ink_of(style), " ".join(_word(style[key]) for key in ("x", "y", "width", "height"))
+        self._write(ink.operators, f"n {box} re {ink.paint(even_odd=True)}")
 
     def _circle(self, element: ET.Element, style: Style) -> None:
-        stroke, fill = self._inked(style)
-        self._canvas.circle(*(float(style[key]) for key in ("cx", "cy", "r")), stroke=stroke, fill=fill)
+        ink = _ink_of(style)
+        self._write(ink.operators)
+        place = (float(style[key]) for key in ("cx", "cy", "r"))
+        self._canvas.circle(*place, stroke=int(ink.stroke), fill=int(ink.fill))
 
     def _text(self, element: ET.Element, style: Style) -> None:
-        content, size = element.text or "", float(style["font-size"])
-        font, content = _font(content, bold=style.get("font-weight") == "bold")
-        canvas = self._canvas
+        font, content = _font(element.text or "", bold=style.get("font-weight") == "bold")
+        size, ink = float(style["font-size"]), _ink_of(style)
         shift = {"middle": 0.5, "end": 1.0}.get(style.get("text-anchor", "start"), 0.0)
-        begin = -shift * canvas.stringWidth(content, font, size)
-        canvas.saveState()
-        turn = _TURN.fullmatch(style.get("transform", ""))
-        angle = math.radians(float(turn[1])) if turn is not None else 0.0  # about its own place
-        cos, sin = math.cos(angle), math.sin(angle)
-        canvas.transform(cos, sin, sin, -cos, float(style["x"]), float(style["y"]))
-        canvas.setFont(font, size)
-        stroke, _ = self._inked(style)
-        if stroke:  # a halo: the letters are painted over it
-            canvas.drawString(begin, 0, content, mode=1)
-        canvas.drawString(begin, 0, content, mode=0)
-        canvas.restoreState()
+        begin = -shift * self._canvas.stringWidth(content, font, size) if shift else 0.0
+        place = f"q\n{_turn_of(style)} {_word(style['x'])} {_word(style['y'])} cm"
+        if font in FONTS.values() and _WRITTEN.fullmatch(content):
+            at, shown = f"BT 1 0 0 1 {_numbers(begin)} 0 Tm", f"({content.translate(_ESCAPES)}) Tj T*"
+            halo = f"{at} 1 Tr {shown} 0 Tr ET" if ink.stroke else ""
+            self._write(place, self._font_words(font, size), ink.operators, halo, f"{at} {shown} ET\nQ")
+            return
+        self._write(place)
+        self._canvas.setFont(font, size)
+        self._write(ink.operators)
+        for mode in (1, 0) if ink.stroke else (0,):  # a halo: the letters are painted over it
+            self._canvas.drawString(begin, 0, content, mode=mode)
+        self._write("Q")
+
+    def _font_words(self, font: str, size: float) -> str:
+        """The operators that choose a font."""
+        if (font, size) not in self._fonts:
+            chosen = self._canvas.beginText()
+            chosen.setFont(font, size)
+            self._fonts[font, size] = "BT " + chosen.getCode().partition(" Tm ")[2]
+        return self._fonts[font, size]
 
 
 _DRAWING = {
@@ -176,39 +182,90 @@ _DRAWING = {
 
 
 @dataclass(frozen=True)
-class _WrittenPath:
-    """A path that is written in the words of PDF already."""
+class _Ink:
+    """Colours and line of a shape, as operators, and whether it is stroked and filled."""
 
     operators: str
+    stroke: bool
+    fill: bool
 
-    def getCode(self) -> str:
-        """The operators, as a canvas asks a path for them."""
-        return self.operators
-
-
-def _operators(data: str) -> Iterator[str]:
-    """Path data in the words of PDF; the points after `l` are steps, those after `M` and `L` positions."""
-    last = ("0", "0")
-    letters = _LETTER.split(data)[1:]
-    for letter, numbers in zip(letters[::2], letters[1::2], strict=True):
-        if letter == "Z":
-            yield "h"
-        words = iter(numbers.split())
-        for count, xy in enumerate(zip(words, words, strict=True)):
-            last = _moved(last, xy) if letter == "l" else xy
-            yield f"{last[0]} {last[1]} {'m' if letter == 'M' and not count else 'l'}"
+    def paint(self, *, even_odd: bool) -> str:
+        """The operator that paints a path."""
+        letters = ("nS", "fB")[self.fill]
+        return letters[self.stroke] + ("*" if self.fill and even_odd else "")
 
 
-def _moved(point: tuple[str, str], step: tuple[str, str]) -> tuple[str, str]:
-    x, y = (svg_number(float(at) + float(by)) for at, by in zip(point, step, strict=True))
-    return x, y
+def _ink_of(style: Style) -> _Ink:
+    return _ink(
+        style.get("fill", "#000000"),
+        style.get("stroke", "none"),
+        style.get("stroke-width", "1"),
+        style.get("stroke-dasharray", ""),
+        style.get("stroke-linejoin", ""),
+    )
 
 
 @cache
-def _colour(name: str) -> Any:
+def _ink(fill: str, stroke: str, width: str, dashes: str, join: str) -> _Ink:
+    drawn = [f"{_colour(fill)} rg"] if fill != "none" else []
+    if stroke != "none":
+        drawn += [
+            f"{_colour(stroke)} RG",
+            f"{_numbers(float(width))} w",
+            f"[{_numbers(*map(float, dashes.split()))}] 0 d",
+            f"{int(join == 'round')} j",
+        ]
+    return _Ink("\n".join(drawn), stroke != "none", fill != "none")
+
+
+def _numbers(*values: float) -> str:
+    from reportlab.lib.rl_accel import fp_str
+
+    return str(fp_str(*values)) if values else ""
+
+
+def _word(value: str) -> str:
+    """A number of an attribute as reportlab writes it: without the 0 before a point."""
+    return value[1:] if value.startswith("0.") else value
+
+
+def _turn_of(style: Style) -> str:
+    """The turn of a text about its own place, in the numbers of PDF; y is up again."""
+    turn = _TURN.fullmatch(style.get("transform", ""))
+    if turn is None:
+        return "1 0 0 -1"
+    cos, sin = math.cos(math.radians(float(turn[1]))), math.sin(math.radians(float(turn[1])))
+    return _numbers(cos, sin, sin, -cos)
+
+
+def _operators(data: str) -> str:
+    """Path data in the words of PDF."""
+    return " ".join(map(_part_of_path, data.split("M")[1:]))
+
+
+def _part_of_path(data: str) -> str:
+    """The part after an M; points after `l` are steps, those after `L` positions."""
+    first, *steps = data.removesuffix("Z").split("l")
+    for step in steps:
+        by, *others = step.split("L", 1)
+        first = "L".join((first, _moved(first.rpartition("L")[2], by), *others))
+    begin, *points = first.split("L", 1)
+    ends = [" h"] if data.endswith("Z") else []
+    return "".join((begin, " m", *(f" {point.replace('L', ' l ')} l" for point in points), *ends))
+
+
+def _moved(point: str, step: str) -> str:
+    return " ".join(
+        svg_number(float(at) + float(by)) for at, by in zip(point.split(), step.split(), strict=True)
+    )
+
+
+@cache
+def _colour(name: str) -> str:
     from reportlab.lib.colors import HexColor
 
-    return HexColor("#" + "".join(2 * letter for letter in name[1:]) if len(name) == 4 else name)
+    long = "#" + "".join(2 * letter for letter in name[1:]) if len(name) == 4 else name
+    return _numbers(*HexColor(long).rgb())
 
 
 def _font(content: str, *, bold: bool) -> tuple[str, str]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
@@ -34,6 +34,9 @@ STRIP = 10.0
 """Height in millimetres of the strips by which points are found."""
 _TRIES = 28
 """Positions tried along each side of a room's bounding box."""
+_STEPS = np.arange(_TRIES)[:, None]
+_ROUNDING = 1e-6
+"""Millimetres by which a label may seem to leave the bounds of a room that it just fits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,46 +44,49 @@ class Busy:
     """Points on paper (n, 2) that labels should not cover, and how much each matters (n,)."""
 
     xy: FloatArray
-    weight: IntArray
+    weight: FloatArray
 
     @classmethod
     def of(cls, *layers: tuple[int, list[FloatArray]]) -> Busy:
         """From (weight, points) of each layer."""
         kept = [(weight, np.concatenate(points)) for weight, points in layers if points]
-        weights = [np.full(len(points), weight) for weight, points in kept]
+        weights = [np.full(len(points), float(weight)) for weight, points in kept]
         return cls(np.concatenate([points for _, points in kept]), np.concatenate(weights))
 
     def and_also(self, weight: int, points: FloatArray) -> Busy:
-        weights = np.full(len(points), weight)
-        return Busy(np.concatenate([self.xy, points]), np.concatenate([self.weight, weights]))
+        weights = np.full(len(points), float(weight))
+        xy = np.concatenate([self.xy.T, points.T], axis=1).T
+        return Busy(xy, np.concatenate([self.weight, weights]))
+
+    def only(self, chosen: BoolArray) -> Busy:
+        """Those of the points (n,) that are chosen."""
+        return Busy(self.xy.T.compress(chosen, axis=1).T, self.weight[chosen])
 
     def near(self, low: FloatArray, high: FloatArray) -> Busy:
         """Those between two corners, in any order."""
-        order, x, first = self._strips
-        begin, end = (
-            np.clip(np.floor(y / STRIP) - self._lowest, 0, len(first) - 1) for y in (low[1], high[1])
-        )
-        found = [np.empty(0, dtype=np.int64)]
-        for strip in range(int(begin), min(int(end) + 1, len(first) - 1)):
-            there = slice(first[strip], first[strip + 1])
-            within = np.searchsorted(x[there], [low[0], high[0]])
-            found.append(order[there][within[0] : within[1]])
-        index = np.concatenate(found)
-        y = self.xy[index, 1]
-        index = index[(y > low[1]) & (y < high[1])]
-        return Busy(self.xy[index], self.weight[index])
+        xy, weight, first = self._strips
+        (left, bottom), (right, top) = low.tolist(), high.tolist()
+        begin, end = (math.floor(y / STRIP) - self._lowest for y in (bottom, top))
+        found = [slice(0)]
+        for strip in range(max(begin, 0), min(end + 1, len(first) - 1)):
+            x = xy[0, first[strip] : first[strip + 1]]
+            found.append(slice(*(first[strip] + x.searchsorted((left, right)))))
+        xy = np.concatenate([xy[:, there] for there in found], axis=1)
+        within = (xy[1] > bottom) & (xy[1] < top)
+        return Busy(xy.T, np.concatenate([weight[there] for there in found])).only(within)
 
     @cached_property
-    def _lowest(self) -> float:
-        return math.floor(self.xy[:, 1].min() / STRIP) if len(self.xy) else 0.0
+    def _lowest(self) -> int:
+        return math.floor(self.xy[:, 1].min() / STRIP) if len(self.xy) else 0
 
     @cached_property
-    def _strips(self) -> tuple[IntArray, FloatArray, IntArray]:
-        """Points by strips STRIP high and by x in each: their order, x, and where each strip begins."""
+    def _strips(self) -> tuple[FloatArray, FloatArray, list[int]]:
+        """Points (2, n) and weights by strips STRIP high and by x in each, and where each strip begins."""
         strip = (np.floor(self.xy[:, 1] / STRIP) - self._lowest).astype(np.int64)
         order = np.lexsort((self.xy[:, 0], strip))
         many = int(strip.max(initial=-1)) + 1
-        return order, self.xy[order, 0], np.searchsorted(strip[order], np.arange(many + 1))
+        begins = np.searchsorted(strip[order], np.arange(many + 1)).tolist()
+        return self.xy[order].T.copy(), self.weight[order], begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,14 +98,14 @@ class Label:
     half: FloatArray
     """Half its width and height."""
     cost: float
-    crosses: bool
-    """A wall, a stop or another label."""
 
     @property
     def points(self) -> FloatArray:
         """Points (28, 2) all over it, from corner to corner, for other labels to keep off."""
-        grid = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 4)), axis=-1).reshape(-1, 2)
-        return self.centre + grid * self.half
+        return np.asarray(self.centre + _ALL_OVER * self.half)
+
+
+_ALL_OVER = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 4)), axis=-1).reshape(-1, 2)
 
 
 def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> str:
@@ -109,26 +115,28 @@ def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> s
     has no label here.
     """
     labels: list[Label] = []
-    written = np.empty((0, 28, 2))
+    written = np.empty((*_ALL_OVER.T.shape, len(rooms)))
     # The smallest rooms first: they have the least choice.
     for room in sorted((room for room in rooms if room.polygons), key=lambda room: room.area):
-        label = _label(room, sheet, avoid, written)
+        label = _label(room, sheet, avoid, written[:, :, : len(labels)])
         if label is not None:
+            written[:, :, len(labels)] = label.points.T
             labels.append(label)
-            written = np.concatenate([written, label.points[None]])
     style: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.5}
     drawn = ("".join(_lines(label)) for label in labels)
     return group("names", drawn, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
 
 
 def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> Label | None:
-    """The fullest that crosses no wall and no other label; they are at the points `written` (n, 28, 2)."""
+    """The fullest that crosses no wall and no other label; they are at the points `written` (2, 28, n)."""
     rings = [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
-    for layouts in _layouts(room, max(float(np.ptp(np.concatenate(rings)[:, 0])) - 1.0, LEAST)):
+    corners = np.concatenate(rings)
+    places = LabelPlaces(rings, corners.min(axis=0), corners.max(axis=0), avoid, written)
+    for layouts in _layouts(room, max(float(places.high[0] - places.low[0]) - 1.0, LEAST)):
         best: Label | None = None
         for lines in layouts:
-            label = _placed(lines, rings, avoid, written)
-            if not label.crosses and (best is None or label.cost < best.cost):
+            label = _placed(lines, places)
+            if label is not None and (best is None or label.cost < best.cost):
                 best = label
             if best is not None and not best.cost:
                 return best
@@ -148,13 +156,12 @@ def _layouts(room: Room, widest: float) -> Iterator[list[list[tuple[str, float]]
     yield [[(room.label.partition(" ")[0], NAME)]]
 
 
-def _placed(
-    lines: list[tuple[str, float]], rings: list[FloatArray], avoid: Busy, written: FloatArray
-) -> Label:
+def _placed(lines: list[tuple[str, float]], places: LabelPlaces) -> Label | None:
+    """Return the label at its best place; None if it crosses a wall, a stop or another label there."""
     size = (max(text_width(*item) for item in lines), sum(size + 0.4 for _, size in lines))
     half = np.array(size) / 2
-    cost, crossed, centre = _best_place(rings, half, avoid, written)
-    return Label(lines, centre, half, cost, crossed > 0)
+    found = places.best(half)
+    return None if found is None else Label(lines, found[1], half, found[0])
 
 
 def wrapped(name: str, *, width: float, cut: float | None = None) -> list[str]:
@@ -174,65 +181,98 @@ def _lines(label: Label) -> Iterator[str]:
         yield text(x, top - 0.2 * size, content, size=size)
 
 
-def _best_place(
-    rings: list[FloatArray], half: FloatArray, avoid: Busy, written: FloatArray
-) -> tuple[float, float, FloatArray]:
-    """Cost of a label, how much of it is for what it may not cross, and its centre.
+@dataclass(frozen=True, eq=False)
+class LabelPlaces:
+    """Positions for the label of a room, and what is near.
 
-    It is inside the room with its corners, off all else, and near the middle.
+    `rings` of the room are on paper, between the corners `low` and `high`; the points of other labels
+    `written` are (2, 28, n).
     """
-    corners = np.concatenate(rings)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    x, y = np.linspace(low, high, _TRIES).T
-    tried = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    touching = (written[:, -1] > low - half) & (written[:, 0] < high + half)
-    around = written[touching.all(axis=1)].reshape(-1, 2)
-    close = around[((around > low - half) & (around < high + half)).all(axis=1)]
-    busy = avoid.near(low - half, high + half).and_also(LABEL, close)
-    outside = OUTSIDE * _outside(x, y, half, rings)
-    cost = covered_weight(x, y, half + AROUND, busy) + outside
-    far: FloatArray = np.hypot(*((tried - (low + high) / 2) / (high - low + 1e-9)).T)
-    order = np.lexsort((np.arange(len(tried)), np.round(far, 6), cost))
-    best = order[0]
-    way = busy.xy[busy.weight == WAY]
-    on_way = WAY * np.count_nonzero((np.abs(way - tried[best]) < half + AROUND).all(axis=1))
-    return float(cost[best]), float(cost[best] - on_way), np.asarray(tried[best])
+
+    rings: list[FloatArray]
+    low: FloatArray
+    high: FloatArray
+    avoid: Busy
+    written: FloatArray
+
+    def best(self, half: FloatArray) -> tuple[float, FloatArray] | None:
+        """Cost and centre of a label that is inside the room with its corners, off all else, near the middle.
+
+        None if it covers there what it may not cross. Where it leaves the room's bounds, three of its nine
+        points at least are outside; a place between the bounds that costs less is the best of all.
+        """
+        x, y = (
+            at[bisect_left(at, low + reach - _ROUNDING) : bisect_right(at, high - reach + _ROUNDING)]
+            for at, reach, low, high in zip(self._tried, half, self.low, self.high, strict=True)
+        )
+        if not len(x) or not len(y):
+            return None
+        found = self._best_of(x, y, half, self._close)
+        if found is None or found[0] < 3 * OUTSIDE:
+            return found
+        return self._best_of(self._tried[0], self._tried[1], half, self._near(half))
+
+    @cached_property
+    def _tried(self) -> FloatArray:
+        """Positions along x and y (2, n)."""
+        return (self.low + _STEPS * ((self.high - self.low) / (_TRIES - 1))).T
+
+    @cached_property
+    def _close(self) -> tuple[Busy, Busy]:
+        """Points that a label between the room's bounds may cover."""
+        return self._near(AROUND + _ROUNDING)
+
+    def _near(self, margin: FloatArray | float) -> tuple[Busy, Busy]:
+        """The points near the room that a label may not cross, and those of the route."""
+        low, high = self.low - margin, self.high + margin
+        begin, end = low[:, None], high[:, None]
+        touching = ((self.written[:, -1] > begin) & (self.written[:, 0] < end)).all(axis=0)
+        around = self.written.compress(touching, axis=2).reshape(2, -1)
+        close = around.compress(((around > begin) & (around < end)).all(axis=0), axis=1)
+        busy = self.avoid.near(low, high)
+        way = busy.weight == WAY
+        return busy.only(~way).and_also(LABEL, close.T), busy.only(way)
+
+    def _best_of(
+        self, x: FloatArray, y: FloatArray, half: FloatArray, near: tuple[Busy, Busy]
+    ) -> tuple[float, FloatArray] | None:
+        crossed, on_way = near
+        cost = covered_weight(x, y, half + AROUND, crossed)
+        if cost.min() > 0:
+            return None
+        cost += OUTSIDE * _outside(x, y, half, self.rings)
+        way = covered_weight(x, y, half + AROUND, on_way)
+        cost += way
+        least = float(cost.min())
+        row, column = np.nonzero(cost == least)
+        middle, size = (self.low + self.high) / 2, self.high - self.low + 1e-9
+        far = np.hypot((x[column] - middle[0]) / size[0], (y[row] - middle[1]) / size[1])
+        nearest = far.round(6).argmin()
+        row, column = row[nearest], column[nearest]
+        return None if least > way[row, column] else (least, np.array([x[column], y[row]]))
 
 
 def covered_weight(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:
-    """Return the weight of the points under a label at each position of the grid x by y, row by row.
-
-    A point lies under a block of neighbouring positions. Its weight is added where a block begins and taken
-    away where it ends; the running sums along both sides of the grid are the weights.
-    """
-    sides = zip((y, x), avoid.xy.T[::-1], half[::-1], strict=True)
-    rows, columns = (
-        (np.searchsorted(at + reach, of, side="right"), np.searchsorted(at - reach, of, side="left"))
-        for at, of, reach in sides
+    """Return the weight of the points under a label at each position of the grid x by y (rows of y)."""
+    columns, rows = (
+        (at[:, None] - reach < of) & (of < at[:, None] + reach)
+        for at, of, reach in zip((x, y), avoid.xy.T, half, strict=True)
     )
-    shape = (len(y) + 1, len(x) + 1)
-    change = np.zeros(shape)
-    for (row, add), (column, more) in product(
-        zip(rows, (1, -1), strict=True), zip(columns, (1, -1), strict=True)
-    ):
-        place = np.ravel_multi_index((row, column), shape)
-        change += np.bincount(place, add * more * avoid.weight, change.size).reshape(shape)
-    return np.asarray(change.cumsum(axis=0).cumsum(axis=1)[:-1, :-1].ravel())
+    return np.asarray((rows * avoid.weight) @ columns.T.astype(np.float64))
 
 
-def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatArray]) -> FloatArray:
-    """Return the number of a label's nine points outside the rings, at each grid position, row by row."""
+def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatArray]) -> IntArray:
+    """Return the number of a label's nine points outside the rings, at each position (rows of y)."""
     sides = np.array([-1.0, 0.0, 1.0])[:, None]
     within = inside((x + half[0] * sides).ravel(), (y + half[1] * sides).ravel(), rings)
-    counts = (~within).reshape(3, len(y), 3, len(x)).sum(axis=(0, 2))
-    return np.asarray(counts.ravel(), dtype=np.float64)
+    return np.asarray((~within).reshape(3, len(y), 3, len(x)).sum(axis=(0, 2)))
 
 
 def inside(x: FloatArray, y: FloatArray, rings: list[FloatArray]) -> BoolArray:
     """Return True for points of the grid x by y inside the rings, by the even-odd rule (rows of y)."""
     result = np.zeros((len(y), len(x)), dtype=bool)
     for ring in rings:
-        after = np.roll(ring, -1, axis=0)
+        after = np.concatenate([ring[1:], ring[:1]])
         level = y[:, None]
         spans = (ring[:, 1] > level) != (after[:, 1] > level)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -15,12 +15,14 @@ from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.mission.stages.figures import LEG_OVER_IGNORED
 from stopgo.planner.geometry.ring_index import RingIndex, areas_within
-from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, to_shape, union
+from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, one_shape, polygon_parts, to_shape, union
 from stopgo.planner.space.local_shapes import ground_of, room_shapes
 from stopgo.planner.space.targets import solid_of
 
 AT_WALL = 0.35
 """A room's outline this close (m) to an element has a wall there."""
+LESS = 0.9
+"""Fraction of this distance that is within it for certain, however roughly its curves are drawn."""
 WALLED = 0.3
 """Fraction of a room's outline with walls, below which walls are missing …"""
 MANY = 0.5
@@ -138,31 +140,42 @@ def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
 
     Shapes on unknown layers do not count: they do not occlude.
     """
-    origin = local_origin(space.floor)
     rooms = [room for room in space.rooms if room.room is not None]
-    if not rooms:
-        return
-    known = [
-        item for item in space.floor.elements if item.kind != "other" and (item.obstacle or item.occludes)
-    ]
-    walls = union([solid_of(item, origin, HAIRLINE) for item in known]).buffer(AT_WALL, quad_segs=2)
-    index = RingIndex(walls)
-    bare = [
-        room
-        for room, outline in zip(space.rooms, shapely.boundary(room_shapes(space)), strict=True)
-        if room.room is not None
-        and outline.length
-        and outline.intersection(index.around(outline.bounds)).length < WALLED * outline.length
-    ]
-    if not bare:
-        return
-    names = ", ".join(room.name for room in bare[:5]) + (" …" if len(bare) > 5 else "")
+    outlines = shapely.boundary(room_shapes(space))
+    bare = [k for k, room in enumerate(space.rooms) if room.room is not None and outlines[k].length]
+    for near_walls in _near_walls(space):
+        index = RingIndex(near_walls)
+        bare = [k for k in bare if _is_bare(outlines[k], index)]
+        if not bare:
+            return
+    names = ", ".join(space.rooms[k].name for k in bare[:5]) + (" …" if len(bare) > 5 else "")
     code = "walls_missing" if len(bare) >= MANY * len(rooms) else "room_without_walls"
     yield Finding(
         code,
         f"{len(bare)} of {len(rooms)} rooms have walls along less than {100 * WALLED:.0f} % "
         f"of their outline: {names}{_not_read(space.floor)}",
     )
+
+
+def _near_walls(space: NavigableSpace) -> Iterator[BaseGeometry]:
+    """The surroundings of what blocks the laser, a little too small, and then those of all known elements.
+
+    The union of all elements takes long, and most rooms have walls by the first.
+    """
+    origin = local_origin(space.floor)
+    if space.settings.doors == "open":
+        solids = shapely.GeometryCollection([one_shape(solid, origin) for solid in space.occluders])
+        yield shapely.MultiPolygon(polygon_parts(solids)).buffer(LESS * AT_WALL, quad_segs=2)
+    known = [
+        item for item in space.floor.elements if item.kind != "other" and (item.obstacle or item.occludes)
+    ]
+    yield union([solid_of(item, origin, HAIRLINE) for item in known]).buffer(AT_WALL, quad_segs=2)
+
+
+def _is_bare(outline: BaseGeometry, near_walls: RingIndex) -> bool:
+    """True if too little of a room's outline is near walls."""
+    near = outline.intersection(near_walls.around(outline.bounds))
+    return bool(near.length < WALLED * outline.length)
 
 
 def _not_read(floor: FloorPlan) -> str:

@@ -9,12 +9,11 @@ import numpy as np
 import shapely
 
 from stopgo.mission.stages import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
-from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.floor_gaps import gap_before
-from stopgo.planner.space.local_shapes import room_shapes
+from stopgo.planner.space.local_shapes import obstacles_of, room_shapes
 from stopgo.planner.space.opening_joins import PROBES
 from stopgo.planner.space.reach import reach_of, room_areas_by_part
-from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 LEAST_AREA = 0.01
 """Rooms smaller than this (m²) are not reported."""
@@ -82,14 +81,15 @@ def _why(candidates: Candidates, index: int, reasons: set[int], parts: frozenset
 def _smaller_d_sec(candidates: Candidates, index: int) -> str:
     """The greatest d_sec, in whole centimetres, that leaves a stop position, if the robot fits there."""
     space = candidates.space
-    feasibility = StopFeasibility(space)
-    free = feasibility.rooms[index].difference(feasibility.obstacles)
+    settings, obstacles = space.settings, obstacles_of(space)
+    free = room_shapes(space)[index].difference(obstacles)
     if free.is_empty:
         return ""
-    middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(free, tolerance=1e-3))[:1]
-    d_sec = math.floor(100 * float(feasibility.to_element(middle)[0]) + 1e-6) / 100
-    fits = d_sec >= space.settings.radius and feasibility.to_edge(middle)[0] >= space.settings.edge
-    return f"; --clearance {d_sec:g} leaves one" if fits and d_sec < space.settings.d_sec else ""
+    middle = shapely.get_point(shapely.maximum_inscribed_circle(free, tolerance=1e-3), 0)
+    edge = to_shape(space.floor.outline, local_origin(space.floor)).boundary
+    d_sec = math.floor(100 * middle.distance(obstacles.boundary) + 1e-6) / 100
+    fits = d_sec >= settings.radius and middle.distance(edge) >= settings.edge
+    return f"; --clearance {d_sec:g} leaves one" if fits and d_sec < settings.d_sec else ""
 
 
 def _barriers(candidates: Candidates, index: int, parts: frozenset[int]) -> str:

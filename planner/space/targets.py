@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
@@ -127,17 +126,18 @@ def raw_units(floor: FloorPlan, *, d_dis: float) -> dict[str, int]:
     counts: dict[str, int] = {}
     for item in floor.elements:
         if item.target or item.occludes:
-            lengths = np.array([polyline_length(np.stack([a, b])) for a, b in _edges(item)])
+            edges = _edges(item)
+            lengths = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
             counts[item.kind] = counts.get(item.kind, 0) + int(units_on(lengths, d_dis=d_dis).sum())
     return dict(sorted(counts.items()))
 
 
-def _edges(element: Element) -> Iterator[tuple[FloatArray, FloatArray]]:
-    for solid in element.solids:
-        for ring in solid.rings:
-            yield from zip(ring, np.roll(ring, -1, axis=0), strict=True)
-    for line in element.lines:
-        yield from pairwise(line)
+def _edges(element: Element) -> FloatArray:
+    """Every segment (n, 2, 2) of an element's outlines and lines."""
+    rings = [ring for solid in element.solids for ring in solid.rings]
+    edges = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings]
+    edges += [np.stack([line[:-1], line[1:]], axis=1) for line in element.lines]
+    return np.concatenate([np.empty((0, 2, 2)), *edges])
 
 
 def _free_segments(floor: FloorPlan) -> list[tuple[FloatArray, int]]:

@@ -126,6 +126,21 @@ def test_relative_steps_and_turned_words_are_understood() -> None:
     assert b"0 -1 -1 0 5 6 cm" in drawn
 
 
+def test_a_halo_lies_beneath_its_words_and_brackets_are_escaped() -> None:
+    content = '<text x="0.5" y="-6.25" font-size="3" fill="#000" stroke="#fff">(3 m²) …</text>'
+    (drawn,) = streams(pdf_of([PdfPage(50.0, 50.0, content)], title="t"))
+    assert b"1 0 0 -1 .5 -6.25 cm" in drawn
+    words = rb"(\(3 m\262\) \205) Tj T*"
+    assert drawn.index(b"Tm 1 Tr " + words + b" 0 Tr ET") < drawn.index(b"Tm " + words + b" ET")
+
+
+def test_a_shape_is_stroked_and_filled_as_its_style_says() -> None:
+    looks = ('fill="none" stroke="#000"', 'fill="#fff" fill-rule="evenodd"', 'fill="#fff" stroke="#000"')
+    content = "".join(f'<path d="M1 2L3 4L5 6Z" {look}/>' for look in looks)
+    (drawn,) = streams(pdf_of([PdfPage(50.0, 50.0, content)], title="t"))
+    assert re.findall(rb"5 6 l h\n(\S+)", drawn) == [b"S", b"f*", b"B"]
+
+
 def test_letters_of_any_script_are_written_or_replaced() -> None:
     content = '<text x="5" y="6" font-size="3">Кабинет 会議室</text>'
     assert pdf_of([PdfPage(50.0, 50.0, content)], title="Кабинет").startswith(b"%PDF")

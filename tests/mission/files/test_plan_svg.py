@@ -258,7 +258,7 @@ def test_points_near_a_label_are_found_and_weighed_as_one_by_one(seed: int, many
     under = (np.abs(xy[:, 0] - x[:, None]) < half[0])[None] & (np.abs(xy[:, 1] - y[:, None]) < half[1])[
         :, None
     ]
-    assert covered_weight(x, y, half, busy).tolist() == (under * weight).sum(axis=2).ravel().tolist()
+    assert covered_weight(x, y, half, busy).tolist() == (under * weight).sum(axis=2).tolist()
 
 
 @given(st.text(min_size=1, max_size=40), st.floats(5, 50))

@@ -1,0 +1,57 @@
+"""The place of a room's label is the best of all, whichever of them are tried."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stopgo.mission.files.room_labels import (
+    AROUND,
+    LABEL,
+    OUTSIDE,
+    STOPS,
+    WALLS,
+    WAY,
+    Busy,
+    LabelPlaces,
+    inside,
+)
+from stopgo.mission.geometry import FloatArray
+
+ROOM = np.array([[0, 0], [1, 0], [1, 1], [0.6, 1], [0.5, 0.7], [0, 1]])
+NINE = np.array(list(product((-1, 0, 1), repeat=2)))
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0, 10, 400]), st.integers(0, 3), st.booleans())
+def test_the_place_of_a_label_is_the_best_of_all(seed: int, points: int, labels: int, only_way: bool) -> None:
+    random = np.random.default_rng(seed)
+    high, half = random.uniform(4, 20, 2), random.uniform(0.5, 8, 2)
+    weight = random.choice([WAY] if only_way else [WAY, WALLS, STOPS], points).astype(float)
+    xy = random.uniform(0.3, 0.7, (points, 2)) * high if only_way else random.uniform(-2, 22, (points, 2))
+    busy, written = Busy(xy, weight), random.uniform(-4, 24, (2, 28, labels))
+    written.sort(axis=1)
+    places = LabelPlaces([high * ROOM], np.zeros(2), high, busy, written)
+    tried = np.array([(x, y) for y in np.linspace(0, high[1], 28) for x in np.linspace(0, high[0], 28)])
+    crossed, way = _costs(tried, half, places)
+    far = np.round(np.hypot(*((tried - high / 2) / (high + 1e-9)).T), 6)
+    best, found = np.lexsort((far, crossed + way))[0], places.best(half)
+    if crossed[best] > 0:
+        assert found is None
+    else:
+        assert found is not None and found[0] == way[best] and np.allclose(found[1], tried[best])
+
+
+def _costs(tried: FloatArray, half: FloatArray, places: LabelPlaces) -> tuple[FloatArray, FloatArray]:
+    """Of what a label may not cross at each place, and of the route."""
+    labels = places.written.transpose(2, 1, 0).reshape(-1, 2)
+    xy, busy = np.concatenate([places.avoid.xy, labels]), places.avoid.weight
+    weight = np.concatenate([busy, np.full(len(labels), LABEL)])
+    near = ((xy > -half) & (xy < places.high + half)).all(axis=1)
+    under = (np.abs(tried[:, None] - xy) < half + AROUND).all(axis=2) & near
+    corners = tried[:, None] + half * NINE
+    within = [inside(point[:1], point[1:], places.rings)[0, 0] for point in corners.reshape(-1, 2)]
+    outside = 9 - np.reshape(within, (-1, 9)).sum(axis=1)
+    return under @ (weight * (weight != WAY)) + OUTSIDE * outside, under @ (weight * (weight == WAY))
