@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import Finding
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
 from stopgo.planner.geometry.ring_index import RingIndex
@@ -47,10 +47,16 @@ def opening_states(
     for crossing in ground.crossings:
         sides = [] if crossing.closed_because else [side_of(room) for room in crossing.rooms]
         why = crossing.closed_because or _not_reached(crossing, parts, sides, around)
-        states.append(OpeningState(crossing.opening, crossing.rooms, crossing.width, not why, why))
+        states.append(_state(crossing, why, ground.origin))
         if why and not why.startswith("exterior"):
             findings.append(_opening_finding(crossing, why, ground))
     return tuple(states), tuple(findings)
+
+
+def _state(crossing: Crossing, why: str, origin: FloatArray) -> OpeningState:
+    filled = crossing.clear.is_empty
+    middle = crossing.opening.line.mean(axis=0) if filled else middle_and_normal(crossing.clear)[0] + origin
+    return OpeningState(crossing.opening, crossing.rooms, crossing.width, frozen(middle), not why, why)
 
 
 def _opening_finding(crossing: Crossing, why: str, ground: Ground) -> Finding:
