@@ -10,9 +10,12 @@ from stopgo.mission.frames.geodesy import out_of_reach
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
-from stopgo.planner.geometry.shapes import local_origin, to_polygons
+from stopgo.planner.geometry.instance_cache import store
+from stopgo.planner.geometry.shapes import local_origin, to_polygons, to_shape
+from stopgo.planner.space.connected_parts import parts_of
 from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
+from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
 from stopgo.planner.space.opening_joins import Crossing, barrier
 from stopgo.planner.space.opening_states import opening_states
 from stopgo.planner.space.room_spaces import room_spaces
@@ -26,7 +29,10 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     _check_georeference(floor, origin, settings)
     ground = Ground.of(floor, settings)
     drive_area, gaps = drivable(ground, settings)
-    states, findings = opening_states(ground, drive_area, gaps, settings)
+    drive_polygons, gaps = to_polygons(drive_area, origin), frozen(gaps + origin)
+    drive_shape = to_shape(drive_polygons, origin)
+    parts = parts_of(drive_shape, gaps - origin)
+    states, findings = opening_states(ground, parts, settings)
     closed = np.array(
         [line for c in ground.crossings if (line := _closed_door(c, settings, ground)) is not None]
     )
@@ -37,7 +43,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
             f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
         )
     rooms = room_spaces(floor, ground, drive_area, settings)
-    return NavigableSpace(
+    space = NavigableSpace(
         floor=floor,
         settings=settings,
         rooms=rooms,
@@ -45,13 +51,16 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         obstacles=to_polygons(ground.obstacles, origin),
         occluders=to_polygons(occluders, origin),
         barriers=frozen(ground.barriers + origin),
-        drive_area=to_polygons(drive_area, origin),
-        gaps=frozen(gaps + origin),
+        drive_area=drive_polygons,
+        gaps=gaps,
         targets=targets,
         unit_room=faced_rooms(targets, rooms, ground),
         ground=to_polygons(ground.outline, origin),
         findings=(*floor.findings, *findings),
     )
+    store(drive_area_of, space, drive_shape)
+    store(drive_parts_of, space, parts)
+    return space
 
 
 def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings) -> None:

@@ -18,7 +18,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
 from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
-from stopgo.planner.space.connected_parts import Parts, parts_of
+from stopgo.planner.space.connected_parts import Parts
 from stopgo.planner.space.gaps import Gap, Walls, gaps_between
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import Crossing, middle_and_normal
@@ -33,10 +33,9 @@ REACHED_AREA = 0.5
 
 
 def opening_states(
-    ground: Ground, drive_area: BaseGeometry, gaps: FloatArray, settings: Settings
+    ground: Ground, parts: Parts, settings: Settings
 ) -> tuple[tuple[OpeningState, ...], tuple[Finding, ...]]:
     """Return the state of each opening for the robot, and a finding for each inner one it cannot pass."""
-    parts = parts_of(drive_area, gaps)
 
     @cache
     def side_of(room: int | None) -> OpeningSide:
