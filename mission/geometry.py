@@ -80,8 +80,8 @@ def bounds(parts: Iterable[FloatArray]) -> tuple[float, float, float, float]:
     arrays = [part for part in parts if len(part)]
     if not arrays:
         return (0.0, 0.0, 0.0, 0.0)
-    low = np.min([part.min(axis=0) for part in arrays], axis=0)
-    high = np.max([part.max(axis=0) for part in arrays], axis=0)
+    points = np.concatenate(arrays)
+    low, high = points.min(axis=0), points.max(axis=0)
     return (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
 
 

@@ -154,7 +154,7 @@ def coverage_json(
     elements = [
         {
             **_named(floor.elements[index]),
-            **counts.summary([index], with_elements=False),
+            **counts.of_element(index),
             "segments": segments.get(index, []),
         }
         for index in targets
@@ -184,19 +184,23 @@ class _Counts:
         by_units = space.settings.coverage_rule == "paper"
         return cls(np.stack(units, axis=1), np.stack(metres, axis=1, dtype=np.float64), by_units)
 
-    def summary(self, rows: list[int], *, with_elements: bool = True) -> dict[str, Any]:
+    def summary(self, rows: list[int]) -> dict[str, Any]:
         """Return the sums of some elements."""
-        units, visible, seen = (int(number) for number in self.units[rows].sum(axis=0))
-        metres = self.metres[rows].sum(axis=0)
-        length, visible_m, seen_m = (round(float(number), 4) for number in metres)
-        part, whole = (seen, visible) if self.by_units else (float(metres[2]), float(metres[1]))
-        fraction = part / whole if whole else None
-        summary = {
-            **{"units": units, "visible": visible, "seen": seen},
-            **{"length_m": length, "visible_m": visible_m, "seen_m": seen_m},
-            "coverage": None if fraction is None else round(fraction, DIGITS),
+        sums = self.units[rows].sum(axis=0), self.metres[rows].sum(axis=0)
+        return {"elements": len(rows), **self._summary(*sums)}
+
+    def of_element(self, row: int) -> dict[str, Any]:
+        """Return the sums of one element."""
+        return self._summary(self.units[row], self.metres[row])
+
+    def _summary(self, units: IntArray, metres: FloatArray) -> dict[str, Any]:
+        (total, visible, seen), (length_m, visible_m, seen_m) = units.tolist(), metres.tolist()
+        part, whole = (seen, visible) if self.by_units else (seen_m, visible_m)
+        return {
+            **{"units": total, "visible": visible, "seen": seen},
+            **{"length_m": round(length_m, 4), "visible_m": round(visible_m, 4), "seen_m": round(seen_m, 4)},
+            "coverage": round(part / whole, DIGITS) if whole else None,
         }
-        return {"elements": len(rows), **summary} if with_elements else summary
 
 
 def _room(group: GroupCoverage) -> dict[str, Any]:
@@ -216,8 +220,8 @@ def _segments_by_element(route: Route) -> dict[int, list[dict[str, Any]]]:
     targets = route.visibility.targets
     seen = _seen_by_segment(targets, route)
     segments: dict[int, list[dict[str, Any]]] = {}
-    for index, element in enumerate(targets.element.tolist()):
-        a, b = (np.round(end[index], DIGITS).tolist() for end in (targets.a, targets.b))
+    ends = (np.round(end, DIGITS).tolist() for end in (targets.a, targets.b))
+    for index, (element, a, b) in enumerate(zip(targets.element.tolist(), *ends, strict=True)):
         segments.setdefault(element, []).append({"a": a, "b": b, "seen": seen.get(index, [])})
     return segments
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from stopgo.mission.files.sheet import PaperMap, PaperSheet
-from stopgo.mission.files.svg import clean, group, line_data, number, path, ring_data
+from stopgo.mission.files.svg import clean, group, lines_data, number, path
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, Polygon
 from stopgo.mission.settings.element_kinds import kind_of
@@ -42,10 +41,9 @@ def building(space: NavigableSpace, sheet: PaperSheet) -> Iterator[str]:
 
 def floor_layers(floor: FloorPlan, paper: PaperSheet | PaperMap, *, named: bool = False) -> Iterator[str]:
     """Yield floor, rooms, and elements by kind; `named` gives every element a tooltip, not only a model's."""
-    outline = "".join(_region(part, paper) for part in floor.outline)
-    yield group("floor", [path([outline])], **FLOOR, **_EVEN_ODD)
-    rooms = (_region(part, paper) for room in floor.rooms for part in room.polygons)
-    yield group("rooms", [path(rooms)], **ROOM, **_EVEN_ODD)
+    yield group("floor", [path([_regions(floor.outline, paper)])], **FLOOR, **_EVEN_ODD)
+    rooms = _regions((part for room in floor.rooms for part in room.polygons), paper)
+    yield group("rooms", [path([rooms])], **ROOM, **_EVEN_ODD)
     for kind in kinds_of(floor):
         elements = [item for item in floor.elements if item.kind == kind]
         yield group(kind, _elements(elements, paper, named=named), **look_of(kind))
@@ -53,8 +51,9 @@ def floor_layers(floor: FloorPlan, paper: PaperSheet | PaperMap, *, named: bool 
 
 def outline(floor: FloorPlan, sheet: PaperSheet) -> str:
     """Return the floor's outline alone."""
-    data = (_region(part, sheet) for part in floor.outline)
-    return path(data, fill="#e4e4e0", stroke="#888888", stroke_width=0.15, **_EVEN_ODD)
+    return path(
+        [_regions(floor.outline, sheet)], fill="#e4e4e0", stroke="#888888", stroke_width=0.15, **_EVEN_ODD
+    )
 
 
 def targets(selection: Selection, sheet: PaperSheet) -> Iterator[str]:
@@ -68,7 +67,7 @@ def targets(selection: Selection, sheet: PaperSheet) -> Iterator[str]:
     )
     for name, units, look in layers:
         width = {"stroke_width": THINNER.get(sheet.scale, 0.5) * look["stroke_width"]}
-        strokes = path(_strokes(visibility.targets, units, sheet))
+        strokes = path([_strokes(visibility.targets, units, sheet)])
         yield group(name, [strokes], fill="none", **{**look, **width})
 
 
@@ -91,22 +90,27 @@ def cross(at: FloatArray, *, size: float) -> str:
     )
 
 
-def _region(part: Polygon, sheet: PaperSheet | PaperMap) -> str:
-    return "".join(ring_data(sheet.on_paper(ring)) for ring in part.rings)
+def _regions(parts: Iterable[Polygon], sheet: PaperSheet | PaperMap) -> str:
+    return _lines_on(sheet, (ring for part in parts for ring in part.rings), end="Z")
+
+
+def _lines_on(sheet: PaperSheet | PaperMap, lines: Iterable[FloatArray], *, end: str = "") -> str:
+    """Return the path data of polylines (n, 2), which are put on paper together."""
+    drawn = [line for line in lines if len(line)]
+    return lines_data(sheet.on_paper(np.concatenate(drawn)), map(len, drawn), end=end) if drawn else ""
 
 
 def _elements(elements: list[Element], sheet: PaperSheet | PaperMap, *, named: bool) -> Iterator[str]:
     """Yield the elements; those of a model are separate shapes with a tooltip."""
     yield from (_named(item, sheet) for item in elements if named or item.global_id)
     elements = [] if named else [item for item in elements if not item.global_id]
-    solids = (_region(part, sheet) for item in elements for part in item.solids)
-    yield path(solids, **_EVEN_ODD)
-    yield path((line_data(sheet.on_paper(line)) for item in elements for line in item.lines), fill="none")
+    yield path([_regions((part for item in elements for part in item.solids), sheet)], **_EVEN_ODD)
+    yield path([_lines_on(sheet, (line for item in elements for line in item.lines))], fill="none")
 
 
 def _named(item: Element, sheet: PaperSheet | PaperMap) -> str:
-    solids = path((_region(part, sheet) for part in item.solids), **_EVEN_ODD)
-    lines = path((line_data(sheet.on_paper(line)) for line in item.lines), fill="none")
+    solids = path([_regions(item.solids, sheet)], **_EVEN_ODD)
+    lines = path([_lines_on(sheet, item.lines)], fill="none")
     name = " ".join(filter(None, (item.id, item.global_id)))
     return f"<g><title>{clean(name)}</title>{solids}{lines}</g>"
 
@@ -125,20 +129,19 @@ def _openings(openings: tuple[OpeningState, ...], sheet: PaperSheet) -> Iterator
 
 
 def _lines(openings: list[OpeningState], kind: str, sheet: PaperSheet) -> str:
-    data = [line_data(sheet.on_paper(item.opening.line)) for item in openings if item.opening.kind == kind]
-    return path(data, **({"stroke_dasharray": "1.2 0.7"} if kind == "passage" else {}))
+    data = _lines_on(sheet, (item.opening.line for item in openings if item.opening.kind == kind))
+    return path([data], **({"stroke_dasharray": "1.2 0.7"} if kind == "passage" else {}))
 
 
 def _middle(state: OpeningState, sheet: PaperSheet) -> FloatArray:
     return sheet.on_paper(state.opening.line.mean(axis=0))
 
 
-def _strokes(targets: Targets, units: BoolArray, sheet: PaperSheet) -> Iterator[str]:
-    """Yield the path data of the units of a mask; adjoining stretches become one polyline."""
+def _strokes(targets: Targets, units: BoolArray, sheet: PaperSheet) -> str:
+    """Return the path data of the units of a mask; adjoining stretches become one polyline."""
     lines = lines_along(targets, units)
     begins, ends = sheet.on_paper(lines[:, 0]), sheet.on_paper(lines[:, 1])
     apart = np.abs(begins[1:] - ends[:-1]).max(axis=1, initial=0.0) > 0.005
-    breaks = [0, *(np.flatnonzero(apart) + 1).tolist(), len(begins)]
-    for first, last in pairwise(breaks):
-        if first < last:
-            yield line_data(np.concatenate([begins[first : first + 1], ends[first:last]]))
+    first = np.flatnonzero(np.concatenate([np.ones(len(begins[:1]), dtype=bool), apart]))
+    lengths = np.diff(first, append=len(begins)) + 1
+    return lines_data(np.insert(ends, first, begins[first], axis=0), lengths.tolist())

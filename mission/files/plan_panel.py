@@ -17,12 +17,12 @@ from stopgo.mission.files import floor_drawing as floor_look
 from stopgo.mission.files import route_drawing as route_look
 from stopgo.mission.files.shared_drawing import back, letter, line_of
 from stopgo.mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
-from stopgo.mission.files.stop_list import stop_list
+from stopgo.mission.files.stop_list import ListedStop
 from stopgo.mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
 from stopgo.mission.geometry import polyline_length
 from stopgo.mission.stages import Route, Selection
 from stopgo.mission.stages.figures import Figures, GroupCoverage
-from stopgo.mission.stages.network import magnified_errors, network_of
+from stopgo.mission.stages.network import error_factor, network_of
 from stopgo.mission.stages.plan_results import PlanResults
 
 BODY = 2.5
@@ -181,7 +181,7 @@ def _network_entries(mission: Mission) -> list[tuple[str, str, bool]]:
     return [
         ("pair", "scans that register", len(network.overlaps) > len(network.bridges)),
         ("bridge", "their only connection", bool(network.bridges)),
-        ("error", ERROR, magnified_errors(mission, most_m=1.0) is not None),
+        ("error", ERROR, error_factor(mission, most_m=1.0) is not None),
     ]
 
 
@@ -194,9 +194,9 @@ def legend(entries: list[tuple[str, str]], mission: Mission, sheet: PaperSheet) 
     box = sheet.legend
     rows = math.ceil(len(entries) / 2)
     items = [text(box.x + 3, box.y + 4.6, "Legend", size=2.6, font_weight="bold")]
-    errors = route_look.errors_of(mission, sheet)
+    factor = route_look.error_factor_on(sheet, mission)
     for index, (symbol, name) in enumerate(entries):
-        words = f"{name} × {errors.factor:g}" if symbol == "error" and errors is not None else name
+        words = f"{name} × {factor:g}" if symbol == "error" and factor is not None else name
         x = box.x + 3 + (index // rows) * (COLUMN / 2)
         y = box.y + 8.5 + LINE * (index % rows)
         items += [_symbol(symbol, x, y), text(x + 9, y + 0.8, words, size=BODY)]
@@ -302,24 +302,23 @@ STOP_HEAD = Row(("no", *STOP_COLUMNS[:-1], "time"), STOP_EDGES, bold=True)
 COVERAGE_HEAD = Row(("coverage", "all", "visible", "covered", "%"), COVERAGE_EDGES, bold=True, to_left=True)
 
 
-def shared_rows(missions: Sequence[Mission], most: int) -> list[Row]:
+def shared_rows(missions: Sequence[Mission], stops: Sequence[Sequence[ListedStop]], most: int) -> list[Row]:
     """The stops of every mission, below a line that says whose they are."""
     rows: list[Row] = []
-    for k, mission in enumerate(missions):
+    for k, (mission, own) in enumerate(zip(missions, stops, strict=True)):
         taken = duration(schedule(mission).total_s)
-        told = f"{letter(k)}: {allocation_in_words(mission)}, {len(mission.stops)} stops, {taken}"
-        rows += [_words(told, bold=True), *stop_rows(mission, most, before=letter(k))]
+        told = f"{letter(k)}: {allocation_in_words(mission)}, {len(own)} stops, {taken}"
+        rows += [_words(told, bold=True), *stop_rows(own, most, before=letter(k))]
     return rows
 
 
-def stop_rows(mission: Mission, most: int, *, before: str = "") -> list[Row]:
+def stop_rows(stops: Sequence[ListedStop], most: int, *, before: str = "") -> list[Row]:
     """A row per stop, `most` of them, as the robot meets them; a doorway stop has a `d` after its number."""
     cells: list[tuple[str, ...]] = [
         (f"{before}{row['no']}{row['doorway'] and 'd'}", *(row[name] for name in STOP_COLUMNS))
-        for row in (stop.cells for stop in stop_list(mission))
+        for row in (stop.cells for stop in stops[:most])
     ]
-    rows = [Row(row, STOP_EDGES) for row in cells[:most]]
-    return [*rows, *_more(len(cells) - most)]
+    return [*(Row(row, STOP_EDGES) for row in cells), *_more(len(stops) - most)]
 
 
 def figure_rows(figures: Figures, most: int) -> list[Row]:

@@ -22,7 +22,7 @@ from stopgo.mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, Pa
 from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import group, line, rect, shortened, text, use
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, bounds
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures
 
@@ -83,7 +83,7 @@ def sheets_of(
     tiles = tiles_of(made, mission) if whole.scale > READABLE else []
     shared: dict[str, str] = {}
     if tiles:
-        site = _site_sheet(made, mission)
+        site = _site_sheet(whole.centre)
         shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range))
         shared["key"] = _key(tiles, floor)
         shared["legend"] = _tile_legend(made, mission, tiles[0])
@@ -141,11 +141,10 @@ def _places(made: Route, mission: Mission) -> FloatArray:
     return np.concatenate([made.visibility.targets.unit_xy, *legs, [(mission.start.x, mission.start.y)]])
 
 
-def _site_sheet(made: Route, mission: Mission) -> PaperSheet:
+def _site_sheet(centre: tuple[float, float]) -> PaperSheet:
     """A sheet without end at the readable scale, with the site's middle at its corner."""
-    x0, y0, x1, y1 = extent_of(made, mission)
     nowhere = PaperBox(0.0, 0.0, 0.0, 0.0)
-    return PaperSheet("", 0.0, 0.0, READABLE, nowhere, nowhere, nowhere, (), ((x0 + x1) / 2, (y0 + y1) / 2))
+    return PaperSheet("", 0.0, 0.0, READABLE, nowhere, nowhere, nowhere, (), centre)
 
 
 def _tile_sheet(tile: Tile) -> PaperSheet:
@@ -260,17 +259,14 @@ def _stop_lines(mission: Mission, floor: FloorPlan, tiles: Sequence[Tile]) -> It
 
 def rooms_of(mission: Mission, floor: FloorPlan) -> list[str]:
     """Return the name of each stop's room; empty between rooms."""
-    xy = np.array([(stop.x, stop.y) for stop in mission.stops], dtype=np.float64).reshape(-1, 2)
-    names = [""] * len(xy)
-    for room in floor.rooms:
-        rings = [ring for part in room.polygons for ring in part.rings]
-        corners = np.concatenate([*rings, np.empty((0, 2))])
-        if not len(corners):
-            continue
-        near = ((xy >= corners.min(axis=0)) & (xy <= corners.max(axis=0))).all(axis=1)
-        for number in np.flatnonzero(near).tolist():
-            within = inside(xy[number, :1], xy[number, 1:], rings)[0, 0]
-            names[number] = names[number] or (room.label if within else "")
+    rooms = [(room.label, [ring for part in room.polygons for ring in part.rings]) for room in floor.rooms]
+    rooms = [(label, rings) for label, rings in rooms if rings]
+    x0, y0, x1, y1 = np.reshape([bounds(rings) for _, rings in rooms], (-1, 4)).T
+    names = []
+    for stop in mission.stops:
+        near = np.flatnonzero((x0 <= stop.x) & (stop.x <= x1) & (y0 <= stop.y) & (stop.y <= y1)).tolist()
+        x, y = np.array([stop.x]), np.array([stop.y])
+        names.append(next((rooms[k][0] for k in near if inside(x, y, rooms[k][1])[0, 0]), ""))
     return names
 
 

@@ -15,6 +15,7 @@ from stopgo.mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_alo
 from stopgo.mission.files.route_drawing import STOP, errors, network, rings, route, stops
 from stopgo.mission.files.shared_drawing import shared_routes, shared_stops
 from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit, sheet_with
+from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray, bounds, closed
@@ -59,30 +60,32 @@ def overview(
     with_table: bool = True,
 ) -> tuple[str, PaperSheet]:
     """Return the blocks of the one sheet that shows everything, and the sheet."""
-    rows = _table_rows(made, mission, figures, shared) if with_table else []
     facts = panel.facts_of(made, mission, shared, date=date)
-    sheet = whole_sheet(made, mission, shared, rows=len(rows))
+    entries = panel.legend_entries(made, mission, shared)
+    contents = _contents(made, shared or (mission,), facts, entries)
+    rows = _table_rows(contents, mission, figures, shared) if with_table else []
+    sheet = fit(replace(contents, rows=len(rows)))
     inside = "\n".join(drawing_of(made, mission, sheet, shared, with_range=with_range))
     drawn = (
         group("drawing", [inside], clip_path="url(#frame)"),
         _outline(sheet.drawing),
         panel.coordinate_ticks(sheet),
         panel.title_block(mission, [*facts, ("Scale", _scale(sheet))], sheet.title),
-        panel.legend(panel.legend_entries(made, mission, shared), mission, sheet),
+        panel.legend(entries, mission, sheet),
         panel.table(rows, sheet.table),
     )
     return "\n".join(item for item in drawn if item), sheet
 
 
 def _table_rows(
-    made: Route, mission: Mission, figures: Figures | None, shared: Sequence[Mission]
+    contents: SheetContents, mission: Mission, figures: Figures | None, shared: Sequence[Mission]
 ) -> list[panel.Row]:
     """Rows of the table: fewer of each list on a floor whose drawing would else be smaller."""
-    contents = _contents(made, mission, shared)
+    stops = [stop_list(item) for item in shared or (mission,)]
     scale = max(HANDY, fit(contents).scale)
     rows: list[panel.Row] = []
     for most in panel.MOST_ROWS:
-        rows = panel.shared_rows(shared, most) if shared else panel.stop_rows(mission, most)
+        rows = panel.shared_rows(shared, stops, most) if shared else panel.stop_rows(stops[0], most)
         rows += panel.figure_rows(figures, most) if figures else []
         sheet = sheet_with(replace(contents, rows=len(rows)))
         if sheet is not None and sheet.scale <= scale:
@@ -90,19 +93,18 @@ def _table_rows(
     return rows
 
 
-def whole_sheet(
-    made: Route, mission: Mission, shared: Sequence[Mission] = (), *, rows: int = 0
-) -> PaperSheet:
-    """Return the sheet that shows everything, with this number of table rows next to it."""
-    return fit(replace(_contents(made, mission, shared), rows=rows))
+def whole_sheet(made: Route, mission: Mission) -> PaperSheet:
+    """Return the sheet that shows everything, without a table."""
+    facts = panel.facts_of(made, mission, date="")
+    return fit(_contents(made, [mission], facts, panel.legend_entries(made, mission)))
 
 
-def _contents(made: Route, mission: Mission, shared: Sequence[Mission]) -> SheetContents:
+def _contents(
+    made: Route, missions: Sequence[Mission], facts: list[tuple[str, str]], entries: list[tuple[str, str]]
+) -> SheetContents:
     """Contents of the one sheet, without a table."""
-    entries = panel.legend_entries(made, mission, shared)
-    facts = [*panel.facts_of(made, mission, shared, date=""), ("Scale", "")]
-    blocks = (panel.legend_height(entries), panel.title_height(facts), 0)
-    return SheetContents(extent_of(made, *(shared or (mission,))), PADDING, *blocks)
+    blocks = (panel.legend_height(entries), panel.title_height([*facts, ("Scale", "")]), 0)
+    return SheetContents(extent_of(made, *missions), PADDING, *blocks)
 
 
 def drawing_of(

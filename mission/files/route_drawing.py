@@ -23,7 +23,7 @@ from stopgo.mission.files.svg import (
     text_width,
 )
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.stages.network import MagnifiedErrors, magnified_errors, network_of
+from stopgo.mission.stages.network import error_factor, magnified_errors, network_of
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """Line of the leg to each stop."""
@@ -89,14 +89,14 @@ def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
         yield group("weakest", [rect(x - wide / 2, y - 1.6, wide, 3.2, fill="#ffffff", **THIN), held])
 
 
-def errors_of(mission: Mission, sheet: PaperSheet) -> MagnifiedErrors | None:
-    """Return the predicted errors of the scans, magnified for this sheet."""
-    return magnified_errors(mission, most_m=LARGEST_ERROR / sheet.length(1.0))
+def error_factor_on(sheet: PaperSheet, mission: Mission) -> float | None:
+    """Return by how much predicted errors are magnified on this sheet; None if there are none."""
+    return error_factor(mission, most_m=LARGEST_ERROR / sheet.length(1.0))
 
 
 def errors(mission: Mission, sheet: PaperSheet) -> str:
     """Draw the predicted error of each scan as an ellipse."""
-    found = errors_of(mission, sheet)
+    found = magnified_errors(mission, most_m=LARGEST_ERROR / sheet.length(1.0))
     outlines = [] if found is None else [sheet.on_paper(line) for line in found.outlines.values()]
     return group("errors", [path([ring_data(line)]) for line in outlines], **ERROR)
 

@@ -195,6 +195,8 @@ def _packed(
 
 def _chunks(spans: list[PaperBox], rows: int) -> tuple[Chunk, ...] | None:
     """The table's rows over the spans from left to right, or None if they do not fit."""
+    if sum(max(int((span.height - HEADER) // ROW), 0) for span in spans) < rows:
+        return None
     chunks: list[Chunk] = []
     first = 0
     for span in spans:
@@ -203,4 +205,4 @@ def _chunks(spans: list[PaperBox], rows: int) -> tuple[Chunk, ...] | None:
             box = PaperBox(span.x, span.y, span.width, HEADER + count * ROW)
             chunks.append(Chunk(box, first, count))
             first += count
-    return tuple(chunks) if first >= rows else None
+    return tuple(chunks)

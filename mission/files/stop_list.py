@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from stopgo.mission.console.table import duration
@@ -29,7 +30,7 @@ class ListedStop:
         """Length of the leg that leads to it."""
         return polyline_length(frozen(self.stop.approach).reshape(-1, 2))
 
-    @property
+    @cached_property
     def cells(self) -> Mapping[str, str]:
         """The row of a table: text by the column's heading."""
         stop = self.stop

@@ -95,12 +95,25 @@ def path(data: Iterable[str], **style: object) -> str:
 
 def ring_data(points: FloatArray) -> str:
     """Path data of a closed ring (n, 2)."""
-    return f"{line_data(points)}Z" if len(points) else ""
+    return lines_data(points, [len(points)], end="Z") if len(points) else ""
 
 
 def line_data(points: FloatArray) -> str:
     """Path data of a polyline (n, 2)."""
-    return "M" + "L".join(f"{number(x)} {number(y)}" for x, y in np.asarray(points).tolist())
+    return lines_data(points, [len(points)])
+
+
+def lines_data(points: FloatArray, lengths: Iterable[int], *, end: str = "") -> str:
+    """Path data of polylines of these lengths, whose points (n, 2) follow one another."""
+    words = "".join("M" + "L".join(["%.2f %.2f"] * length) + end for length in lengths)
+    data = words % tuple(np.asarray(points, dtype=np.float64).ravel().tolist())
+    for digits, short in _SHORTER.items():
+        data = data.replace(digits, short)
+    return data
+
+
+_SHORTER = {"-0.00": "0", ".00": "", **{f".{digit}0": f".{digit}" for digit in range(1, 10)}}
+"""Two digits after a point without the zeros that end them."""
 
 
 def number(value: float) -> str:

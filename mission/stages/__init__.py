@@ -79,6 +79,8 @@ class OpeningState:
     """Indices into `FloorPlan.rooms` of the rooms on its two sides."""
     clear_width: float
     """Widest clear stretch of the line between obstacles."""
+    middle: FloatArray
+    """Middle of this stretch (2,); of the line if obstacles fill it."""
     passable: bool
     why: str
     """Empty when passable, else the reason in words."""

@@ -122,18 +122,26 @@ class MagnifiedErrors:
     """Each ellipse in words."""
 
 
+def error_factor(mission: Mission, *, most_m: float) -> float | None:
+    """Return by how much errors are magnified for half axes of at most `most_m`; None if there are none."""
+    claimed = (stop.error for stop in mission.stops if not isinstance(stop.error, msgspec.UnsetType))
+    largest = max((error.major_m for error in claimed), default=0.0)
+    return _round_below(most_m / largest) if 0 < largest < math.inf else None
+
+
 def magnified_errors(mission: Mission, *, most_m: float) -> MagnifiedErrors | None:
     """Return the standard error ellipses, with half axes of at most `most_m`; None if there are none."""
-    claimed = {stop: stop.error for stop in mission.stops if not isinstance(stop.error, msgspec.UnsetType)}
-    largest = max((error.major_m for error in claimed.values()), default=0.0)
-    if not 0 < largest < math.inf:
+    factor = error_factor(mission, most_m=most_m)
+    if factor is None:
         return None
-    factor = _round_below(most_m / largest)
     turn = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS)
+    circle = np.array([np.cos(turn), np.sin(turn)])
     outlines, words = {}, {}
-    for stop, error in claimed.items():
-        half = factor * np.array([error.major_m, error.minor_m])
-        x, y = half[:, None] * np.array([np.cos(turn), np.sin(turn)])
+    for stop in mission.stops:
+        error = stop.error
+        if isinstance(error, msgspec.UnsetType):
+            continue
+        x, y = factor * np.array([[error.major_m], [error.minor_m]]) * circle
         cos, sin = math.cos(error.direction), math.sin(error.direction)
         outlines[stop.id] = np.stack([stop.x + cos * x - sin * y, stop.y + sin * x + cos * y], axis=1)
         words[stop.id] = error_in_words(stop)

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import shapely
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.geometry import FloatArray
-from stopgo.mission.stages import DROP_REASONS, KEPT, NavigableSpace, OpeningState
+from stopgo.mission.stages import DROP_REASONS, KEPT, NavigableSpace
 from stopgo.planner.candidates.proposals import Proposals
-from stopgo.planner.geometry.ring_index import RingIndex
-from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.space.local_shapes import obstacles_of
-from stopgo.planner.space.opening_joins import widest_clear
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 
@@ -22,17 +16,9 @@ def doorways(space: NavigableSpace) -> Proposals:
     if not (settings.door_scan or settings.door_candidates or settings.registers):
         return Proposals.of(np.empty((0, 2)), [])
     index = {item.room: k for k, item in enumerate(space.rooms) if item.room is not None}
-    obstacles = RingIndex(obstacles_of(space))
     passable = [item for item in space.openings if item.passable]
     rooms = [next((index[k] for k in item.rooms if k is not None), 0) for item in passable]
-    return Proposals.of([_middle(space, item, obstacles) for item in passable], rooms, doorway=True)
-
-
-def _middle(space: NavigableSpace, state: OpeningState, obstacles: RingIndex) -> FloatArray:
-    """The middle of the opening's clear piece, in the drawing's coordinates."""
-    origin = local_origin(space.floor)
-    widest = widest_clear(shapely.LineString(state.opening.line - origin), obstacles)
-    return shapely.get_coordinates(widest)[[0, -1]].mean(axis=0) + origin
+    return Proposals.of([item.middle for item in passable], rooms, doorway=True)
 
 
 def required_stops(feasibility: StopFeasibility) -> Proposals:

@@ -16,7 +16,7 @@ def instance_cached(compute: Callable[[Instance], T]) -> Callable[[Instance], T]
     It works as `functools.cached_property`, for functions outside the class, which `mission` must not import.
     The result is stored in the instance's `__dict__`; a changed copy of the instance has no result yet.
     """
-    name = f"_cached_{compute.__module__}.{compute.__qualname__}"
+    name = _name_of(compute)
 
     @functools.wraps(compute)
     def result(instance: Instance) -> T:
@@ -27,3 +27,12 @@ def instance_cached(compute: Callable[[Instance], T]) -> Callable[[Instance], T]
         return found
 
     return result
+
+
+def store(cached: Callable[[Instance], T], instance: Instance, result: T) -> None:
+    """Store the result of an `instance_cached` function, where it is known without computing it."""
+    vars(instance)[_name_of(cached)] = result
+
+
+def _name_of(function: Callable[[Instance], T]) -> str:
+    return f"_cached_{function.__module__}.{function.__qualname__}"

@@ -7,6 +7,7 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
+from stopgo.planner.space.connected_parts import Parts, parts_of
 
 
 @instance_cached
@@ -25,6 +26,12 @@ def obstacles_of(space: NavigableSpace) -> BaseGeometry:
 def drive_area_of(space: NavigableSpace) -> BaseGeometry:
     """Area in which the robot's centre may drive."""
     return to_shape(space.drive_area, local_origin(space.floor))
+
+
+@instance_cached
+def drive_parts_of(space: NavigableSpace) -> Parts:
+    """Connected parts of the drive area."""
+    return parts_of(drive_area_of(space), space.gaps - local_origin(space.floor))
 
 
 @instance_cached

@@ -13,10 +13,13 @@ from stopgo.mission.frames.geodesy import out_of_reach
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Targets
-from stopgo.planner.geometry.shapes import local_origin, to_polygons
+from stopgo.planner.geometry.instance_cache import store
+from stopgo.planner.geometry.shapes import local_origin, to_polygons, to_shape
 from stopgo.planner.geometry.side_work import SideWork
+from stopgo.planner.space.connected_parts import parts_of
 from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
+from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
 from stopgo.planner.space.opening_joins import Crossing, barrier
 from stopgo.planner.space.opening_states import opening_states
 from stopgo.planner.space.room_spaces import room_spaces
@@ -38,14 +41,17 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     scanned = partial(_occluders_and_targets, floor, closed, settings)
     with SideWork(scanned, forked=len(floor.elements) >= MANY) as work:
         drive_area, gaps = drivable(ground, settings)
-        states, findings = opening_states(ground, drive_area, gaps, settings)
+        drive_polygons, gaps = to_polygons(drive_area, origin), frozen(gaps + origin)
+        drive_shape = to_shape(drive_polygons, origin)
+        parts = parts_of(drive_shape, gaps - origin)
+        states, findings = opening_states(ground, parts, settings)
         rooms = room_spaces(floor, ground, drive_area, settings)
         occluders, targets = work.result()
     if targets.total == 0:
         raise NegativeResult(
             f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
         )
-    return NavigableSpace(
+    space = NavigableSpace(
         floor=floor,
         settings=settings,
         rooms=rooms,
@@ -53,13 +59,16 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         obstacles=to_polygons(ground.obstacles, origin),
         occluders=to_polygons(occluders, origin),
         barriers=frozen(ground.barriers + origin),
-        drive_area=to_polygons(drive_area, origin),
-        gaps=frozen(gaps + origin),
+        drive_area=drive_polygons,
+        gaps=gaps,
         targets=targets,
         unit_room=faced_rooms(targets, rooms, ground),
         ground=to_polygons(ground.outline, origin),
         findings=(*floor.findings, *findings),
     )
+    store(drive_area_of, space, drive_shape)
+    store(drive_parts_of, space, parts)
+    return space
 
 
 def _occluders_and_targets(

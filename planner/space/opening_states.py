@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import Finding
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
 from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
-from stopgo.planner.space.connected_parts import Parts, parts_of
+from stopgo.planner.space.connected_parts import Parts
 from stopgo.planner.space.gaps import Gap, Walls, gaps_between
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import Crossing, middle_and_normal
@@ -33,10 +33,9 @@ REACHED_AREA = 0.5
 
 
 def opening_states(
-    ground: Ground, drive_area: BaseGeometry, gaps: FloatArray, settings: Settings
+    ground: Ground, parts: Parts, settings: Settings
 ) -> tuple[tuple[OpeningState, ...], tuple[Finding, ...]]:
     """Return the state of each opening for the robot, and a finding for each inner one it cannot pass."""
-    parts = parts_of(drive_area, gaps)
 
     @cache
     def side_of(room: int | None) -> OpeningSide:
@@ -47,10 +46,16 @@ def opening_states(
     for crossing in ground.crossings:
         sides = [] if crossing.closed_because else [side_of(room) for room in crossing.rooms]
         why = crossing.closed_because or _not_reached(crossing, parts, sides, around)
-        states.append(OpeningState(crossing.opening, crossing.rooms, crossing.width, not why, why))
+        states.append(_state(crossing, why, ground.origin))
         if why and not why.startswith("exterior"):
             findings.append(_opening_finding(crossing, why, ground))
     return tuple(states), tuple(findings)
+
+
+def _state(crossing: Crossing, why: str, origin: FloatArray) -> OpeningState:
+    filled = crossing.clear.is_empty
+    middle = crossing.opening.line.mean(axis=0) if filled else middle_and_normal(crossing.clear)[0] + origin
+    return OpeningState(crossing.opening, crossing.rooms, crossing.width, frozen(middle), not why, why)
 
 
 def _opening_finding(crossing: Crossing, why: str, ground: Ground) -> Finding:

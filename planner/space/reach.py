@@ -13,9 +13,14 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import GRID, boundary_lines, local_origin, segments_of
-from stopgo.planner.space.connected_parts import Parts, parts_of
 from stopgo.planner.space.gaps import Site, Walls
-from stopgo.planner.space.local_shapes import drive_area_of, ground_of, obstacles_of, room_shapes
+from stopgo.planner.space.local_shapes import (
+    drive_area_of,
+    drive_parts_of,
+    ground_of,
+    obstacles_of,
+    room_shapes,
+)
 
 INSIDE = 3 * GRID
 """Points nearer than this (m) to the drive area's edge are anchored, since the mesh is snapped."""
@@ -26,9 +31,8 @@ class Reach:
     """A navigable space, prepared for reachability queries; points are local (n, 2)."""
 
     def __init__(self, space: NavigableSpace) -> None:
-        origin = local_origin(space.floor)
         drive_area = drive_area_of(space)
-        self.parts: Parts = parts_of(drive_area, space.gaps - origin)
+        self.parts = drive_parts_of(space)
         self.site = Site(walls_of(space), drive_area, ground_of(space))
         self._rim = boundary_lines(drive_area)
         self._rim_tree = shapely.STRtree(self._rim)

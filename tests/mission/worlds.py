@@ -144,8 +144,15 @@ def opening_states(floor: FloorPlan) -> tuple[OpeningState, ...]:
     """The door is passable, the passage is not."""
     door, passage = floor.openings
     return (
-        OpeningState(door, (0, None), clear_width=1.0, passable=True, why=""),
-        OpeningState(passage, (0, None), clear_width=0.6, passable=False, why="narrower than 0.7 m"),
+        OpeningState(door, (0, None), clear_width=1.0, middle=door.line.mean(axis=0), passable=True, why=""),
+        OpeningState(
+            passage,
+            (0, None),
+            clear_width=0.6,
+            middle=passage.line.mean(axis=0),
+            passable=False,
+            why="narrower than 0.7 m",
+        ),
     )
 
 

@@ -91,7 +91,9 @@ def space_of(floor: FloorPlan) -> NavigableSpace:
         floor=floor,
         settings=Settings(),
         rooms=(RoomSpace(0, "Room 1", area, (box(x + 0.9, y + 0.9, 4.6, 0.4),)),),
-        openings=(OpeningState(floor.openings[0], (0, None), 1.0, True, ""),),
+        openings=(
+            OpeningState(floor.openings[0], (0, None), 1.0, floor.openings[0].line.mean(axis=0), True, ""),
+        ),
         obstacles=(),
         occluders=(),
         barriers=frozen(np.empty((0, 2, 2))),

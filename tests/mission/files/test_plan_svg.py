@@ -20,7 +20,7 @@ from stopgo.mission.files.plan_panel import coordinate_ticks
 from stopgo.mission.files.plan_svg import plan_svg
 from stopgo.mission.files.room_labels import Busy, covered_weight, inside, room_labels, wrapped
 from stopgo.mission.files.sheet import MARGIN, PAPERS, PaperBox, PaperSheet, SheetContents, fit
-from stopgo.mission.files.svg import SMALLEST_TEXT, shortened, text_width
+from stopgo.mission.files.svg import SMALLEST_TEXT, lines_data, number, shortened, text_width
 from stopgo.mission.floor import Room
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.stages import Route
@@ -259,6 +259,13 @@ def test_points_near_a_label_are_found_and_weighed_as_one_by_one(seed: int, many
         :, None
     ]
     assert covered_weight(x, y, half, busy).tolist() == (under * weight).sum(axis=2).tolist()
+
+
+@given(st.lists(st.tuples(*[st.floats(-1e4, 1e4) | st.floats(-0.02, 0.02)] * 2), min_size=1))
+def test_points_of_lines_are_written_as_single_numbers(points: list[tuple[float, float]]) -> None:
+    words = [f"{number(x)} {number(y)}" for x, y in points]
+    drawn = lines_data(np.array([*points, points[0]]), [len(points), 1], end="Z")
+    assert drawn == f"M{'L'.join(words)}ZM{words[0]}Z"
 
 
 @given(st.text(min_size=1, max_size=40), st.floats(5, 50))

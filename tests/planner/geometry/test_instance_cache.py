@@ -6,8 +6,11 @@ import gc
 import weakref
 from dataclasses import replace
 
+import shapely
+
 from stopgo.mission.settings import Settings
 from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.reach import reach_of
 from tests.planner.worlds import two_rooms
@@ -20,6 +23,16 @@ def test_it_is_worked_out_once_and_again_for_a_noun_with_other_values() -> None:
     other = replace(space, settings=Settings(robot_radius=0.2))
     assert reach_of(other) is not reach_of(space)
     assert local_origin(space.floor) is local_origin(space.floor)
+
+
+def test_what_is_stored_is_what_would_be_worked_out() -> None:
+    space = navigable(two_rooms(0.9), Settings())
+    again = replace(space)
+    assert drive_area_of(space) is not drive_area_of(again)
+    assert shapely.to_wkb(drive_area_of(space)) == shapely.to_wkb(drive_area_of(again))
+    parts, once_more = drive_parts_of(space), drive_parts_of(again)
+    assert shapely.to_wkb(parts.cells).tolist() == shapely.to_wkb(once_more.cells).tolist()
+    assert parts.cell_part.tolist() == once_more.cell_part.tolist()
 
 
 def test_it_goes_with_the_noun() -> None:
