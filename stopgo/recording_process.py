@@ -185,6 +185,8 @@ class _Pickler(pickle.Pickler):
     """Pickles stage results; what was derived from them stays here."""
 
     def reducer_override(self, value: Any) -> Any:
+        if type(value).__name__ == "UnsetType":  # else pickle looks for it in all modules, also in stand-ins
+            return _unset, ()
         if isinstance(value, MappingProxyType):
             return _read_only, (dict(value),)
         values = getattr(value, "__dict__", None)
@@ -194,6 +196,12 @@ class _Pickler(pickle.Pickler):
             return NotImplemented
         left = {name: held for name, held in values.items() if not name.startswith(CACHED)}
         return copyreg.__newobj__, (type(value),), left  # type: ignore[attr-defined]
+
+
+def _unset() -> object:
+    from msgspec import UNSET
+
+    return UNSET
 
 
 def _read_only(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 
 import pytest
 
@@ -20,7 +20,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages.sight import sight_of
 from stopgo.planner import plan
-from stopgo.recording_process import RecordingProcess, recording_process
+from stopgo.recording_process import RecordingProcess, _pickled, recording_process
 from stopgo.recordings.rrd.read import check
 from tests.disk import small_disk
 from tests.planner.worlds import two_rooms
@@ -71,6 +71,20 @@ def test_the_process_writes_what_would_be_written_here(
     lasting.draw("next", results).write(there)
     assert lasting.is_running
     assert check(there).recording_id == "next"
+
+
+def test_results_are_pickled_without_a_search_in_other_modules(
+    results: tuple[object, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A search would load the modules that only stand-ins hold a place for."""
+
+    class StandIn(ModuleType):
+        def __getattribute__(self, name: str) -> object:
+            raise AssertionError(name)
+
+    others = {"stand-in": StandIn("stand-in"), **sys.modules}
+    monkeypatch.setattr(sys, "modules", others)
+    assert pickle.loads(_pickled(results)) is not None
 
 
 @pytest.mark.parametrize("when", ["before", "during", "after"])
