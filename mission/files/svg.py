@@ -10,7 +10,7 @@ from itertools import accumulate, takewhile
 
 import numpy as np
 
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import FloatArray
 
 FONT = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 SMALLEST_TEXT = 2.5
@@ -105,25 +105,13 @@ def line_data(points: FloatArray) -> str:
 
 def lines_data(points: FloatArray, lengths: Iterable[int], *, end: str = "") -> str:
     """Path data of polylines of these lengths, whose points (n, 2) follow one another."""
-    counts = np.fromiter(lengths, dtype=np.int64)
-    first = np.concatenate([[0], np.cumsum(counts)])
-    blocks = range(0, len(counts), AT_ONCE)
-    return "".join(
-        _lines_data(points[first[k] : first[min(k + AT_ONCE, len(counts))]], counts[k : k + AT_ONCE], end)
-        for k in blocks
-    )
-
-
-def _lines_data(points: FloatArray, counts: IntArray, end: str) -> str:
-    words = "".join("M" + "L".join(["%.2f %.2f"] * count) + end for count in counts.tolist())
+    words = "".join("M" + "L".join(["%.2f %.2f"] * length) + end for length in lengths)
     data = words % tuple(np.asarray(points, dtype=np.float64).ravel().tolist())
     for digits, short in _SHORTER.items():
         data = data.replace(digits, short)
     return data
 
 
-AT_ONCE = 2000
-"""Polylines that are written at once: all those of a large floor would take some hundred megabytes."""
 _SHORTER = {"-0.00": "0", ".00": "", **{f".{digit}0": f".{digit}" for digit in range(1, 10)}}
 """Two digits after a point without the zeros that end them."""
 
