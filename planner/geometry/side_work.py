@@ -56,7 +56,6 @@ class SideWork(Generic[T]):
         with contextlib.suppress(OSError):  # too many processes, or too little memory
             process = os.fork()
             if not process:
-                os.close(self._answer)
                 self._serve(end)
         os.close(end)
         self._process = process
@@ -65,6 +64,7 @@ class SideWork(Generic[T]):
         """In the other process: do the work, and answer; it never returns."""
         try:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+            os.close(self._answer)
             with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
                 data = _pickled(self._work())  # a thread may have held the lock of the real one
             with open(end, "wb") as answer:

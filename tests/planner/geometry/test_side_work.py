@@ -16,6 +16,7 @@ from stopgo.planner import pipeline
 from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.space import navigable
 from tests.planner.worlds import two_rooms
+from tests.waiting import wait_until
 
 
 @pytest.fixture(autouse=True)
@@ -69,8 +70,7 @@ def test_the_end_of_the_block_ends_the_work(tmp_path: Path) -> None:
         threading.Event().wait()
 
     with SideWork(work_for_ever, forked=True):
-        while not _workers(tmp_path / "workers"):
-            pass
+        wait_until(lambda: _workers(tmp_path / "workers"))
     with pytest.raises(ProcessLookupError):
         os.kill(_workers(tmp_path / "workers")[0], 0)
 
