@@ -10,7 +10,7 @@ import numpy as np
 from stopgo.mission.document import Stop
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation
-from stopgo.planner.scan_simulation.casting import Hits, RayFan, SolidScene, distances
+from stopgo.planner.scan_simulation.casting import Hits, RayFan, RayRuns, SolidScene, distances
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor
 from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
@@ -66,14 +66,12 @@ def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation
     every = max(1, round(CLOUD_DEG / simulation.step_deg))
     cloud = []
     for block in fan.blocks():
-        directions = fan.directions(block)
-        met = scene.cast(directions)
-        counts.take(met, fan, block, directions)
+        runs = scene.runs(fan, block)
+        counts.take(runs)
         if more is not None:
-            beyond = more.cast(directions)
-            counts.take(np.where(_passed(solids, beyond), beyond, NONE), fan, block, directions)
-        kept = _in_cloud(solids, pose.position, met, directions, -block.start % every, every)
-        cloud.append(_points(solids, pose.position, met[kept], directions[kept], simulation, random))
+            beyond = more.runs(fan, block)
+            counts.take(beyond._replace(met=np.where(_passed(solids, beyond.met), beyond.met, NONE)))
+        cloud.append(_cloud(solids, pose.position, runs, every, simulation, random))
     cell = np.flatnonzero(counts.points)
     towards = strips.middle[cell] - pose.position
     return ScanCount(
@@ -91,20 +89,23 @@ def _passed(solids: ExtrudedFloor, met: Hits) -> Hits:
     return np.append(solids.passed, False)[met]
 
 
-def _in_cloud(
-    solids: ExtrudedFloor, position: FloatArray, met: Hits, directions: FloatArray, first: int, every: int
-) -> BoolArray:
-    """True for rays (columns, rows) kept in the cloud: few where points are dense, else all.
-
-    `first` is the first of the columns always kept, one of `every`.
-    """
-    few, towards = met[first::every, ::every], directions[first::every, ::every]
-    hit = few != NONE
-    far = distances(solids, position, few[hit], towards[hit])
-    slope = np.abs(np.einsum("ij,ij->i", towards[hit], solids.normal[few[hit]]))
-    sparse = np.zeros(few.shape, dtype=bool)
-    sparse[hit] = is_sparse(far, slope)
-    return spread(sparse, met.shape, first, every)
+def _cloud(
+    solids: ExtrudedFloor,
+    position: FloatArray,
+    runs: RayRuns,
+    every: int,
+    simulation: Simulation,
+    random: np.random.Generator,
+) -> FloatArray:
+    """Measured ends of a block's rays, relative to the scanner (n, 3): few where dense enough, else all."""
+    met, first = runs.hits, -runs.block.start % every
+    few = np.arange(runs.rays).reshape(runs.shape)[first::every, ::every]
+    sparse, hit = np.zeros(few.shape, dtype=bool), met[few] != NONE
+    towards, few_met = runs.towards(few[hit]), met[few[hit]]
+    far = distances(solids, position, few_met, towards)
+    sparse[hit] = is_sparse(far, np.abs(np.einsum("ij,ij->i", towards, solids.normal[few_met])))
+    kept = np.flatnonzero(spread(sparse, runs.shape, first, every).ravel() & (met != NONE))
+    return _points(solids, position, met[kept], runs.towards(kept), simulation, random)
 
 
 def is_sparse(far: FloatArray, slope: FloatArray) -> BoolArray:
@@ -132,11 +133,10 @@ def _points(
     random: np.random.Generator,
 ) -> FloatArray:
     """Measured ends of rays, relative to the scanner (n, 3)."""
-    hit = met != NONE
-    far = distances(solids, position, met[hit], directions[hit])
-    near = _within(far, directions[hit], simulation.joining_m, slant=simulation.slant)
+    far = distances(solids, position, met, directions)
+    near = _within(far, directions, simulation.joining_m, slant=simulation.slant)
     far = far[near] + random.normal(0.0, simulation.noise_m, int(near.sum()))
-    found: FloatArray = far[:, None] * directions[hit][near]
+    found: FloatArray = far[:, None] * directions[near]
     return found
 
 
@@ -175,13 +175,14 @@ class _CellCounts:
         self.points = np.zeros(strips.cells, np.int64)
         self.columns = np.zeros(strips.cells, np.int64)
 
-    def take(self, met: Hits, fan: RayFan, block: slice, directions: FloatArray) -> None:
-        self._take_upright(self._face[met], fan, fan.azimuth[block])
+    def take(self, runs: RayRuns) -> None:
+        self._take_upright(runs, runs.fan.elevation)
         if len(self._strips.patch):
-            self._take_under(met, directions)
+            self._take_under(runs)
 
-    def _take_upright(self, face: IntArray, fan: RayFan, azimuth: FloatArray) -> None:
-        column, begin, end, face = _runs(face)
+    def _take_upright(self, runs: RayRuns, elevation: FloatArray) -> None:
+        column, begin, end, face = _on_faces(runs, self._face[runs.met])
+        azimuth = runs.fan.azimuth[runs.block]
         towards = np.column_stack([np.cos(azimuth), np.sin(azimuth)])[column]
         along, to = self._along[face], self._solids.a[face] - self._position[:2]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -192,9 +193,9 @@ class _CellCounts:
         column, begin, end, away, unit = (item[good] for item in (column, begin, end, away, unit))
         if self._simulation.slant:
             steepest = np.arccos(np.clip(away / self._reach, 0.0, 1.0))
-            begin = np.maximum(begin, np.searchsorted(fan.elevation, -steepest))
-            end = np.minimum(end, np.searchsorted(fan.elevation, steepest, side="right"))
-        self._count(unit, away, begin, end, fan.elevation)
+            begin = np.maximum(begin, np.searchsorted(elevation, -steepest))
+            end = np.minimum(end, np.searchsorted(elevation, steepest, side="right"))
+        self._count(unit, away, begin, end, elevation)
 
     def _unit(self, face: IntArray, at: FloatArray, side: IntArray) -> IntArray:
         """Unit at a distance along a face, on one of its sides."""
@@ -222,23 +223,23 @@ class _CellCounts:
             np.add.at(self.columns, strips.first_cell[unit[kept]] + row, 1)
             before = after
 
-    def _take_under(self, met: Hits, directions: FloatArray) -> None:
-        hit = self._under[met] != NONE
-        towards = directions[hit]
-        far = distances(self._solids, self._position, met[hit], towards)
+    def _take_under(self, runs: RayRuns) -> None:
+        hits = runs.hits
+        hit = np.flatnonzero(self._under[hits] != NONE)
+        towards = runs.towards(hit)
+        far = distances(self._solids, self._position, hits[hit], towards)
         unit = self._strips.under_at(self._position[:2] + far[:, None] * towards[:, :2])
         good = (unit != NONE) & _within(far, towards, self._reach, slant=self._simulation.slant)
         np.add.at(self.points, self._strips.first_cell[unit[good] + 1] - 1, 1)
 
 
-def _runs(face: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Runs of rays of one column on the same face: column, first row, row after the last, face."""
-    columns, rows = face.shape
-    begins = np.ones((columns, rows), dtype=bool)
-    begins[:, 1:] = face[:, 1:] != face[:, :-1]
-    start = np.flatnonzero(begins)
-    behind = np.append(start[1:], face.size)
-    met = face.ravel()[start]
+def _on_faces(runs: RayRuns, face: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Rays of one column on the same upright face: column, first row, row after the last, face."""
+    rows = runs.shape[1]
+    begins = runs.start % rows == 0
+    begins[1:] |= face[1:] != face[:-1]
+    start, met = runs.start[begins], face[begins]
+    behind = np.append(start[1:], runs.rays)
     kept = met != NONE
     start, behind, met = start[kept], behind[kept], met[kept]
     column = start // rows
