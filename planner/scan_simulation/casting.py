@@ -56,9 +56,11 @@ class RayFan:
         return self.towards(columns, np.arange(shape[0] * shape[1])).reshape(*shape, 3)
 
     def towards(self, columns: slice, ray: IntArray) -> FloatArray:
-        """Unit vectors of some rays of a block (n, 3), which are numbered column by column."""
+        """Unit vectors of some rays of a block (n, 3), numbered column by column, ascending."""
         azimuth, level = self.azimuth[columns], np.cos(self.elevation)
-        column, row = np.divmod(ray, len(level))
+        first = np.arange(len(azimuth) + 1) * len(level)
+        column = np.repeat(np.arange(len(azimuth)), np.diff(np.searchsorted(ray, first)))
+        row = ray - first[column]
         found = np.empty((len(ray), 3))
         found[:, 0] = np.cos(azimuth)[column] * level[row]
         found[:, 1] = np.sin(azimuth)[column] * level[row]
@@ -106,7 +108,8 @@ class SolidScene:
         from embreex.rtcore_scene import EmbreeScene
 
         opened = (solids.door == open_door) & (solids.door != NONE)
-        self._solids, self._position = solids, position
+        self.position, self._normal = position, solids.normal
+        self._offset = np.einsum("ij,ij->i", solids.normal, solids.corners[:, 0] - position)
         solid = np.flatnonzero((solids.passed <= see_through) & ~opened)
         faces = solid[solid < len(solids.a)]
         self._lines = _lines(solids, faces, position)
@@ -128,6 +131,12 @@ class SolidScene:
         middle = (start + np.append(start[1:], len(azimuth) * len(fan.elevation))) // 2
         return RayRuns(fan, block, start, self.cast(fan.towards(block, middle)[:, None])[:, 0])
 
+    def distances(self, triangle: IntArray, directions: FloatArray) -> FloatArray:
+        """Distance along each ray to its triangle (n,): Embree found the triangle, this is exact."""
+        along = np.einsum("ij,ij->i", directions, self._normal[triangle])
+        found: FloatArray = self._offset[triangle] / along
+        return found
+
     def unobstructed(self, points: FloatArray) -> BoolArray:
         """True for points (n, 3), relative to the scanner, with nothing between them and the scanner."""
         far = np.linalg.norm(points, axis=1)
@@ -135,7 +144,7 @@ class SolidScene:
         met = self.cast(directions[:, None])[:, 0]
         hit = met != NONE
         clear = np.ones(len(points), dtype=bool)
-        away = distances(self._solids, self._position, met[hit], directions[hit])
+        away = self.distances(met[hit], directions[hit])
         clear[hit] = away > far[hit] - TOUCHING_M
         return clear
 
@@ -151,12 +160,3 @@ def _lines(solids: ExtrudedFloor, faces: IntArray, position: FloatArray) -> Surf
         high=np.append(solids.high[faces] - position[2], level),
         levels=np.unique(level),
     )
-
-
-def distances(
-    solids: ExtrudedFloor, position: FloatArray, triangle: IntArray, directions: FloatArray
-) -> FloatArray:
-    """Distance along each ray to its triangle (n,): Embree finds the triangle, this the exact distance."""
-    offset = np.einsum("ij,ij->i", solids.normal, solids.corners[:, 0] - position)
-    found: FloatArray = offset[triangle] / np.einsum("ij,ij->i", directions, solids.normal[triangle])
-    return found

@@ -47,7 +47,7 @@ class SurfaceLines:
             first = np.ceil((low - MARGIN - elevation[0]) / step)
             last = np.floor((high + MARGIN - elevation[0]) / step) + 1
             first, last = (np.clip(row, 0, len(elevation)).astype(np.int64) for row in (first, last))
-            of, row = _ranges(first, last + 1)
+            of, row = ranges(first, last + 1)
             starts[column[of], row] = True
         return np.flatnonzero(starts[:, :-1])
 
@@ -126,12 +126,12 @@ def _lines_in_columns(lines: SurfaceLines, azimuth: FloatArray, step: float) -> 
     for back in (0.0, 2 * np.pi):
         first, last = np.ceil((begin - back) / step), np.floor((end - back) / step) + 1
         first, last = (np.clip(item, 0, len(azimuth)).astype(np.int64) for item in (first, last))
-        pairs.append(_ranges(first, last))
+        pairs.append(ranges(first, last))
     line, column = (np.concatenate(part) for part in zip(*pairs, strict=True))
     return line, column
 
 
-def _ranges(first: IntArray, last: IntArray) -> tuple[IntArray, IntArray]:
+def ranges(first: IntArray, last: IntArray) -> tuple[IntArray, IntArray]:
     """Every number from `first` to before `last` of each range, with the number of its range."""
     many = np.maximum(last - first, 0)
     of = np.repeat(np.arange(len(many)), many)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -207,6 +207,8 @@ class _CloudPair:
     one: OrientedCloud
     other: OrientedCloud
     truth: FloatArray
+    prepared: dict[tuple[bool, bytes], tuple[Any, Any]] = field(default_factory=dict)
+    """Clouds prepared so far, by their masks: many starts come to the same points."""
 
     @cached_property
     def shared(self) -> tuple[BoolArray, BoolArray]:
@@ -287,14 +289,20 @@ class _CloudPair:
             one, other = self.one.near_each_other(self.other, there, within)
             if min(one.sum(), other.sum()) <= NEIGHBOURS:
                 return there
-            target, tree = _prepared(self.one.points[one])
-            source, _ = _prepared(self.other.points[other])
+            target, tree = self._prepared(self.one, one)
+            source, _ = self._prepared(self.other, other)
             there = small_gicp.align(
                 target, source, tree, there,
                 max_correspondence_distance=matched, num_threads=1, max_iterations=MOST_ITERATIONS,
                 rotation_epsilon=FINE, translation_epsilon=FINE,
             ).T_target_source  # fmt: skip
         return there
+
+    def _prepared(self, cloud: OrientedCloud, mask: BoolArray) -> tuple[Any, Any]:
+        key = (cloud is self.one, mask.tobytes())
+        if key not in self.prepared:
+            self.prepared[key] = _prepared(cloud.points[mask])
+        return self.prepared[key]
 
     def error(self, there: FloatArray) -> tuple[float, float]:
         """Error of a pose, metres and degrees."""

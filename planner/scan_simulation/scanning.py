@@ -10,8 +10,9 @@ import numpy as np
 from stopgo.mission.document import Stop
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation
-from stopgo.planner.scan_simulation.casting import Hits, RayFan, RayRuns, SolidScene, distances
+from stopgo.planner.scan_simulation.casting import Hits, RayFan, RayRuns, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor
+from stopgo.planner.scan_simulation.ray_runs import ranges
 from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 CLOUD_DEG = 0.4
@@ -61,7 +62,7 @@ def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation
         if solids.passed.any()
         else None
     )
-    counts = _CellCounts(solids, strips, pose.position, simulation)
+    counts = _CellCounts(solids, strips, scene, simulation)
     fan = RayFan.of(simulation, pose.heading)
     every = max(1, round(CLOUD_DEG / simulation.step_deg))
     cloud = []
@@ -71,7 +72,7 @@ def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation
         if more is not None:
             beyond = more.runs(fan, block)
             counts.take(beyond._replace(met=np.where(_passed(solids, beyond.met), beyond.met, NONE)))
-        cloud.append(_cloud(solids, pose.position, runs, every, simulation, random))
+        cloud.append(_cloud(solids, scene, runs, every, simulation, random))
     cell = np.flatnonzero(counts.points)
     towards = strips.middle[cell] - pose.position
     return ScanCount(
@@ -91,7 +92,7 @@ def _passed(solids: ExtrudedFloor, met: Hits) -> Hits:
 
 def _cloud(
     solids: ExtrudedFloor,
-    position: FloatArray,
+    scene: SolidScene,
     runs: RayRuns,
     every: int,
     simulation: Simulation,
@@ -99,13 +100,21 @@ def _cloud(
 ) -> FloatArray:
     """Measured ends of a block's rays, relative to the scanner (n, 3): few where dense enough, else all."""
     met, first = runs.hits, -runs.block.start % every
-    few = np.arange(runs.rays).reshape(runs.shape)[first::every, ::every]
-    sparse, hit = np.zeros(few.shape, dtype=bool), met[few] != NONE
-    towards, few_met = runs.towards(few[hit]), met[few[hit]]
-    far = distances(solids, position, few_met, towards)
+    few = met.reshape(runs.shape)[first::every, ::every]
+    sparse, hit = np.zeros(few.shape, dtype=bool), few != NONE
+    column, row = (every * part for part in np.nonzero(hit))
+    towards, few_met = runs.towards((column + first) * runs.shape[1] + row), few[hit]
+    far = scene.distances(few_met, towards)
     sparse[hit] = is_sparse(far, np.abs(np.einsum("ij,ij->i", towards, solids.normal[few_met])))
     kept = np.flatnonzero(spread(sparse, runs.shape, first, every).ravel() & (met != NONE))
-    return _points(solids, position, met[kept], runs.towards(kept), simulation, random)
+    towards = runs.towards(kept)
+    far = scene.distances(met[kept], towards)
+    if not far.max(initial=0.0) * (1 + 1e-9) < simulation.joining_m:  # along the floor it is no farther
+        near = _within(far, towards, simulation.joining_m, slant=simulation.slant)
+        far, towards = far[near], towards[near]
+    far += random.normal(0.0, simulation.noise_m, len(far))
+    found: FloatArray = far[:, None] * towards
+    return found
 
 
 def is_sparse(far: FloatArray, slope: FloatArray) -> BoolArray:
@@ -122,22 +131,6 @@ def spread(sparse: BoolArray, shape: tuple[int, ...], first: int, every: int) ->
         kept[:] = sparse[np.maximum(columns - first, 0) // every][:, rows // every]
         kept[first::every, ::every] = True
     return kept
-
-
-def _points(
-    solids: ExtrudedFloor,
-    position: FloatArray,
-    met: IntArray,
-    directions: FloatArray,
-    simulation: Simulation,
-    random: np.random.Generator,
-) -> FloatArray:
-    """Measured ends of rays, relative to the scanner (n, 3)."""
-    far = distances(solids, position, met, directions)
-    near = _within(far, directions, simulation.joining_m, slant=simulation.slant)
-    far = far[near] + random.normal(0.0, simulation.noise_m, int(near.sum()))
-    found: FloatArray = far[:, None] * directions[near]
-    return found
 
 
 def _within(far: FloatArray, directions: FloatArray, reach: float, *, slant: bool) -> BoolArray:
@@ -163,9 +156,9 @@ class _CellCounts:
     """
 
     def __init__(
-        self, solids: ExtrudedFloor, strips: Strips, position: FloatArray, simulation: Simulation
+        self, solids: ExtrudedFloor, strips: Strips, scene: SolidScene, simulation: Simulation
     ) -> None:
-        self._solids, self._strips, self._position = solids, strips, position
+        self._solids, self._strips, self._scene, self._position = solids, strips, scene, scene.position
         self._simulation, self._reach = simulation, simulation.range_m
         self._face = np.append(solids.face, NONE)
         self._under = np.append(solids.under, NONE)
@@ -224,10 +217,10 @@ class _CellCounts:
             before = after
 
     def _take_under(self, runs: RayRuns) -> None:
-        hits = runs.hits
-        hit = np.flatnonzero(self._under[hits] != NONE)
-        towards = runs.towards(hit)
-        far = distances(self._solids, self._position, hits[hit], towards)
+        under = np.flatnonzero(self._under[runs.met] != NONE)
+        of, ray = ranges(runs.start[under], np.append(runs.start, runs.rays)[under + 1])
+        towards = runs.towards(ray)
+        far = self._scene.distances(runs.met[under[of]], towards)
         unit = self._strips.under_at(self._position[:2] + far[:, None] * towards[:, :2])
         good = (unit != NONE) & _within(far, towards, self._reach, slant=self._simulation.slant)
         np.add.at(self.points, self._strips.first_cell[unit[good] + 1] - 1, 1)
