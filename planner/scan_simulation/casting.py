@@ -108,7 +108,7 @@ class SolidScene:
         from embreex.rtcore_scene import EmbreeScene
 
         opened = (solids.door == open_door) & (solids.door != NONE)
-        self.position, self._normal = position, solids.normal
+        self.solids, self.position = solids, position
         self._offset = np.einsum("ij,ij->i", solids.normal, solids.corners[:, 0] - position)
         solid = np.flatnonzero((solids.passed <= see_through) & ~opened)
         faces = solid[solid < len(solids.a)]
@@ -133,7 +133,7 @@ class SolidScene:
 
     def distances(self, triangle: IntArray, directions: FloatArray) -> FloatArray:
         """Distance along each ray to its triangle (n,): Embree found the triangle, this is exact."""
-        along = np.einsum("ij,ij->i", directions, self._normal[triangle])
+        along = np.einsum("ij,ij->i", directions, self.solids.normal[triangle])
         found: FloatArray = self._offset[triangle] / along
         return found
 

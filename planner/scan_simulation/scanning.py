@@ -53,16 +53,16 @@ class ScanCount:
     """Some of the points, relative to the scanner, with noise (n, 3)."""
 
 
-def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:
+def scene_at(solids: ExtrudedFloor, pose: ScannerPose, *, see_through: bool = False) -> SolidScene:
+    """The solids around a scanner; `see_through` ones too if asked for."""
+    return SolidScene(solids, pose.position, see_through=see_through, open_door=pose.open_door)
+
+
+def scanned(scene: SolidScene, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:
     """Simulate one scan, block by block; the same seed gives the same noise."""
-    random = np.random.default_rng([simulation.seed, pose.number])
-    scene = SolidScene(solids, pose.position, see_through=False, open_door=pose.open_door)
-    more = (
-        SolidScene(solids, pose.position, see_through=True, open_door=pose.open_door)
-        if solids.passed.any()
-        else None
-    )
-    counts = _CellCounts(solids, strips, scene, simulation)
+    random, solids = np.random.default_rng([simulation.seed, pose.number]), scene.solids
+    more = scene_at(solids, pose, see_through=True) if solids.passed.any() else None
+    counts = _CellCounts(strips, scene, simulation)
     fan = RayFan.of(simulation, pose.heading)
     every = max(1, round(CLOUD_DEG / simulation.step_deg))
     cloud = []
@@ -72,8 +72,8 @@ def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation
         if more is not None:
             beyond = more.runs(fan, block)
             counts.take(beyond._replace(met=np.where(_passed(solids, beyond.met), beyond.met, NONE)))
-        cloud.append(_cloud(solids, scene, runs, every, simulation, random))
-    cell = np.flatnonzero(counts.points)
+        cloud.append(_cloud(scene, runs, every, simulation, random))
+    cell = np.flatnonzero(counts.hit)
     towards = strips.middle[cell] - pose.position
     return ScanCount(
         cell=frozen(cell, np.int64),
@@ -91,7 +91,6 @@ def _passed(solids: ExtrudedFloor, met: Hits) -> Hits:
 
 
 def _cloud(
-    solids: ExtrudedFloor,
     scene: SolidScene,
     runs: RayRuns,
     every: int,
@@ -105,7 +104,7 @@ def _cloud(
     column, row = (every * part for part in np.nonzero(hit))
     towards, few_met = runs.towards((column + first) * runs.shape[1] + row), few[hit]
     far = scene.distances(few_met, towards)
-    sparse[hit] = is_sparse(far, np.abs(np.einsum("ij,ij->i", towards, solids.normal[few_met])))
+    sparse[hit] = is_sparse(far, np.abs(np.einsum("ij,ij->i", towards, scene.solids.normal[few_met])))
     kept = np.flatnonzero(spread(sparse, runs.shape, first, every).ravel() & (met != NONE))
     towards = runs.towards(kept)
     far = scene.distances(met[kept], towards)
@@ -155,9 +154,8 @@ class _CellCounts:
     once, and the number of rays on each cell follows from the elevations of the cell's edges.
     """
 
-    def __init__(
-        self, solids: ExtrudedFloor, strips: Strips, scene: SolidScene, simulation: Simulation
-    ) -> None:
+    def __init__(self, strips: Strips, scene: SolidScene, simulation: Simulation) -> None:
+        solids = scene.solids
         self._solids, self._strips, self._scene, self._position = solids, strips, scene, scene.position
         self._simulation, self._reach = simulation, simulation.range_m
         self._face = np.append(solids.face, NONE)
@@ -167,6 +165,7 @@ class _CellCounts:
         self._along = along / self._length[:, None]
         self.points = np.zeros(strips.cells, np.int64)
         self.columns = np.zeros(strips.cells, np.int64)
+        self.hit = np.zeros(strips.cells, dtype=bool)
 
     def take(self, runs: RayRuns) -> None:
         self._take_upright(runs, runs.fan.elevation)
@@ -212,8 +211,10 @@ class _CellCounts:
             after = np.where(last, len(elevation), np.searchsorted(elevation, np.arctan2(edge, away)))
             many = np.maximum(np.minimum(after, end) - np.maximum(before, begin), 0)
             kept = (row < rows) & (many > 0)
-            np.add.at(self.points, strips.first_cell[unit[kept]] + row, many[kept])
-            np.add.at(self.columns, strips.first_cell[unit[kept]] + row, 1)
+            cell = strips.first_cell[unit[kept]] + row
+            np.add.at(self.points, cell, many[kept])
+            np.add.at(self.columns, cell, 1)
+            self.hit[cell] = True
             before = after
 
     def _take_under(self, runs: RayRuns) -> None:
@@ -223,7 +224,9 @@ class _CellCounts:
         far = self._scene.distances(runs.met[under[of]], towards)
         unit = self._strips.under_at(self._position[:2] + far[:, None] * towards[:, :2])
         good = (unit != NONE) & _within(far, towards, self._reach, slant=self._simulation.slant)
-        np.add.at(self.points, self._strips.first_cell[unit[good] + 1] - 1, 1)
+        cell = self._strips.first_cell[unit[good] + 1] - 1
+        np.add.at(self.points, cell, 1)
+        self.hit[cell] = True
 
 
 def _on_faces(runs: RayRuns, face: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
