@@ -90,7 +90,7 @@ class RayRuns(NamedTuple):
 
     @property
     def hits(self) -> Hits:
-        """What each ray meets (rays,)."""
+        """The triangle that each ray meets (rays,)."""
         return np.repeat(self.met, np.diff(self.start, append=self.rays))
 
     def towards(self, ray: IntArray) -> FloatArray:
