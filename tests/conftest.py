@@ -72,8 +72,12 @@ def pytest_collection() -> Iterator[None]:
 
 
 def pytest_collection_finish() -> None:
-    """Look no more for garbage among thousands of collected tests: that takes a tenth of all time."""
+    """Look no more for garbage among thousands of collected tests, and among new objects ten times less often.
+
+    The former takes a tenth of all time, the latter three hundredths.
+    """
     gc.freeze()
+    gc.set_threshold(7_000, 10, 10)
 
 
 WAITING = {TESTS / name for name in ("bridge", "faults", "journeys", "ros2")}
