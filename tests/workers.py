@@ -146,14 +146,20 @@ class _Workers:
             self.left[here] += content
         elif what == "ran":
             self.left[here].pop(0)
-            for report in content:
-                if isinstance(report, dict):
-                    report = hook.pytest_report_from_serializable(config=self.session.config, data=report)
-                hook.pytest_runtest_logreport(report=report)
+            for one in content:
+                self._report(one)
         else:
             hook.pytest_warning_recorded.call_historic(kwargs=content)
         if self.session.shouldfail:
             raise self.session.Failed(self.session.shouldfail)
+
+    def _report(self, told: pytest.TestReport | dict[str, Any]) -> None:
+        """Pass the result of one phase of a test on."""
+        hook, config = self.session.config.hook, self.session.config
+        report = (
+            hook.pytest_report_from_serializable(config=config, data=told) if isinstance(told, dict) else told
+        )
+        hook.pytest_runtest_logreport(report=report)
 
     def _bury(self, here: Connection) -> None:
         """The test that a worker died in has failed; another worker goes on behind it."""
