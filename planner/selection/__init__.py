@@ -16,7 +16,7 @@ from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
-from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.geometry.instance_cache import instance_cached, taken
 from stopgo.planner.overlap import links_of
 from stopgo.planner.selection.bound import counting_bound, early_bound, first_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
@@ -143,7 +143,7 @@ def _connected(
     """
     settings = visibility.settings
     cover = whole.with_one_of_each([np.array([row]) for row in fixed])
-    task = ConnectedCover(cover, links_of(visibility.candidates), offered)
+    task = ConnectedCover(cover, taken(links_of, visibility.candidates), offered)
     if method.name == "exact":
         rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
     elif method.name == "default":
