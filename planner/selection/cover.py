@@ -81,7 +81,7 @@ class Cover:
 
     @cached_property
     def adds(self) -> csr_array:
-        """What each row adds to each demand before any is chosen (rows, demands)."""
+        """Worth that each row adds to each demand before any is chosen (rows, demands)."""
         return csr_array(self.sees @ self.adds_to)
 
     @cached_property
