@@ -20,6 +20,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any
 
+from stopgo.freed_memory import look_seldom
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -137,6 +138,7 @@ def recording_process() -> Iterator[RecordingProcess]:
 
 def serve() -> None:
     """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
+    look_seldom()
     _leave_pandas_out()
     asked, answers = sys.stdin.buffer, sys.stdout.buffer
     sys.stdout = sys.stderr

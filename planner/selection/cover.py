@@ -80,6 +80,11 @@ class Cover:
         return _sorted(self.worth.T)
 
     @cached_property
+    def adds(self) -> csr_array:
+        """Worth that each row adds to each demand before any is chosen (rows, demands)."""
+        return csr_array(self.sees @ self.adds_to)
+
+    @cached_property
     def worths(self) -> Worths:
         """Sums of what columns add to the demands."""
         return Worths(self.adds_to, self.seen_by)
@@ -160,12 +165,14 @@ class Cover:
         chosen = coo_array(entries, shape=(self.rows, len(sets)))
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
-        return Cover(
+        made = Cover(
             _sorted(hstack([self.sees, chosen])),
             _sorted(worths.astype(np.int64)),
             np.concatenate([self.needed, np.full(len(sets), worth)]),
             np.concatenate([self.asks, np.ones(len(sets), np.int64)]),
         )
+        vars(made)["adds"] = hstack([self.adds, chosen.astype(np.int64) * worth], format="csr")
+        return made
 
 
 def cover_of(visibility: Visibility, demands: Demands) -> Cover:
