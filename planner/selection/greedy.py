@@ -6,6 +6,7 @@ import heapq
 from collections.abc import Callable
 
 import numpy as np
+
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.selection.cover import Cover
