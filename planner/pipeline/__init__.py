@@ -100,7 +100,7 @@ def _figures_before(seen: Visibility, planned: frozenset[int]) -> Iterator[Calla
         def before(route: Route) -> FiguresBefore:
             if route.visibility is seen:
                 return work.result()
-            return FiguresBefore.of(route.visibility, planned)  # with candidates of its own
+            return FiguresBefore.of(route.visibility, planned, before=seen)
 
         yield before
 

@@ -40,15 +40,14 @@ def _labels(links: csr_array, rows: IntArray) -> IntArray:
 
 def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
     """The components needed to meet every demand: the smallest superfluous ones are dropped first."""
-    needed = list(components)
+    needed: list[IntArray] = []
     coverage = RunningCoverage(cover, np.concatenate([np.empty(0, np.int64), *components]))
-    for component in reversed(components):
+    for before, component in reversed(list(enumerate(components))):
         coverage.remove(component)
-        if len(needed) > 1 and coverage.is_enough:
-            needed = [other for other in needed if other is not component]
-        else:
+        if before + len(needed) == 0 or not coverage.is_enough:
             coverage.add(component)
-    return needed
+            needed.append(component)
+    return needed[::-1]
 
 
 @dataclass(frozen=True, eq=False)
