@@ -92,12 +92,13 @@ def test_a_process_with_other_threads_is_not_forked(tmp_path: Path) -> None:
     assert _workers(tmp_path / "workers") == [os.getpid()]
 
 
-def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("fov", [360.0, 270.0])
+def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatch, fov: float) -> None:
     plans = []
     for many in (0, 10**9):
         monkeypatch.setattr(pipeline, "MANY", many)
         monkeypatch.setattr(navigable, "MANY", many)
-        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False)))
+        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False, fov=fov)))
     forked, alone = plans
     assert forked.figures == alone.figures
     assert forked.mission == alone.mission
