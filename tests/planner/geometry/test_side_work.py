@@ -21,7 +21,13 @@ from tests.waiting import wait_until
 
 @pytest.fixture(autouse=True)
 def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run with two cores, and without the threads that other tests have left behind."""
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
+    running = threading.enumerate
+    left_behind = {*running()} - {threading.main_thread()}
+    monkeypatch.setattr(
+        threading, "enumerate", lambda: [thread for thread in running() if thread not in left_behind]
+    )
 
 
 def _noted(place: Path) -> str:

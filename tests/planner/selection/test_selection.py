@@ -241,10 +241,10 @@ def test_one_stop_in_the_middle_of_a_small_hall_is_enough() -> None:
 def test_the_bound_by_parts_is_nearly_that_of_the_relaxation(
     views: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Parts of a twentieth; also where every column needs two views."""
-    once = cover_of_rooms(3, rows=150, columns=450, rooms=20)
+    """Parts of a sixteenth; also where every column needs two views."""
+    once = cover_of_rooms(3, rows=120, columns=360, rooms=16)
     cover = replace(once, views=views)
-    monkeypatch.setattr(bound_by_parts, "SIZE", cover.sees.nnz // 20)
+    monkeypatch.setattr(bound_by_parts, "SIZE", cover.sees.nnz // 16)
     best = relaxation_bound(cover)
     found = bound_by_parts.bound_by_parts(cover, found=2 * best)
     assert best - 1 <= found <= best
