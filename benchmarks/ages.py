@@ -107,10 +107,16 @@ def _meaning(module: str) -> str:
 
 
 @cache
+def parsed(source: str) -> ast.Module:
+    """Tree of a module, parsed once for all who look at it."""
+    return ast.parse(source)
+
+
+@cache
 def _statements(source: str) -> list[ast.stmt]:
     """All statements of a module, in no order; expressions are not searched."""
     found: list[ast.stmt] = []
-    left: list[ast.AST] = [ast.parse(source)]
+    left: list[ast.AST] = [parsed(source)]
     while left:
         node = left.pop()
         for name in ("body", "orelse", "finalbody", "handlers", "cases"):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.freed_memory import give_back
+from stopgo.freed_memory import give_back, look_seldom
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
@@ -76,6 +76,7 @@ class _Writing:
 def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool) -> list[PlanReport]:
     from stopgo.planner.commands.outputs import names
 
+    look_seldom()
     load_when_used()
     from stopgo.planner.floors import options_of, read_floor, standing_bodies
 

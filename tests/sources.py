@@ -1,4 +1,4 @@
-"""Sources of the product as their tests see them: each module is parsed once, and its tree is not kept."""
+"""Sources of the product as their tests see them: each module is parsed once."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from benchmarks.ages import parsed
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("mission", "planner", "bridge", "recordings")
@@ -57,7 +59,7 @@ class Source:
 @cache
 def source_of(name: str) -> Source:
     """Read a module."""
-    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
+    tree = parsed(MODULES[name].read_text(encoding="utf-8"))
     found = Source(types=[*_named_in(tree)])
     _read(tree, found, found.loaded)
     return found

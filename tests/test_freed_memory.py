@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import sys
 
 import pytest
@@ -31,6 +32,15 @@ def test_a_large_process_gives_all_it_can_back(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(freed_memory, "LARGE", 0)
     freed_memory.give_back()
     assert given == [0]
+
+
+def test_python_looks_seldom_for_objects_that_refer_to_each_other() -> None:
+    before = gc.get_threshold()
+    try:
+        freed_memory.look_seldom()
+        assert gc.get_threshold()[0] == freed_memory.OBJECTS
+    finally:
+        gc.set_threshold(*before)
 
 
 def test_a_small_process_keeps_what_it_has(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -9,7 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stopgo.spared_modules import SPARED, load_when_used
+from stopgo.spared_modules import load_when_used
+
+
+@pytest.fixture(autouse=True)
+def finders(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
 
 
 @pytest.fixture
@@ -27,8 +33,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 def test_a_spared_module_is_loaded_at_its_first_use(package: str) -> None:
     load_when_used([f"{package}.heavy"])
-    whole = import_module(package)
-    heavy = whole.heavy
+    whole, heavy = import_module(package), import_module(f"{package}.heavy")
     assert whole.loaded == []
     assert heavy.answer == 42
     assert whole.loaded == [f"{package}.heavy"]
@@ -38,13 +43,29 @@ def test_a_spared_module_is_loaded_at_its_first_use(package: str) -> None:
 def test_a_loaded_or_a_missing_module_stays_as_it_is(package: str) -> None:
     heavy = import_module(f"{package}.heavy")
     load_when_used([f"{package}.heavy", f"{package}.missing"])
-    assert sys.modules[f"{package}.heavy"] is heavy
-    assert f"{package}.missing" not in sys.modules
+    assert import_module(f"{package}.heavy") is heavy
+    with pytest.raises(ModuleNotFoundError):
+        import_module(f"{package}.missing")
 
 
 def test_the_spared_modules_of_numpy_work_once_they_are_used() -> None:
     load_when_used()
-    assert set(SPARED) <= set(sys.modules)
     assert np.ma.array([1, 2], mask=[True, False]).sum() == 2
     assert np.random.default_rng(1).random() == np.random.default_rng(1).random()
     np.testing.assert_equal(1, 1)
+
+
+def test_recordings_load_without_some_modules_of_rerun() -> None:
+    program = (
+        "import sys; from stopgo.spared_modules import SPARED_OF_RERUN, load_when_used; "
+        "load_when_used(SPARED_OF_RERUN); import stopgo.recordings.plan; "
+        "print({type(sys.modules[name]).__name__ for name in SPARED_OF_RERUN})"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "{'_LazyModule'}"
+
+
+def test_a_second_call_changes_nothing(package: str) -> None:
+    for _ in range(2):
+        load_when_used([f"{package}.heavy"])
+    assert sys.meta_path.count(sys.meta_path[0]) == 1

@@ -146,13 +146,20 @@ class _Workers:
             self.left[here] += content
         elif what == "ran":
             self.left[here].pop(0)
-        elif what == "warned":
-            hook.pytest_warning_recorded.call_historic(kwargs=content)
+            for one in content:
+                self._report(one)
         else:
-            report = hook.pytest_report_from_serializable(config=self.session.config, data=content)
-            hook.pytest_runtest_logreport(report=report)
+            hook.pytest_warning_recorded.call_historic(kwargs=content)
         if self.session.shouldfail:
             raise self.session.Failed(self.session.shouldfail)
+
+    def _report(self, told: pytest.TestReport | dict[str, Any]) -> None:
+        """Pass the result of one phase of a test on."""
+        hook, config = self.session.config.hook, self.session.config
+        report = (
+            hook.pytest_report_from_serializable(config=config, data=told) if isinstance(told, dict) else told
+        )
+        hook.pytest_runtest_logreport(report=report)
 
     def _bury(self, here: Connection) -> None:
         """The test that a worker died in has failed; another worker goes on behind it."""
@@ -182,14 +189,20 @@ class _Teller:
     def __init__(self, config: pytest.Config, there: Connection) -> None:
         self._config = config
         self._there = there
+        self._reports: list[Any] = []
         self._heard_before = True
         config.pluginmanager.register(self)  # which repeats every warning so far
         self._heard_before = False
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Send the result of one phase of a test."""
-        data = self._config.hook.pytest_report_to_serializable(config=self._config, report=report)
-        self._there.send(("report", data))
+        """Keep the result of one phase of a test; a failed one holds objects of any class."""
+        serializable = self._config.hook.pytest_report_to_serializable
+        self._reports.append(report if report.passed else serializable(config=self._config, report=report))
+
+    def ran(self) -> None:
+        """Send all results of a test at once."""
+        self._there.send(("ran", self._reports))
+        self._reports = []
 
     def pytest_warning_recorded(
         self, warning_message: warnings.WarningMessage, when: str, nodeid: str, location: Any
@@ -216,12 +229,12 @@ def _work(
         capture.stop_global_capturing()
         capture.start_global_capturing()
         capture.suspend_global_capture()
-    _Teller(config, there)
+    teller = _Teller(config, there)
     item = next(items, None)
     while item is not None:
         following = next(items, None)
         config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-        there.send(("ran", None))
+        teller.ran()
         if session.shouldfail or session.shouldstop:
             break
         item = following

@@ -358,11 +358,11 @@ class Visibility(InSpace):
         return np.setdiff1d(np.arange(self.rows), self.candidates.extra_rows)
 
     def _seen_by_any(self, rows: IntArray) -> BoolArray:
-        change = np.zeros(self.targets.total + 1, dtype=np.int64)
-        for row in rows:
-            start, stop = int(self.pointer[row]), int(self.pointer[row + 1])
-            np.add.at(change, self.first[start:stop], 1)
-            np.add.at(change, self.last[start:stop] + 1, -1)
+        taken, most = np.zeros(self.rows, dtype=bool), self.targets.total + 1
+        taken[rows] = True
+        runs = np.repeat(taken, np.diff(self.pointer))
+        change = np.bincount(self.first[runs], minlength=most)
+        change -= np.bincount(self.last[runs] + 1, minlength=most)
         return frozen(np.cumsum(change[:-1]) > 0, np.bool_)
 
 

@@ -37,8 +37,17 @@ class FiguresBefore:
     estimates: LimitEstimates | None
 
     @classmethod
-    def of(cls, seen: Visibility, planned: frozenset[int] | None = None) -> FiguresBefore:
-        """`planned` are the parts of the floor that any plan enters."""
+    def of(
+        cls,
+        seen: Visibility,
+        planned: frozenset[int] | None = None,
+        *,
+        before: Visibility | None = None,
+    ) -> FiguresBefore:
+        """`planned` are the parts of the floor that any plan enters.
+
+        `seen` may be the visibility `before` with more candidates; these do not change what limits cost.
+        """
         candidates = seen.candidates
         space, parts = candidates.space, planned or frozenset([candidates.chosen_part])
         reached = _reached_m2(candidates, parts)
@@ -48,7 +57,7 @@ class FiguresBefore:
             rooms_m2=sum(floor_of_rooms(space)),
             doubts=floor_doubts(space, reached_m2=reached),
             views=tuple(not_met(seen)),
-            estimates=limit_estimates(seen),
+            estimates=limit_estimates(before if before and before.in_sight is seen.in_sight else seen),
         )
 
 

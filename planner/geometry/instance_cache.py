@@ -34,5 +34,12 @@ def store(cached: Callable[[Instance], T], instance: Instance, result: T) -> Non
     vars(instance)[_name_of(cached)] = result
 
 
+def taken(cached: Callable[[Instance], T], instance: Instance) -> T:
+    """Return the result of an `instance_cached` function, and forget it: it is large, and needed once."""
+    result = cached(instance)
+    del vars(instance)[_name_of(cached)]
+    return result
+
+
 def _name_of(function: Callable[[Instance], T]) -> str:
     return f"_cached_{function.__module__}.{function.__qualname__}"

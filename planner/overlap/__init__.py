@@ -51,6 +51,7 @@ def registers(pairs: Pairs, settings: Settings) -> IntArray:
     return np.flatnonzero(firm & (pairs.share >= settings.least_overlap))
 
 
+@instance_cached
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
     overlaps, settings = _overlaps_of(candidates), candidates.settings

@@ -34,6 +34,13 @@ MOST_SPACING_M = 0.15
 """Largest spacing of points with which a surface has a direction: two cells of a thinned cloud."""
 MOST_INCIDENCE_DEG = 85.0
 """Flattest angle from the surface normal at which a scanner measures a surface."""
+EDGE_M = 0.14
+"""Metres at each end of a common stretch that do not count. A point's direction comes from 15 neighbours,
+thinned to one per 7.5 cm: nearer to an edge they are of two surfaces."""
+LEAST_STRETCH_M = 2 * EDGE_M
+"""Least width of a common stretch. Narrower ones, such as door jambs, have no direction of their own."""
+WIDER_M = LEAST_STRETCH_M - 1e-9
+"""The same less rounding: a stretch that counts is wider."""
 BLOCK = 4096
 """Candidates whose boundary is found at a time, which takes several times the memory of the result."""
 
@@ -61,7 +68,7 @@ class Boundary:
 
 @dataclass(frozen=True, eq=False)
 class ShownBoundary:
-    """The boundary that each candidate sees, as stretches of faces.
+    """The boundary that each candidate sees, as stretches of faces that are wide enough to have a direction.
 
     Stretch k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, is of face `face[k]` and reaches from
     `begin[k]` to `end[k]` metres from the face's start. A row's stretches ascend and do not overlap.
@@ -74,6 +81,8 @@ class ShownBoundary:
     end: FloatArray
     xy: FloatArray
     """Position of each row, local metres (rows, 2)."""
+    metres: FloatArray
+    """Boundary that each row sees, also on narrower stretches (rows,)."""
 
 
 def boundary_of(space: NavigableSpace) -> Boundary:
@@ -118,6 +127,7 @@ def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
         begin=frozen(np.concatenate([part.begin for part in parts])),
         end=frozen(np.concatenate([part.end for part in parts])),
         xy=frozen(np.concatenate([part.xy for part in parts])),
+        metres=frozen(np.concatenate([part.metres for part in parts])),
     )
 
 
@@ -212,14 +222,15 @@ def _shown(boundary: Boundary, xy: FloatArray, seen: _Stretches, step: float) ->
     low, high = _measured(boundary, face, xy[row], step=step)
     begin = np.maximum((seen.first - start) * piece, low)
     end = np.minimum((seen.last + 1 - start) * piece, high)
-    some = end > begin
+    wide = end - begin > WIDER_M
     return ShownBoundary(
         boundary=boundary,
-        pointer=frozen(np.searchsorted(row[some], np.arange(len(xy) + 1)), np.int64),
-        face=frozen(face[some], np.int64),
-        begin=frozen(begin[some]),
-        end=frozen(end[some]),
+        pointer=frozen(np.searchsorted(row[wide], np.arange(len(xy) + 1)), np.int64),
+        face=frozen(face[wide], np.int64),
+        begin=frozen(begin[wide]),
+        end=frozen(end[wide]),
         xy=frozen(xy),
+        metres=frozen(np.bincount(row, np.maximum(end - begin, 0.0), len(xy))),
     )
 
 

@@ -13,28 +13,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.overlap.boundary import ShownBoundary
+from stopgo.planner.overlap.boundary import EDGE_M, WIDER_M, ShownBoundary
 from stopgo.planner.visibility.unit_ranges import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A rotation counts as its displacement at this distance: 0.1° as much as 1 cm, the tolerance of each."""
-EDGE_M = 0.14
-"""Metres at each end of a common stretch that do not count. A point's direction comes from 15 neighbours,
-thinned to one per 7.5 cm: nearer to an edge they are of two surfaces."""
-LEAST_STRETCH_M = 2 * EDGE_M
-"""Least width of a common stretch. Narrower ones, such as door jambs, have no direction of their own."""
 BLOCK = 64
 """Rows whose pairs are computed at a time."""
 DIGITS = 6
 """Decimals of a pair's figures, so that both stops of a pair have equal figures."""
-
-
-EPSILON_M = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +59,10 @@ class Overlaps:
     def rows(self) -> int:
         return len(self._seen.xy)
 
-    @cached_property
+    @property
     def shown_m(self) -> FloatArray:
         """Metres of boundary that each row sees (rows,)."""
-        length = self._seen.end - self._seen.begin
-        return np.asarray(np.bincount(self._row, length, self.rows), np.float64)
+        return self._seen.metres
 
     def of(self, row: int) -> Pairs:
         """A row with every other row; cached."""
@@ -99,7 +89,7 @@ class Overlaps:
         shown = (seen.pointer, seen.face, seen.begin, seen.end, first, self._order, self._row)
         scratch = np.zeros(rows), np.zeros(6 * rows), np.zeros(rows, np.int64)
         data = (*shown, *normal.T.copy(), arm, np.ascontiguousarray(seen.xy).ravel(), *scratch)
-        limits = (EDGE_M, LEAST_STRETCH_M - EPSILON_M, least_m, hold_m, LEVER_M)
+        limits = (EDGE_M, WIDER_M, least_m, hold_m, LEVER_M)
         for low in range(0, rows, BLOCK):
             high = min(low + BLOCK, rows)
             size = (high - low) * (rows - low)
@@ -148,7 +138,7 @@ class Overlaps:
         there, mine = self._order[ranges(begin, counts)], np.repeat(own, counts)
         low = np.maximum(seen.begin[mine], seen.begin[there])
         high = np.minimum(seen.end[mine], seen.end[there])
-        both = (high - low > LEAST_STRETCH_M - EPSILON_M) & (self._row[there] != self._row[mine])
+        both = (high - low > WIDER_M) & (self._row[there] != self._row[mine])
         return mine[both], there[both], low[both], high[both]
 
     def _pairs(self, rows: IntArray, first: IntArray, *, least_m: float = 0.0) -> Pairs:

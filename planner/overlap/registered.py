@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from msgspec import UNSET, UnsetType
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.document import Overlap, PositionError, stop_names
 from stopgo.mission.document.specs import rounded
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import OpeningState, Route
+from stopgo.mission.stages import NavigableSpace, OpeningState, Route
 from stopgo.mission.stages.figures import percent
 from stopgo.mission.stages.network import (
     CONFIDENCE,
@@ -206,9 +207,7 @@ def _remedy(
 
 def _midway(route: Route, here: IntArray, there: IntArray) -> tuple[int, int, tuple[float, float]] | None:
     """The nearest stops of two sets in sight of one another, and the position midway; None if none are."""
-    origin = local_origin(route.space.floor)
-    solids = to_shape(route.space.occluders, origin)
-    shapely.prepare(solids)
+    origin, solids = local_origin(route.space.floor), _opaque(route.space)
     away = np.hypot(*(route.xy[here][:, None] - route.xy[there][None]).transpose(2, 0, 1))
     for flat in np.argsort(away, axis=None, kind="stable").tolist():
         i, j = divmod(flat, len(there))
@@ -217,6 +216,14 @@ def _midway(route: Route, here: IntArray, there: IntArray) -> tuple[int, int, tu
             x, y = ends.mean(axis=0).tolist()
             return int(here[i]), int(there[j]), (x, y)
     return None
+
+
+@instance_cached
+def _opaque(space: NavigableSpace) -> BaseGeometry:
+    """The solids that stop the laser, prepared for many lines of sight."""
+    solids = to_shape(space.occluders, local_origin(space.floor))
+    shapely.prepare(solids)
+    return solids
 
 
 FREE_M = 0.5

@@ -67,17 +67,26 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
         return _part(driven, number, before(driven), observe)
 
 
+MANY = 5000
+"""Candidates from which work that nothing waits for yet is done in a process of its own."""
+
+
 def _seen(found: Candidates, observe: Observe) -> Visibility:
+    """Return the visibility of the candidates; the pairs of many that register are found meanwhile."""
+    from stopgo.planner.geometry.instance_cache import store
+    from stopgo.planner.geometry.side_work import SideWork
+    from stopgo.planner.overlap import links_of
     from stopgo.planner.visibility import visibility
 
     observe(found)
-    seen = visibility(found)
+    settings = found.settings
+    many = len(found.kept) >= MANY and settings.registers and settings.fov >= 360  # else with headings
+    with SideWork(lambda: links_of(found), forked=many) as links:
+        seen = visibility(found)
+        if many:
+            store(links_of, seen.candidates, links.result())
     observe(seen)
     return seen
-
-
-MANY = 5000
-"""Candidates from which the figures that need no route are made in a process of their own."""
 
 
 @contextmanager
@@ -91,7 +100,7 @@ def _figures_before(seen: Visibility, planned: frozenset[int]) -> Iterator[Calla
         def before(route: Route) -> FiguresBefore:
             if route.visibility is seen:
                 return work.result()
-            return FiguresBefore.of(route.visibility, planned)  # with candidates of its own
+            return FiguresBefore.of(route.visibility, planned, before=seen)
 
         yield before
 

@@ -26,7 +26,7 @@ from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths
 from stopgo.planner.routing.proof import tour_proof
 from stopgo.planner.routing.roadmap import nearby_paths_between, paths_between
-from stopgo.planner.routing.tour import NANOMETRES, canonical, nanometres, shortest_tour
+from stopgo.planner.routing.tour import NANOMETRES, canonical, nanometres, shortest_over, shortest_tour
 from stopgo.planner.space.reach import reach_of
 
 Router = Callable[..., IntArray]
@@ -66,7 +66,7 @@ def route(selection: Selection) -> Route:
     router = variant("router", settings.router, ROUTERS)
     points, ends = points_and_ends(selection)
     if len(points) > ALL_PAIRS_UP_TO and (settings.router, settings.graph) == ("default", "exact"):
-        return _route_over_nearby(selection, points, ends, router)
+        return _route_over_nearby(selection, points, ends)
     legs = legs_between(space, points)
     if not np.isfinite(legs.lengths).all():
         raise _not_connected(selection)
@@ -75,9 +75,7 @@ def route(selection: Selection) -> Route:
     return assembled(selection, points, legs, sequence, ends, bound, method)
 
 
-def _route_over_nearby(
-    selection: Selection, points: FloatArray, ends: Ends, router: Variant[Router]
-) -> Route:
+def _route_over_nearby(selection: Selection, points: FloatArray, ends: Ends) -> Route:
     """The route over many points, of which only near pairs have exact lengths.
 
     The tour is searched over upper bounds on all other lengths, so that it is no longer than it seems. Its
@@ -86,13 +84,11 @@ def _route_over_nearby(
     paths = nearby_paths_between(selection.space, points)
     if not paths.connected:
         raise _not_connected(selection)
-    matrix = tour_matrix(paths.at_most(), ends)
-    by_place = np.concatenate(
-        [[0], 1 + np.argsort(selection.chosen[1:]), np.arange(len(selection.chosen), len(matrix))]
-    )
-    matrix = matrix[np.ix_(by_place, by_place)]  # neighbours in memory too, which is quicker
-    order = canonical(by_place[router.called(matrix, seed=selection.settings.seed)])
-    del matrix
+    stops, others = selection.chosen, np.arange(len(selection.chosen), len(points) + (not ends.closed))
+    by_place = np.concatenate([[0], 1 + np.argsort(stops[1:]), others]).astype(np.int64)
+    cost = nanometres(_most_by_place(paths, by_place, ends), in_place=True)
+    order = canonical(by_place[shortest_over(cost, seed=selection.settings.seed)])
+    del cost
     sequence = _sequence(order, ends, len(points))
     legs = paths.learn(np.stack([sequence, np.roll(sequence, -1)], axis=1))
     if len(points) <= BOUNDS_UP_TO:
@@ -100,6 +96,20 @@ def _route_over_nearby(
     else:
         bound = _bound_over_nearby(paths, float(legs.sum() if ends.closed else legs[:-1].sum()), ends)
     return assembled(selection, points, paths, sequence, ends, bound, METHODS["default"])
+
+
+def _most_by_place(paths: NearbyPaths, by_place: IntArray, ends: Ends) -> FloatArray:
+    """The matrix of a tour over upper bounds: neighbours are near in memory too, which is quicker.
+
+    It is made in one piece, as that of thousands of stops is a large part of the memory.
+    """
+    n = paths.points
+    matrix = np.empty((len(by_place), len(by_place)))
+    lengths = paths.at_most(by_place[:n], out=matrix[:n, :n])
+    if not ends.closed:
+        matrix[:n, n] = matrix[n, :n] = _to_extra_point(lengths, ends)[by_place[:n]]
+        matrix[n, n] = 0.0
+    return matrix
 
 
 def _bound_over_nearby(paths: NearbyPaths, length: float, ends: Ends) -> float:
@@ -216,10 +226,16 @@ def tour_matrix(lengths: FloatArray, ends: Ends) -> FloatArray:
     """
     if ends.closed:
         return lengths
+    extra = _to_extra_point(lengths, ends)
+    return np.block([[lengths, extra[:, None]], [extra[None, :], np.zeros((1, 1))]])
+
+
+def _to_extra_point(lengths: FloatArray, ends: Ends) -> FloatArray:
+    """Length from each point to the extra one (points,)."""
     fixed = [end for end in (ends.first, ends.last) if end is not None]
     extra = np.full(len(lengths), _far(lengths) if fixed else 0.0)
     extra[fixed] = 0.0
-    return np.block([[lengths, extra[:, None]], [extra[None, :], np.zeros((1, 1))]])
+    return extra
 
 
 def far_edge(lengths: FloatArray, ends: Ends) -> float:

@@ -108,14 +108,20 @@ class NearbyPaths:
         order = np.argsort(self._pairs[:, 0] < self._pairs[:, 1], kind="stable")
         self._pairs, self._lengths = self._pairs[order], self._lengths[order]
 
-    def at_most(self) -> FloatArray:
-        """Metres between all points (points, points): exact for known pairs, an upper bound for others."""
-        most = np.full((self.points, self.points), np.inf)
+    def at_most(self, order: IntArray | None = None, *, out: FloatArray | None = None) -> FloatArray:
+        """Metres between all points (points, points): exact for known pairs, an upper bound for others.
+
+        With an `order`, the points are in this order, and the result is written into `out` if that is given.
+        """
+        order = np.arange(self.points) if order is None else order
+        most = np.empty((self.points, self.points)) if out is None else out
+        most[:] = np.inf
+        from_landmarks = self._away[:, order]
         for k in range(0, self.points, BLOCK):
             some = most[k : k + BLOCK]
-            for away in self._away:
+            for away in from_landmarks:
                 np.minimum(some, away[k : k + BLOCK, None] + away, out=some)
-        return self._with_known(most, 1 + ROUNDING, ROUNDING)
+        return self._with_known(most, order, 1 + ROUNDING, ROUNDING)
 
     def at_least(self) -> FloatArray:
         """Metres between all points (points, points): exact for known pairs, a lower bound for others."""
@@ -124,15 +130,16 @@ class NearbyPaths:
             some = least[k : k + BLOCK]
             for away in self._away:
                 np.maximum(some, np.abs(away[k : k + BLOCK, None] - away), out=some)
-        return self._with_known(least, 1 - ROUNDING, -ROUNDING)
+        return self._with_known(least, np.arange(self.points), 1 - ROUNDING, -ROUNDING)
 
-    def _with_known(self, lengths: FloatArray, times: float, plus: float) -> FloatArray:
-        """Bounds widened by rounding, with the exact lengths in their places."""
+    def _with_known(self, lengths: FloatArray, order: IntArray, times: float, plus: float) -> FloatArray:
+        """Bounds widened by rounding, with the exact lengths in their places; the points are in an order."""
         lengths *= times
         lengths += plus
         np.maximum(lengths, 0.0, out=lengths)
         np.fill_diagonal(lengths, 0.0)
-        low, high = np.sort(self._pairs, axis=1).T
+        place = np.argsort(order)
+        low, high = place[np.sort(self._pairs, axis=1)].T
         lengths[low, high] = self._lengths
         lengths[high, low] = lengths[low, high]
         return lengths

@@ -170,9 +170,9 @@ def _tangent(edges: IntArray, nodes: FloatArray, sides: FloatArray) -> IntArray:
     """The edges that a shortest path may use: those that pass by the corners at their ends.
 
     If the sides of a corner (n, 2, 2) lie on different sides of the edge, a shorter path cuts the corner.
-    Edges too close to decide stay.
+    Edges too close to decide stay. Edges leave their first corner past it, so most end at their last.
     """
-    for end in range(2):
+    for end in (1, 0):
         along = (nodes[edges[:, 1]] - nodes[edges[:, 0]])[:, None]
         turn = _cross(along, sides[edges[:, end]])
         edges = edges[turn[:, 0] * turn[:, 1] >= -TOUCH]

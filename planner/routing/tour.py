@@ -47,20 +47,27 @@ def shortest_tour(lengths: FloatArray, *, seed: int) -> IntArray:
 
     The direction is the one in which the second point is lower than the last.
     """
-    n = len(lengths)
-    cost = nanometres(lengths)
+    return shortest_over(nanometres(lengths), seed=seed)
+
+
+def shortest_over(cost: IntArray, *, seed: int) -> IntArray:
+    """`shortest_tour` over lengths in whole nanometres."""
+    n = len(cost)
     if n <= COMPARE_ALL_UP_TO:
         return canonical(best_of_all(cost))
     rounds = ROUNDS_OF_SHORT if n <= SHORT else ROUNDS
     return canonical(search(cost, trials(cost, min(rounds * n, MOST_TRIALS), seed=seed)))
 
 
-def nanometres(lengths: FloatArray) -> IntArray:
-    """Lengths in whole nanometres, rounded down, so that no sum of them is above the true one."""
+def nanometres(lengths: FloatArray, *, in_place: bool = False) -> IntArray:
+    """Lengths in whole nanometres, rounded down, so that no sum of them is above the true one.
+
+    Those `in_place` take the memory of the lengths, which are gone then.
+    """
     if float(np.max(lengths, initial=0.0)) * NANOMETRES * len(lengths) > LARGEST:
         longest, most = float(lengths.max()), LARGEST / NANOMETRES / len(lengths)
         raise InputError(f"route: a path of {longest:g} m between {len(lengths)} stops; at most {most:g} m")
-    whole = np.empty(lengths.shape, dtype=np.int64)
+    whole = lengths.view(np.int64) if in_place else np.empty(lengths.shape, dtype=np.int64)
     for k in range(0, len(lengths), BLOCK):  # of thousands of points a copy is a large part of the memory
         whole[k : k + BLOCK] = np.floor(lengths[k : k + BLOCK] * NANOMETRES)
     return whole

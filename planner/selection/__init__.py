@@ -16,9 +16,9 @@ from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
-from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.geometry.instance_cache import instance_cached, taken
 from stopgo.planner.overlap import links_of
-from stopgo.planner.selection.bound import counting_bound, first_bound, lower_bound
+from stopgo.planner.selection.bound import counting_bound, early_bound, first_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
@@ -36,16 +36,17 @@ def _greedy(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
 
 
 def _default(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
-    rows, bound = _draft(cover, settings)
+    start = greedy(cover)
+    bound = early_bound(cover, found=len(start))
+    rows = improved(cover, start, at_least=bound)
     rows = improved_otherwise(cover, rows, at_least=bound, work=EntriesLeft())
     return rows, bound if len(rows) <= bound else max(bound, lower_bound(cover, found=len(rows)))
 
 
 def _draft(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
-    """The rows of the default method, with a first bound."""
-    start = greedy(cover)
-    bound = lower_bound(cover, found=len(start), quickly=True)
-    return improved(cover, start, at_least=bound), bound
+    """The rows of the default method before the removal of other rows, with a bound by counting."""
+    bound = counting_bound(cover)
+    return improved(cover, greedy(cover), at_least=bound), bound
 
 
 def _exact(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
@@ -78,7 +79,7 @@ def select(visibility: Visibility, *, joined: bool = True) -> Selection:
 
     Required stops, and doorways added for registration, are chosen first and count. Where scans must
     register with one another, doorways are offered too. Not `joined`, the scans need not register, and the
-    default method's bound is a first one.
+    default method's bound is by counting.
     """
     settings = visibility.settings
     method = variant("selector", settings.selector, METHODS)
@@ -101,6 +102,12 @@ def quick_estimate(visibility: Visibility) -> tuple[int, int]:
     bound = first_bound(problem, found=len(start))
     rows = improved(problem, start, at_least=bound, swaps=QUICK_SWAPS)
     return len(fixed) + len(rows), len(fixed) + bound
+
+
+def quick_count(visibility: Visibility) -> int:
+    """The estimate of `quick_estimate` alone."""
+    _, fixed, problem = cover_problem(visibility)
+    return len(fixed) + len(improved(problem, greedy(problem), at_least=0, swaps=QUICK_SWAPS))
 
 
 def greedy_count(visibility: Visibility) -> int:
@@ -136,7 +143,7 @@ def _connected(
     """
     settings = visibility.settings
     cover = whole.with_one_of_each([np.array([row]) for row in fixed])
-    task = ConnectedCover(cover, links_of(visibility.candidates), offered)
+    task = ConnectedCover(cover, taken(links_of, visibility.candidates), offered)
     if method.name == "exact":
         rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
     elif method.name == "default":
@@ -164,7 +171,7 @@ class Searches:
 
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
             nonlocal bound, last
-            bound = bound or lower_bound(cover, found=len(start), quickly=True)
+            bound = bound or early_bound(cover, found=len(start))
             asked = cover.with_one_of_each(conditions.sets)
             again = repaired_again(asked, last) if 0 < len(last) < len(start) else None
             first = start if again is None else again
@@ -280,6 +287,7 @@ __all__ = [
     "coverage_steps",
     "greedy_count",
     "offered_for_follow_up",
+    "quick_count",
     "quick_estimate",
     "remaining_cover",
     "select",

@@ -14,10 +14,10 @@ from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
-QUICK = 100_000
-"""Entries above which the relaxation takes up to seconds, and a first bound comes from a coarse one."""
 COARSE = 30_000
 """Entries of a coarse relaxation, about."""
+FEW = 30
+"""Most rows of a selection that a bound often proves the fewest."""
 FIRST_STEPS = 100
 """Steps of a first bound by the multipliers, for problems that are too large for a relaxation."""
 FIRST_WORK = 40_000_000
@@ -36,22 +36,33 @@ def _fewest(gains: IntArray, needed: int) -> int:
     return int(np.searchsorted(np.cumsum(np.sort(gains)[::-1]), needed)) + 1 if needed > 0 else 0
 
 
-def lower_bound(cover: Cover, *, found: int, quickly: bool = False) -> int:
+def lower_bound(cover: Cover, *, found: int) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
     Small problems use the linear relaxation, large ones that of one part after another, or the multiplier
-    bound where the range is long; `quickly`, problems
-    of more than `QUICK` entries a coarse relaxation, or a few steps of the multiplier bound.
+    bound where the range is long. A coarse relaxation comes first for few rows, and often proves them.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
         return simple
-    if quickly and entries > QUICK:
-        return max(simple, coarse_bound(cover)) if entries <= LARGEST else first_bound(cover, found=found)
-    if entries <= LARGEST:
-        return max(simple, relaxation_bound(cover))
-    large = bound_by_parts if has_parts(cover) else multiplier_bound
-    return max(simple, large(cover, found=found))
+    if entries > LARGEST:
+        return max(simple, (bound_by_parts if has_parts(cover) else multiplier_bound)(cover, found=found))
+    coarse = coarse_bound(cover) if found <= FEW and entries > COARSE else 0
+    return max(simple, coarse if coarse >= found else relaxation_bound(cover))
+
+
+def early_bound(cover: Cover, *, found: int) -> int:
+    """A lower bound for the end of a search; `found` rows are known to suffice.
+
+    A search for many rows seldom reaches its bound, which takes longer than the search. It has that by
+    counting. One for few rows has that of the coarse relaxation, or by a few steps of the multiplier bound.
+    """
+    simple = counting_bound(cover)
+    if simple >= found or found > FEW or not cover.needed.any():
+        return simple
+    if cover.sees.nnz > LARGEST:
+        return first_bound(cover, found=found)
+    return max(simple, coarse_bound(cover) if cover.sees.nnz > COARSE else relaxation_bound(cover))
 
 
 def first_bound(cover: Cover, *, found: int) -> int:

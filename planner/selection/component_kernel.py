@@ -40,6 +40,13 @@ def label_components(first: Any, to: Any, inside: Any, label: Any, stack: Any) -
         components += 1
 
 
+def mark_neighbours(first: Any, to: Any, rows: Any, is_end: Any) -> None:
+    """Set `is_end` to 1 for each row that has a link to one of the `rows`; links are as above."""
+    for k in range(len(rows)):
+        for link in range(first[rows[k]], first[rows[k] + 1]):
+            is_end[to[link]] = 1
+
+
 def grow_parts(
     first: Any, to: Any, inside: Any, seeds: Any, label: Any, parent: Any, head: Any, tail: Any,
     turn: Any, following: Any, met: Any,

@@ -9,6 +9,11 @@ cpdef void label_components(
     const whole[::1] first, const whole[::1] to, const whole[::1] inside, whole[::1] label, whole[::1] stack
 ) noexcept nogil
 
+@cython.locals(k=whole, link=whole)
+cpdef void mark_neighbours(
+    const whole[::1] first, const whole[::1] to, const whole[::1] rows, unsigned char[::1] is_end
+) noexcept nogil
+
 @cython.locals(
     count=whole, growing=whole, here=whole, k=whole, link=whole, part=whole, parts=whole,
     there=whole, turns=whole,

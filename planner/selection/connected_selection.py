@@ -112,7 +112,7 @@ class ConnectedCover:
         if inside[row] == 0:
             return False
         inside[row] = 0
-        parts = self.graph.parts_around(self.graph.ends(np.array([row]))[1], inside)
+        parts = self.graph.parts_around(self.graph.ends(np.array([row])), inside)
         inside[row] = 1
         return len(parts.whole) + min(1, len(parts.last)) > 1
 

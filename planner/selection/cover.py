@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack
+from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import Visibility
@@ -78,6 +79,11 @@ class Cover:
     def adds_to(self) -> csr_array:
         """The transpose of `worth` (columns, demands)."""
         return _sorted(self.worth.T)
+
+    @cached_property
+    def adds(self) -> csr_array:
+        """Worth that each row adds to each demand before any is chosen (rows, demands)."""
+        return csr_array(self.sees @ self.adds_to)
 
     @cached_property
     def worths(self) -> Worths:
@@ -160,12 +166,14 @@ class Cover:
         chosen = coo_array(entries, shape=(self.rows, len(sets)))
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
-        return Cover(
+        made = Cover(
             _sorted(hstack([self.sees, chosen])),
             _sorted(worths.astype(np.int64)),
             np.concatenate([self.needed, np.full(len(sets), worth)]),
             np.concatenate([self.asks, np.ones(len(sets), np.int64)]),
         )
+        vars(made)["adds"] = hstack([self.adds, chosen.astype(np.int64) * worth], format="csr")
+        return made
 
 
 def cover_of(visibility: Visibility, demands: Demands) -> Cover:
@@ -227,18 +235,34 @@ def _sorted(matrix: csr_array) -> csr_array:
 
 def _first_of_stretches(visibility: Visibility) -> IntArray:
     """First unit of each stretch within which no run begins or ends."""
-    cuts = np.concatenate([[0], visibility.first, visibility.last + 1])
-    return np.unique(cuts[cuts < visibility.targets.total])
+    begins = np.zeros(visibility.targets.total + 1, dtype=bool)
+    begins[0] = True
+    begins[visibility.first] = True
+    begins[visibility.last + 1] = True
+    return np.flatnonzero(begins[:-1])
+
+
+BLOCK = 1_000_000
+"""Runs of units whose stretches are found at a time: of long ranges there are many millions."""
 
 
 def _stretch_matrix(visibility: Visibility, stretch_first: IntArray) -> csr_array:
     """1 where the row sees the stretch (rows, stretches); its indices have 32 bits, as it has many."""
-    row = np.repeat(np.arange(visibility.rows), np.diff(visibility.pointer))
-    begin = np.searchsorted(stretch_first, visibility.first)
-    end = np.searchsorted(stretch_first, visibility.last, side="right")
-    rows = np.repeat(row.astype(np.int32), end - begin)
+    blocks = np.searchsorted(visibility.pointer[:-1], np.arange(0, len(visibility.first), BLOCK))
+    rows = np.unique([0, *blocks.tolist(), visibility.rows]).tolist()
+    parts = [_stretches_of(visibility, stretch_first, *some) for some in pairwise(rows)]
+    return csr_array(vstack([csr_array((0, len(stretch_first)), dtype=np.int8), *parts], format="csr"))
+
+
+def _stretches_of(visibility: Visibility, stretch_first: IntArray, low: int, high: int) -> csr_array:
+    """`_stretch_matrix` of the rows from `low` to below `high`."""
+    pointer = visibility.pointer[low : high + 1]
+    own = slice(int(pointer[0]), int(pointer[-1]))
+    begin = np.searchsorted(stretch_first, visibility.first[own])
+    end = np.searchsorted(stretch_first, visibility.last[own], side="right")
+    rows = np.repeat(np.repeat(np.arange(high - low, dtype=np.int32), np.diff(pointer)), end - begin)
     columns = ranges(begin, end - begin).astype(np.int32)
-    shape = (visibility.rows, len(stretch_first))
+    shape = (high - low, len(stretch_first))
     matrix = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=shape)
     matrix.data[:] = 1
     return matrix

@@ -6,7 +6,6 @@ import heapq
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
@@ -23,22 +22,21 @@ def in_greedy_order(cover: Cover, rows: IntArray) -> IntArray:
     """The same rows, ordered so that each next row has the largest gain."""
     covered, short = np.zeros(cover.columns, dtype=np.int64), cover.views_needed
     gains = [(*_gain(cover, row, covered, short, cover.needed), row) for row in rows.tolist()]
-    return _by_gain(cover, gains, until_met=False)
+    return _by_gain(cover, np.array(gains, dtype=np.int64).reshape(-1, 4), until_met=False)
 
 
-Gain = tuple[int, int, int, int]
-"""Negative gain of a row in three ways, so that the least is the best, and the row."""
-
-
-def _by_gain(cover: Cover, queue: list[Gain], *, until_met: bool) -> IntArray:
+def _by_gain(cover: Cover, gains: IntArray, *, until_met: bool) -> IntArray:
     """Rows by their gain for unmet demands, then by their total gain, then by the lower row number.
 
+    `gains` are those before any row is chosen: negative ones in three ways, so that the least is the best,
+    and the row (rows, 4).
     Gains only fall while rows are chosen. So an outdated gain is computed again only when its row
     reaches the head of the queue (Minoux, 1978).
     """
     kernel = compiled(choose, large=False)
     if kernel is not None:
-        return _by_kernel(kernel, cover, queue, until_met=until_met)
+        return _by_kernel(kernel, cover, gains, until_met=until_met)
+    queue: list[tuple[int, ...]] = list(map(tuple, gains.tolist()))
     covered = np.zeros(cover.columns, dtype=np.int64)
     short, missing = cover.views_needed.copy(), cover.needed
     heapq.heapify(queue)
@@ -58,9 +56,8 @@ def _by_gain(cover: Cover, queue: list[Gain], *, until_met: bool) -> IntArray:
     return np.array(chosen, dtype=np.int64)
 
 
-def _by_kernel(kernel: Callable[..., int], cover: Cover, queue: list[Gain], *, until_met: bool) -> IntArray:
+def _by_kernel(kernel: Callable[..., int], cover: Cover, gains: IntArray, *, until_met: bool) -> IntArray:
     """`_by_gain` by the kernel, compiled or as written."""
-    gains = np.array(queue, dtype=np.int64).reshape(-1, 4)
     keys = np.zeros((cover.rows, 3), dtype=np.int64)
     keys[gains[:, 3]] = gains[:, :3]
     covered, sums = (np.zeros(size, dtype=np.int64) for size in (cover.columns, len(cover.needed)))
@@ -70,16 +67,16 @@ def _by_kernel(kernel: Callable[..., int], cover: Cover, queue: list[Gain], *, u
     return chosen[: kernel(int(until_met), *cover.seen_columns, *cover.worths.added, *state)]
 
 
-def _first_gains(cover: Cover) -> list[Gain]:
-    """`_gain` of every row before any is chosen."""
-    adds = csr_array(cover.sees @ cover.adds_to)
+def _first_gains(cover: Cover) -> IntArray:
+    """`_gain` of every row before any is chosen, and the row (rows, 4)."""
+    adds = cover.adds
     gain, unmet = adds.copy(), adds.copy()
     gain.data = np.minimum(adds.data, cover.views_needed[adds.indices])
     unmet.data = np.where(cover.needed[adds.indices] > 0, adds.data, 0)
     first = np.asarray(gain.sum(axis=1)).ravel()
     second = np.where(first > 0, 0, np.asarray(unmet.sum(axis=1)).ravel())
     whole = adds[:, [0]].toarray().ravel()
-    return list(zip((-first).tolist(), (-second).tolist(), (-whole).tolist(), range(cover.rows), strict=True))
+    return np.stack([-first, -second, -whole, np.arange(cover.rows)], axis=1)
 
 
 def _gain(

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.selection.component_kernel import grow_parts
+from stopgo.planner.selection.component_kernel import grow_parts, mark_neighbours
 from stopgo.planner.visibility.unit_ranges import ranges
 
 
@@ -42,14 +42,17 @@ class LinkGraph:
         self._is_end = np.zeros(rows, dtype=bool)
         self._following, self._met = (np.zeros(rows, dtype=np.int64) for _ in range(2))
 
-    def ends(self, rows: IntArray) -> tuple[IntArray, IntArray]:
-        """Links of some rows: how many each has (n,), and the rows to which they lead."""
-        counts = self._first[rows + 1] - self._first[rows]
-        return counts, self._to[ranges(self._first[rows], counts)]
+    def ends(self, rows: IntArray) -> IntArray:
+        """Rows to which the links of some rows lead (links,)."""
+        return self._to[ranges(self._first[rows], self._first[rows + 1] - self._first[rows])]
 
     def neighbours(self, rows: IntArray) -> IntArray:
         """Rows that have a link to one of these, once each, ascending (n,)."""
-        self._is_end[self.ends(rows)[1]] = True
+        kernel = compiled(mark_neighbours, large=False)
+        if kernel is None:
+            self._is_end[self.ends(rows)] = True
+        else:
+            kernel(self._first, self._to, np.ascontiguousarray(rows, np.int64), self._is_end.view(np.uint8))
         found = np.flatnonzero(self._is_end).astype(np.int64)
         self._is_end[found] = False
         return found

@@ -40,15 +40,14 @@ def _labels(links: csr_array, rows: IntArray) -> IntArray:
 
 def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
     """The components needed to meet every demand: the smallest superfluous ones are dropped first."""
-    needed = list(components)
+    needed: list[IntArray] = []
     coverage = RunningCoverage(cover, np.concatenate([np.empty(0, np.int64), *components]))
-    for component in reversed(components):
+    for before, component in reversed(list(enumerate(components))):
         coverage.remove(component)
-        if len(needed) > 1 and coverage.is_enough:
-            needed = [other for other in needed if other is not component]
-        else:
+        if before + len(needed) == 0 or not coverage.is_enough:
             coverage.add(component)
-    return needed
+            needed.append(component)
+    return needed[::-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +73,8 @@ class SeparatorSearch:
         self._region_of = np.full(cover.rows, -1, dtype=np.int64)
         self._region_of[every] = np.repeat(np.arange(len(regions)), [len(region) for region in regions])
         self._every, self._elsewhere = RunningCoverage(cover, every), RunningCoverage(cover, every)
-        self._part = np.full(cover.rows, -1, dtype=np.int64)
+        self._left_out = np.empty(0, np.int64)
+        self._is_near = np.zeros(cover.rows, dtype=bool)
 
     def separators(self, rows: IntArray) -> Iterator[IntArray]:
         """Sets of rows (n,) of which every selection that is connected in each region has at least one.
@@ -113,15 +113,19 @@ class SeparatorSearch:
             if len(inner) > 1:
                 region = self._regions[number]
                 inside[region] = 1
-                self._elsewhere.remove(region)
-                try:
-                    for k, component in enumerate(inner):
-                        others = np.concatenate([*inner[:k], *inner[k + 1 :]])
-                        for separator in self._around(component, others, inside, len(region)):
-                            yield separator, component, others
-                finally:
-                    self._elsewhere.add(region)
-                    inside[region] = 0
+                self._leave_out(region)
+                for k, component in enumerate(inner):
+                    others = np.concatenate([*inner[:k], *inner[k + 1 :]])
+                    for separator in self._around(component, others, inside, len(region)):
+                        yield separator, component, others
+                inside[region] = 0
+
+    def _leave_out(self, region: IntArray) -> None:
+        """Let the coverage elsewhere be that of all regions but this one; it is often the same again."""
+        if region is not self._left_out:
+            self._elsewhere.add(self._left_out)
+            self._elsewhere.remove(region)
+            self._left_out = region
 
     def _around(
         self, component: IntArray, others: IntArray, inside: IntArray, size: int
@@ -152,14 +156,11 @@ class SeparatorSearch:
 
     def _between(self, near: IntArray, parts: LinkedParts) -> list[IntArray]:
         """The rows of those near that have a link to each part (n,), the last one included."""
-        every = [*parts.whole, parts.last]
-        for k, part in enumerate(every):
-            self._part[part] = k
-        counts, ends = self._graph.ends(near)
-        part_at, row = self._part[ends], np.repeat(near, counts)
-        for part in every:
-            self._part[part] = -1
-        return [np.unique(row[part_at == k]).astype(np.int64) for k in range(len(every))]
+        self._is_near[near] = True
+        linked = [self._graph.neighbours(part) for part in (*parts.whole, parts.last)]
+        found = [rows[self._is_near[rows]] for rows in linked]
+        self._is_near[near] = False
+        return found
 
 
 @dataclass(eq=False)

@@ -35,6 +35,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -91,9 +92,14 @@ class Canvas:
         """Return points (…, 2) relative to the local origin, as Rerun stores them."""
         return (np.asarray(xy, dtype=np.float64) - self.origin).astype(np.float32)
 
-    def strips(self, strips: Iterable[FloatArray]) -> list[NDArray[Any]]:
-        """Return line strips relative to the local origin."""
-        return [self.local(strip) for strip in strips]
+    def strips(self, strips: Iterable[FloatArray]) -> Sequence[NDArray[Any]] | NDArray[Any]:
+        """Return line strips relative to the local origin; as one array if they are: Rerun takes it whole."""
+        if isinstance(strips, np.ndarray):
+            return self.local(strips)
+        parts = list(strips)
+        ends = np.cumsum([len(part) for part in parts]).tolist()
+        points = self.local(np.concatenate(parts)) if parts else None
+        return [] if points is None else [points[a:b] for a, b in pairwise([0, *ends])]
 
     def show(self, entity: str, *archetypes: Any) -> None:
         """Draw a static row: it is visible at every time of every timeline."""

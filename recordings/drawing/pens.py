@@ -50,7 +50,7 @@ def draw(
     `names`, one per strip, are shown at the mouse pointer.
     """
     local = canvas.strips(strips)
-    if local:
+    if len(local):
         named: dict[str, Any] = {"labels": names, "show_labels": False} if names else {}
         look: dict[str, Any] = {"colors": pen.colour, "radii": pen.radius, "draw_order": ORDER[pen.order]}
         shape = rr.LineStrips2D(local, **look, **named)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -32,7 +31,7 @@ def hatch(polygons: Iterable[Polygon], *, spacing: float, angle: float) -> Float
     for polygon in polygons:
         edges = _edges(polygon) @ rotation
         first, last = (np.floor(edges[..., 1].min() / spacing), np.ceil(edges[..., 1].max() / spacing))
-        lines.extend(_chords(edges, (row + 0.5) * spacing) for row in np.arange(first, last))
+        lines.append(_chords(edges, (np.arange(first, last) + 0.5) * spacing))
     return np.concatenate(lines) @ rotation.T
 
 
@@ -45,7 +44,7 @@ def fill(polygons: Iterable[Polygon], *, spacing: float) -> Strokes:
         low, high = edges[..., 1].min(), edges[..., 1].max()
         count = max(1, int(np.ceil((high - low) / spacing)))
         step = (high - low) / count
-        chords = np.concatenate([_chords(edges, low + (row + 0.5) * step) for row in range(count)])
+        chords = _chords(edges, low + (np.arange(count) + 0.5) * step)
         lines.append(_shortened(chords, step / 2) @ rotation.T)
         radii.append(np.full(len(chords), step / 2))
     return Strokes(np.concatenate(lines), np.concatenate(radii))
@@ -66,10 +65,7 @@ def triangles(polygons: Iterable[Polygon]) -> FloatArray:
     """Return triangles (k, 3, 2) that cover the polygons: trapezoids between vertex heights."""
     parts = [np.empty((0, 3, 2))]
     for polygon in polygons:
-        edges = _edges(polygon)
-        heights = np.unique(edges[..., 1])
-        for low, high in pairwise(heights):
-            parts.append(_band(edges, float(low), float(high)))
+        parts.append(_trapezoids(_edges(polygon)))
     return np.concatenate(parts)
 
 
@@ -127,16 +123,27 @@ def _rotation(angle: float) -> FloatArray:
 
 
 def _edges(polygon: Polygon) -> FloatArray:
-    return np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in polygon.rings])
+    edges = [np.empty((len(ring), 2, 2)) for ring in polygon.rings]
+    for edge, ring in zip(edges, polygon.rings, strict=True):
+        edge[:, 0], edge[:-1, 1], edge[-1:, 1] = ring, ring[1:], ring[:1]
+    return np.concatenate(edges)
 
 
-def _chords(edges: FloatArray, y: float) -> FloatArray:
-    """Return the parts (k, 2, 2) of the horizontal line at `y` inside the edges, by the even-odd rule."""
-    a, b = edges[:, 0], edges[:, 1]
-    hit = (a[:, 1] <= y) != (b[:, 1] <= y)
-    a, b = a[hit], b[hit]
-    x = np.sort(a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
-    return np.stack([x, np.full(len(x), y)], axis=1).reshape(-1, 2, 2)
+def _crossings(edges: FloatArray, heights: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return which edges reach which ascending heights, each from its lower end to below its upper one."""
+    first, last = heights.searchsorted((edges[..., 1].min(axis=1), edges[..., 1].max(axis=1)))
+    count = last - first
+    edge = np.repeat(np.arange(len(edges)), count)
+    return edge, np.arange(len(edge)) + np.repeat(first + count - count.cumsum(), count)
+
+
+def _chords(edges: FloatArray, heights: FloatArray) -> FloatArray:
+    """Return the parts (k, 2, 2) of lines at ascending heights inside the edges, by the even-odd rule."""
+    edge, row = _crossings(edges, heights)
+    a, b, y = edges[edge, 0], edges[edge, 1], heights[row]
+    x = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    order = np.lexsort((x, row))
+    return np.stack([x[order], y[order]], axis=1).reshape(-1, 2, 2)
 
 
 def _shortened(chords: FloatArray, by: float) -> FloatArray:
@@ -151,20 +158,21 @@ def _longest_direction(polygon: Polygon) -> float:
     return float(np.arctan2(longest[1], longest[0]))
 
 
-def _band(edges: FloatArray, low: float, high: float) -> FloatArray:
-    a, b = edges[:, 0], edges[:, 1]
-    across = np.minimum(a[:, 1], b[:, 1]) <= low
-    across &= np.maximum(a[:, 1], b[:, 1]) >= high
-    across &= a[:, 1] != b[:, 1]
-    a, b = a[across], b[across]
+def _trapezoids(edges: FloatArray) -> FloatArray:
+    """Return two triangles (k, 3, 2) of each trapezoid between neighbouring heights of the edges' ends."""
+    heights = np.unique(edges[..., 1])
+    edge, band = _crossings(edges, heights)
+    a, b = edges[edge, 0], edges[edge, 1]
     slope = (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
-    x0, x1 = a[:, 0] + (low - a[:, 1]) * slope, a[:, 0] + (high - a[:, 1]) * slope
-    order = np.argsort(x0 + x1)
-    ends = np.stack([np.stack([x, np.full(len(x), y)], 1) for x, y in ((x0, low), (x1, high))], axis=1)[order]
+    ends = np.empty((len(edge), 2, 2))
+    ends[:, :, 1] = np.stack([heights[band], heights[band + 1]], axis=1)
+    ends[:, :, 0] = a[:, :1] + (ends[:, :, 1] - a[:, 1:]) * slope[:, None]
+    ends = ends[np.lexsort((ends[:, 0, 0] + ends[:, 1, 0], band))]
     left, right = ends[::2], ends[1::2]
-    lower = np.stack([left[:, 0], right[:, 0], right[:, 1]], axis=1)
-    upper = np.stack([left[:, 0], right[:, 1], left[:, 1]], axis=1)
-    return np.concatenate([lower, upper])
+    corners = np.concatenate([left, right], axis=1)  # lower left, upper left, lower right, upper right
+    lower, upper = corners[:, [0, 2, 3]], corners[:, [0, 3, 1]]
+    bands = np.sort(band)[::2]
+    return np.concatenate([lower, upper])[np.argsort(np.tile(bands, 2), kind="stable")]
 
 
 def _ends(strips: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:

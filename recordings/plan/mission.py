@@ -65,15 +65,17 @@ def plan_states(canvas: Canvas, mission: Mission, drive: Drive) -> None:
     for metric, sides in limits.items():
         look = rr.SeriesLines(colors=[palette.FAILED.colour] * len(sides), names=["tolerance"] * len(sides))
         canvas.show(entities.child(metric, "planned"), look)
-    canvas.at(lane, rr.StateChange(state="NAVIGATING"), mission_s=0.0)
-    for stop, leaving in zip(mission.stops, drive.leaving_s.tolist(), strict=True):
-        scanning = leaving - stop.scan.duration_s
-        times = {"SETTLING": scanning - stop.settle_s, "SCANNING": scanning, "NAVIGATING": leaving}
-        for state, seconds in times.items():
-            canvas.at(lane, rr.StateChange(state=state), mission_s=seconds)
-        for metric, sides in limits.items():
-            values = [side * stop.tolerance_m * 1000 for side in sides]
-            canvas.at(entities.child(metric, "planned"), rr.Scalars(values), mission_s=scanning)
+    scanning = drive.leaving_s - [stop.scan.duration_s for stop in mission.stops]
+    settling = scanning - [stop.settle_s for stop in mission.stops]
+    changes = np.stack([settling, scanning, drive.leaving_s], axis=1).ravel()
+    states = ["NAVIGATING", *("SETTLING", "SCANNING", "NAVIGATING") * len(scanning)]
+    index = rr.TimeColumn(entities.MISSION_TIME, duration=[0.0, *changes.tolist()])
+    canvas.columns(lane, index, rr.StateChange.columns(state=states))
+    for metric, sides in limits.items():
+        values = np.outer([stop.tolerance_m for stop in mission.stops], sides).ravel() * 1000
+        column = rr.Scalars.columns(scalars=values).partition([len(sides)] * len(scanning))
+        index = rr.TimeColumn(entities.MISSION_TIME, duration=scanning.tolist())
+        canvas.columns(entities.child(metric, "planned"), index, column)
     least = entities.child(entities.METRIC_BATTERY, "planned")
     canvas.show(least, rr.SeriesLines(colors=palette.FAILED.colour, names="least, then home"))
     for seconds in (0.0, float(drive.seconds[-1])):

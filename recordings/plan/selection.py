@@ -41,8 +41,8 @@ def paint_coverage(canvas: Canvas, selection: Selection) -> None:
     lines, value = strokes.lines_by_value(selection.visibility.targets, state)
     meanings = {0: ("seen", palette.SEEN), 1: ("unseen", palette.UNSEEN), 2: ("hidden", palette.HIDDEN)}
     for number, (name, meaning) in meanings.items():
-        band = [strokes.level(canvas.local(line), CUT + SKIN) for line in lines[value == number]]
-        if band:
+        band = strokes.level(canvas.local(lines[value == number]), CUT + SKIN)
+        if len(band):
             shape = rr.LineStrips3D(band, colors=meaning.colour, radii=0.03)
             canvas.show(entities.child(entities.WORLD_COVERAGE, name), shape)
 

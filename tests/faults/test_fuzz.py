@@ -100,7 +100,7 @@ def test_no_payload_on_any_key_brings_the_robot_down() -> None:
     station.push(MISSION)
 
     @settings(
-        max_examples=size(short=80, full=30_000),
+        max_examples=size(short=40, full=30_000),
         deadline=None,
         derandomize=True,
         database=None,

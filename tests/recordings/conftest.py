@@ -16,6 +16,7 @@ from stopgo.recordings.runs.field import FieldRecording
 from tests.faults.sizes import FULL
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world
+from tests.shared_folder import shared_folder
 
 with suppress(ModuleNotFoundError):
     import pandas  # noqa: F401  pyarrow loads it for the first drawing: here once, before workers are copied
@@ -37,39 +38,51 @@ def mission() -> Mission:
 
 @pytest.fixture(scope="session")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_plan(tmp_path_factory.mktemp("plan") / "plan.rrd")
+    written = shared_folder(tmp_path_factory, "plan", lambda folder: write_plan(folder / "plan.rrd"))
+    return written / "plan.rrd"
 
 
 @pytest.fixture(scope="session")
 def field(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
-    return write_field(tmp_path_factory.mktemp("field") / "field.rrd", mission)
+    written = shared_folder(
+        tmp_path_factory, "field", lambda folder: write_field(folder / "field.rrd", mission)
+    )
+    return written / "field.rrd"
 
 
 @pytest.fixture(scope="session")
 def revised(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
     """A run that takes revision 2 after its first stop."""
-    return write_revised(tmp_path_factory.mktemp("revised") / "field.rrd", mission)
+    written = shared_folder(
+        tmp_path_factory, "revised", lambda folder: write_revised(folder / "field.rrd", mission)
+    )
+    return written / "field.rrd"
 
 
 @pytest.fixture(scope="session")
 def sighted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A plan that carries what its stops see; 70 % is asked."""
-    path = tmp_path_factory.mktemp("sighted") / "plan.rrd"
-    recording = PlanRecording(world.MISSION_ID)
-    for noun in (*world.nouns_at(), planned()[1]):
-        recording.observe(noun)
-    recording.write(path)
-    return path
+    return shared_folder(tmp_path_factory, "sighted", write_sighted) / "plan.rrd"
 
 
 @pytest.fixture(scope="session")
 def skipping(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
     """A run that skips its second stop."""
-    path = tmp_path_factory.mktemp("skipping") / "field.rrd"
-    with FieldRecording(path, mission) as recording:
+    written = shared_folder(tmp_path_factory, "skipping", lambda folder: write_skipping(folder, mission))
+    return written / "field.rrd"
+
+
+def write_sighted(folder: Path) -> None:
+    recording = PlanRecording(world.MISSION_ID)
+    for noun in (*world.nouns_at(), planned()[1]):
+        recording.observe(noun)
+    recording.write(folder / "plan.rrd")
+
+
+def write_skipping(folder: Path, mission: Mission) -> None:
+    with FieldRecording(folder / "field.rrd", mission) as recording:
         for report in run.reports_with_a_skip(mission, "S2"):
             tell(recording, report)
-    return path
 
 
 def write_revised(path: Path, mission: Mission) -> Path:

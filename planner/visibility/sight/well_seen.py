@@ -13,7 +13,7 @@ Coordinates are whole grid steps from the position, within 2**30, and units are 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -51,7 +51,78 @@ def well_seen(stretches: SeenSegments, unit: IntArray, limits: ViewLimits) -> Bo
 def clipped(
     stretches: SeenSegments, low: IntArray, high: IntArray, limits: ViewLimits
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """The part within the limits of the runs of units low..high (n,): run, first and last unit."""
+    """The part within the limits of the runs of units low..high (n,): run, first and last unit.
+
+    Where no end of the part is near the middle of a unit, floating-point numbers decide.
+    """
+    pieces, clear = _by_formula(stretches, low, high, limits)
+    rest = np.flatnonzero(~clear)
+    run, first, last = _tested(stretches.among(rest), low[rest], high[rest], limits)
+    known = [np.where(clear, [begin, end], [[1], [0]]) for begin, end in pieces]
+    every = np.arange(len(low))
+    return _in_order(
+        np.concatenate([every, every, rest[run]]),
+        np.concatenate([known[0][0], known[1][0], first]),
+        np.concatenate([known[0][1], known[1][1], last]),
+    )
+
+
+CLEAR = 1e-6
+"""Relative difference above which floating-point numbers decide: their error is a thousandth of it."""
+
+
+def _by_formula(
+    stretches: SeenSegments, low: IntArray, high: IntArray, limits: ViewLimits
+) -> tuple[list[tuple[IntArray, IntArray]], BoolArray]:
+    """First and last unit of both pieces (n,) that `clipped` leaves, empty or not; and where these are clear.
+
+    The second piece is the one beyond the units that are too near.
+    """
+    length, away = _length_and_distance(stretches)
+    middle, scale, clear = _foot(stretches), stretches.units / length, length > 1.0
+    rise, near = round(limits.rise / GRID), float(round(limits.near / GRID))
+
+    def ends_of(squared_reach: Any) -> tuple[IntArray, IntArray]:
+        """The units low..high whose midpoints are within reach; what is not clear is noted."""
+        nonlocal clear
+        square = squared_reach - away**2
+        half = np.sqrt(np.maximum(square, 0.0)) * scale
+        slack = CLEAR * (1.0 + np.abs(middle) + half)
+        clear &= np.abs(square) > CLEAR * (np.abs(squared_reach) + away**2)
+        for edge in (middle - half, middle + half):
+            inside = (edge > low - 1 - slack) & (edge < high + 1 + slack)
+            clear &= (square < 0) | ~inside | (np.abs(edge - np.rint(edge)) > slack)
+        first = np.where(square < 0, high + 1, np.clip(np.ceil(middle - half), low, high + 1))
+        last = np.where(square < 0, high, np.clip(np.floor(middle + half), low - 1, high))
+        return first.astype(np.int64), last.astype(np.int64)
+
+    first, last = low, high
+    for reach in _squared_reaches(away, rise, limits):
+        begin, end = ends_of(reach)
+        first, last = np.maximum(first, begin), np.minimum(last, end)
+    begin, end = ends_of(near**2)
+    none = begin > end
+    return [
+        (first, np.where(none, last, np.minimum(last, begin - 1))),
+        (np.where(none, last + 1, np.maximum(first, end + 1)), last),
+    ], clear
+
+
+def _squared_reaches(away: FloatArray, rise: int, limits: ViewLimits) -> Iterator[FloatArray]:
+    """Squared distances up to which points of a line are neither too flat nor too sparse (n,).
+
+    The line is so far away (n,), all in grid steps.
+    """
+    if limits.max_incidence is not None:
+        yield (away / math.cos(limits.max_incidence)) ** 2 - float(rise) ** 2
+    if limits.farthest_per_height is not None:
+        yield limits.farthest_per_height / GRID * away - float(rise) ** 2
+
+
+def _tested(
+    stretches: SeenSegments, low: IntArray, high: IntArray, limits: ViewLimits
+) -> tuple[IntArray, IntArray, IntArray]:
+    """`clipped` by tests of single midpoints."""
     middle, half = _round_the_foot(stretches, limits)
     nearest = np.clip(np.rint(middle), low, high).astype(np.int64)
     nearest = _first_that(
@@ -108,11 +179,18 @@ def _without_near(
     for limit, ends, sign in ((low, begin, -1), (high, end, 1)):
         guess = (middle + sign * half)[some]
         ends[some] = _end_of(lambda u: _too_near(within, u, limits), nearest[some], limit[some], guess)
-    runs = np.concatenate([run, run])
-    first, last = np.concatenate([low, end + 1]), np.concatenate([begin - 1, np.where(hole, high, end)])
-    order = np.lexsort((first, runs))
-    order = order[first[order] <= last[order]]
-    return runs[order], first[order], last[order]
+    return _in_order(
+        np.concatenate([run, run]),
+        np.concatenate([low, end + 1]),
+        np.concatenate([begin - 1, np.where(hole, high, end)]),
+    )
+
+
+def _in_order(run: IntArray, first: IntArray, last: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """The pieces of runs that have units, by run and by their first unit."""
+    some = np.flatnonzero(first <= last)
+    order = some[np.lexsort((first[some], run[some]))]
+    return run[order], first[order], last[order]
 
 
 def _foot(stretches: SeenSegments) -> FloatArray:
@@ -141,14 +219,11 @@ def _area(stretches: SeenSegments) -> IntArray:
 
 def _round_the_foot(stretches: SeenSegments, limits: ViewLimits) -> tuple[FloatArray, FloatArray]:
     """The foot, and the number of units on either side of it that are neither too flat nor too sparse."""
-    length, away = _length_and_distance(stretches)
-    rise = limits.rise / GRID
-    half = np.full(len(length), np.inf)
-    if limits.max_incidence is not None:
-        half = _units_within(stretches, (away / math.cos(limits.max_incidence)) ** 2 - rise**2)
-    if limits.farthest_per_height is not None:
-        half = np.minimum(half, _units_within(stretches, limits.farthest_per_height / GRID * away - rise**2))
-    return _foot(stretches), np.minimum(half, 1e15)
+    _, away = _length_and_distance(stretches)
+    half = np.full(len(away), 1e15)
+    for reach in _squared_reaches(away, round(limits.rise / GRID), limits):
+        half = np.minimum(half, _units_within(stretches, reach))
+    return _foot(stretches), half
 
 
 @dataclass(frozen=True)

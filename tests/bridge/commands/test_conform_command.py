@@ -26,7 +26,9 @@ def test_a_robot_with_keys_meets_what_can_be_tried_at_rest(tmp_path: Path) -> No
     listen = f"tls/127.0.0.1:{free_port()}"
     with robot_process("r1", tmp_path / "s", listen=listen, extra=["--keys", str(site / "r1")]) as endpoint:
         reach = ("--robot", "r1", "--connect", endpoint, "--keys", str(site / "alice"))
-        done = stopgo("conform", "robot", *reach, "--other-keys", str(site / "bob"), "--json")
+        done = stopgo(
+            "conform", "robot", *reach, "--other-keys", str(site / "bob"), "--timeout", "60", "--json"
+        )
         told = json.loads(done.stdout)
         assert done.returncode == 3, [one for one in told["requirements"] if one["outcome"] == "failed"]
         assert told["counts"]["failed"] == 0

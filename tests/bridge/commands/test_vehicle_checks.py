@@ -23,6 +23,8 @@ from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.autopilots.px4 import PX4
 from tests.ports import free_port
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 INDOORS = {
     "GPS1_TYPE": 0.0, "VISO_TYPE": 1.0, "AHRS_EKF_TYPE": 3.0, "EK3_ENABLE": 1.0, "EK3_SRC1_POSXY": 6.0,
     "EK3_SRC1_VELXY": 6.0, "EK3_SRC1_YAW": 6.0, "WP_RADIUS": 0.05, "MIS_RESTART": 0.0,

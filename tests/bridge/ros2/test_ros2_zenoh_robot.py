@@ -153,12 +153,14 @@ class Place:
         self.await_(lambda: self.said.get("state") == "HELD")
         return self.said["reason"]
 
-    def guard_has_ended(self) -> None:
-        """Wait until a guard has stopped the robot: until then it cancels every goal."""
-        zeros = -1
-        while zeros != self.robot.zeros:
-            zeros = self.robot.zeros
-            time.sleep(1.0)
+    @staticmethod
+    def guard_has_ended(agent: subprocess.Popen[str]) -> None:
+        """Wait until the guard of a killed program, which writes where it wrote, has ended.
+
+        Until then it cancels every goal.
+        """
+        assert agent.stdout is not None
+        agent.stdout.read()
 
     def finished(self, stops: int) -> None:
         state = self.until(lambda state: state.get("state") in ("FINISHED", "HELD"))
@@ -243,7 +245,7 @@ def test_a_killed_program_is_stopped_by_its_guard_and_takes_up_its_run(tmp_path:
         at = place.robot.x
         assert at < 1.9
         place.await_(lambda: place.robot.zeros > 0 and place.robot.speed == 0.0)
-        place.guard_has_ended()
+        place.guard_has_ended(agent)
         place.agent()
         assert place.until(lambda state: "state" in state)["state"] == "PAUSED"
         assert place.stopgo("resume").returncode == 0

@@ -14,6 +14,8 @@ from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import Started
 from tests.bridge.world import Field, corridor
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 READS: dict[str, Callable[[Station], object]] = {
     "log": lambda station: station.log(),
     "record": lambda station: list(read_run(station.link, station.keys, "run", patience_s=0.0)),

@@ -56,6 +56,8 @@ from stopgo.mission.run.events import (
 from tests.bridge.world import Field, corridor
 from tests.disk import small_disk
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 
 def test_the_time_left_at_the_start_is_the_plan() -> None:
     field = Field()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,7 +20,6 @@ from stopgo.mission.files.room_labels import (
 from stopgo.mission.geometry import FloatArray
 
 ROOM = np.array([[0, 0], [1, 0], [1, 1], [0.6, 1], [0.5, 0.7], [0, 1]])
-NINE = np.array(list(product((-1, 0, 1), repeat=2)))
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0, 10, 400]), st.integers(0, 3), st.booleans())
@@ -51,7 +48,7 @@ def _costs(tried: FloatArray, half: FloatArray, places: LabelPlaces) -> tuple[Fl
     weight = np.concatenate([busy, np.full(len(labels), LABEL)])
     near = ((xy > -half) & (xy < places.high + half)).all(axis=1)
     under = (np.abs(tried[:, None] - xy) < half + AROUND).all(axis=2) & near
-    corners = tried[:, None] + half * NINE
-    within = [inside(point[:1], point[1:], places.rings)[0, 0] for point in corners.reshape(-1, 2)]
-    outside = 9 - np.reshape(within, (-1, 9)).sum(axis=1)
+    x, y = (np.unique(of)[:, None] + by * np.arange(-1, 2) for of, by in zip(tried.T, half, strict=True))
+    within = inside(x.ravel(), y.ravel(), places.rings).reshape(len(y), 3, len(x), 3)
+    outside = 9 - within.sum(axis=(1, 3)).ravel()
     return under @ (weight * (weight != WAY)) + OUTSIDE * outside, under @ (weight * (weight == WAY))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -13,8 +12,9 @@ from stopgo.mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.recognise import recognise
 from stopgo.mission.mavlink.recognised_tour import recognised_tour
+from tests.mission.mavlink.rover_log import OF_ROVER_LOG, logged
 
-LOG = Path(__file__).parents[3].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
+pytestmark = OF_ROVER_LOG
 # Where the log's ORGN message says that the vehicle's origin is.
 ORIGIN = SiteOrigin(lat=47.3977, lon=8.5456, alt=488.0, heading_deg=0.0)
 CORNERS = [(3.0, 0.0), (3.0, 3.0), (6.0, 3.0), (6.0, 0.0), (9.0, 0.0)]
@@ -23,14 +23,7 @@ CORNERS = [(3.0, 0.0), (3.0, 3.0), (6.0, 3.0), (6.0, 0.0), (9.0, 0.0)]
 @pytest.fixture(scope="module")
 def kept() -> list[Item]:
     """The 15 items that the vehicle logged when it was armed, home left out."""
-    if not LOG.exists():
-        pytest.skip(f"{LOG} is not here")
-    from pymavlink import DFReader
-
-    log = DFReader.DFReader_binary(str(LOG))
-    items: dict[int, Item] = {}
-    while (message := log.recv_match(type=["CMD"])) is not None:
-        items[message.CNum] = _item(message)
+    items = {message.CNum: _item(message) for message in logged("CMD")}
     return [items[number] for number in sorted(items) if number > 0]
 
 

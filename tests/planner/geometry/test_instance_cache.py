@@ -9,6 +9,7 @@ from dataclasses import replace
 import shapely
 
 from stopgo.mission.settings import Settings
+from stopgo.planner.geometry.instance_cache import taken
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
 from stopgo.planner.space.navigable import navigable
@@ -48,3 +49,10 @@ def test_no_module_keeps_nouns_alive() -> None:
     nouns = [name for name in MODULES if not name.startswith("stopgo.bridge.")]
     keeping = [name for name in nouns if "lru_cache" in MODULES[name].read_text(encoding="utf-8")]
     assert not keeping
+
+
+def test_what_is_taken_is_forgotten() -> None:
+    space = navigable(two_rooms(0.9), Settings())
+    kept = drive_area_of(space)
+    assert taken(drive_area_of, space) is kept
+    assert drive_area_of(space) is not kept

@@ -21,7 +21,13 @@ from tests.waiting import wait_until
 
 @pytest.fixture(autouse=True)
 def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run with two cores, and without the threads that other tests have left behind."""
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
+    running = threading.enumerate
+    left_behind = {*running()} - {threading.main_thread()}
+    monkeypatch.setattr(
+        threading, "enumerate", lambda: [thread for thread in running() if thread not in left_behind]
+    )
 
 
 def _noted(place: Path) -> str:
@@ -86,12 +92,13 @@ def test_a_process_with_other_threads_is_not_forked(tmp_path: Path) -> None:
     assert _workers(tmp_path / "workers") == [os.getpid()]
 
 
-def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("fov", [360.0, 270.0])
+def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatch, fov: float) -> None:
     plans = []
     for many in (0, 10**9):
         monkeypatch.setattr(pipeline, "MANY", many)
         monkeypatch.setattr(navigable, "MANY", many)
-        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False)))
+        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False, fov=fov)))
     forked, alone = plans
     assert forked.figures == alone.figures
     assert forked.mission == alone.mission

@@ -96,7 +96,7 @@ def test_an_accuracy_that_holds_already_costs_nothing() -> None:
 
 
 def test_an_accuracy_that_cannot_be_reached_is_reported_with_a_position_for_a_control_point() -> None:
-    part = made(accuracy=0.01, grid=1.0)
+    part = made(accuracy=0.01, grid=2.0)
     report = PlanReport(part, {}, {})
     (told,) = [item for item in report.figures.grave if item.code == "accuracy_not_met"]
     assert "with 0.01 mm required" in told.message

@@ -147,7 +147,7 @@ def test_links_are_the_same_in_numpy_as_written_and_compiled(
     share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On the sample office, where thousands of pairs lie on both sides of each limit."""
-    found = candidates(navigable(read_floor(SAMPLE), Settings(overlap=share, grid=1.0)))
+    found = candidates(navigable(read_floor(SAMPLE), Settings(overlap=share, grid=1.5)))
     fast = links_of(found)
     pairs = [
         links_by_kernel(kernel, overlaps_of(found), found.settings)

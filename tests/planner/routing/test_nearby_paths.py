@@ -74,6 +74,15 @@ def test_lengths_and_paths_asked_for_are_the_shortest(seed: int) -> None:
         assert shapely.equals_exact(*map(shapely.LineString, (near.path(a, b), paths.path(a, b))), 1e-6)
 
 
+def test_upper_bounds_come_in_any_order_of_the_points() -> None:
+    near, _ = both(3)
+    near.learn(np.array([(5, 40), (40, 6)]))
+    order, matrix = np.random.default_rng(3).permutation(60), np.zeros((61, 61))
+    found = near.at_most(order, out=matrix[:60, :60])
+    assert np.array_equal(found, near.at_most()[np.ix_(order, order)])
+    assert np.array_equal(found, matrix[:60, :60])
+
+
 def test_the_nearest_points_are_found_by_both_forms_of_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
     assert machine_code(reach) is not reach
     fast, paths = both(1)

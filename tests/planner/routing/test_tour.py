@@ -48,6 +48,14 @@ def test_a_tour_visits_every_point_once_from_the_first_in_one_direction(n: int, 
     assert n < 3 or order[1] < order[-1]
 
 
+def test_nanometres_may_take_the_memory_of_the_lengths() -> None:
+    lengths = scattered(300, 4)
+    expected = nanometres(lengths)
+    found = nanometres(lengths, in_place=True)
+    assert np.array_equal(found, expected)
+    assert np.shares_memory(found, lengths)
+
+
 @pytest.mark.parametrize("n", [4, 5, 6, 7, 8])
 @pytest.mark.parametrize("lengths", [scattered, any_lengths])
 def test_comparing_subsets_finds_the_shortest_of_all_tours(n: int, lengths) -> None:

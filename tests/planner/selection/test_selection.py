@@ -17,6 +17,7 @@ from stopgo.planner.selection import METHODS, bound, bound_by_parts
 from stopgo.planner.selection.bound import (
     coarse_bound,
     counting_bound,
+    early_bound,
     first_bound,
     lower_bound,
     relaxation_bound,
@@ -120,16 +121,32 @@ def test_the_first_bound_of_a_large_problem_is_nearly_that_of_its_relaxation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Some 800 entries are large here, and groups of three columns are solved as one."""
-    monkeypatch.setattr(bound, "QUICK", 500)
+    monkeypatch.setattr(bound, "FEW", 60)
     monkeypatch.setattr(bound, "COARSE", 300)
     covers = [cover_of_rooms(seed, rows=60, columns=200, rooms=12) for seed in range(4)]
     steps = []
     for cover in covers:
         found = len(greedy(cover))
-        quick, few = lower_bound(cover, found=found, quickly=True), first_bound(cover, found=found)
+        quick, few = early_bound(cover, found=found), first_bound(cover, found=found)
         assert few <= quick <= relaxation_bound(cover) <= quick + 1
         steps.append(quick - few)
     assert sum(steps) > 0  # of the relaxation: else the few steps alone would do
+
+
+def test_rows_that_the_coarse_relaxation_proves_need_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    cover = cover_of_rooms(1, rows=60, columns=200, rooms=12)
+    monkeypatch.setattr(bound, "COARSE", 300)
+    monkeypatch.setattr(bound, "relaxation_bound", lambda cover: pytest.fail("was not needed"))
+    proved = coarse_bound(cover)
+    assert counting_bound(cover) < proved == lower_bound(cover, found=proved)
+    assert proved == early_bound(cover, found=proved + 1)
+
+
+def test_a_search_for_many_rows_begins_with_the_bound_by_counting(monkeypatch: pytest.MonkeyPatch) -> None:
+    cover = cover_of_rooms(1, rows=60, columns=200, rooms=12)
+    found = len(greedy(cover))
+    monkeypatch.setattr(bound, "FEW", found - 1)
+    assert early_bound(cover, found=found) == counting_bound(cover) < lower_bound(cover, found=found)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -224,10 +241,10 @@ def test_one_stop_in_the_middle_of_a_small_hall_is_enough() -> None:
 def test_the_bound_by_parts_is_nearly_that_of_the_relaxation(
     views: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Parts of a twentieth; also where every column needs two views."""
-    once = cover_of_rooms(3, rows=150, columns=450, rooms=20)
+    """Parts of a sixteenth; also where every column needs two views."""
+    once = cover_of_rooms(3, rows=120, columns=360, rooms=16)
     cover = replace(once, views=views)
-    monkeypatch.setattr(bound_by_parts, "SIZE", cover.sees.nnz // 20)
+    monkeypatch.setattr(bound_by_parts, "SIZE", cover.sees.nnz // 16)
     best = relaxation_bound(cover)
     found = bound_by_parts.bound_by_parts(cover, found=2 * best)
     assert best - 1 <= found <= best

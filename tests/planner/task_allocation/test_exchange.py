@@ -23,11 +23,12 @@ class StraightDrives:
         xy = np.concatenate([np.random.default_rng(seed).uniform(0, 60, (stops, 2)), [(0.0, 0.0)]])
         self.stops, self.timed = stops, 0
         self.least = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
+        self._rows = self.least.tolist()
 
     def seconds(self, tour: Tour, start: int = 0) -> float:
         self.timed += 1
         line = (self.stops, *tour, self.stops)
-        return len(tour) * self.pause_s + float(sum(self.least[a, b] for a, b in pairwise(line)))
+        return len(tour) * self.pause_s + sum(self._rows[a][b] for a, b in pairwise(line))
 
     def seconds_of(self, tours: Sequence[Tour], start: int = 0) -> FloatArray:
         return np.array([self.seconds(tour, start) for tour in tours])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,9 @@ from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.replay.uploaded import mission_in
+from tests.mission.mavlink.rover_log import KINDS, LOG, OF_ROVER_LOG, logged
 
-LOG = Path(__file__).parents[4] / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
-pytestmark = pytest.mark.skipif(not LOG.is_file(), reason="../shared/data/logs is not here")
+pytestmark = OF_ROVER_LOG
 M_PER_STEP = 0.011131884502145034
 SCAN, WAYPOINT, DELAY = 217, 16, 93
 
@@ -25,13 +24,7 @@ SCAN, WAYPOINT, DELAY = 217, 16, 93
 @pytest.fixture(scope="module")
 def messages() -> dict[str, list[Any]]:
     """By name, as pymavlink's own reader gives them."""
-    from pymavlink.DFReader import DFReader_binary
-
-    reader = DFReader_binary(str(LOG))
-    found: dict[str, list[Any]] = {name: [] for name in ("CMD", "MISE", "SIM", "XKF1", "ORGN", "MSG")}
-    while (message := reader.recv_match(type=list(found))) is not None:
-        found[message.get_type()].append(message)
-    return found
+    return {name: logged(name) for name in KINDS}
 
 
 @pytest.fixture(scope="module")

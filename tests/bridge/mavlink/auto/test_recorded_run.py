@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -26,9 +25,10 @@ from stopgo.mission.mavlink.recognise import recognise
 from stopgo.mission.run.events import AnyEvent, Arrived, Failed
 from stopgo.mission.run.states import started
 from tests.mission.mavlink.following.worlds import told
+from tests.mission.mavlink.rover_log import OF_ROVER_LOG, logged
 from tests.mission.worlds import mission_of, stop
 
-LOG = Path(__file__).parents[4].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
+pytestmark = OF_ROVER_LOG
 ORIGIN = SiteOrigin(lat=47.3977, lon=8.5456, alt=488.0, heading_deg=0.0)
 CORNERS = ((3.0, 0.0), (3.0, 3.0), (6.0, 3.0), (6.0, 0.0), (9.0, 0.0))
 COMPARED_EVERY_US = 200_000
@@ -47,12 +47,7 @@ class NoHands:
 
 @pytest.fixture(scope="module")
 def log() -> list[Any]:
-    if not LOG.exists():
-        pytest.skip(f"{LOG} is not here")
-    from pymavlink import DFReader
-
-    reader = DFReader.DFReader_binary(str(LOG))
-    return list(iter(lambda: reader.recv_match(type=["CMD", "MISE", "XKF1", "MSG"]), None))
+    return logged("CMD", "MISE", "XKF1", "MSG")
 
 
 def mission(tolerance_m: float) -> Mission:
