@@ -31,7 +31,7 @@ from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, overlaps_of
 from stopgo.planner.scan_simulation import registration
-from stopgo.planner.scan_simulation.casting import SolidScene, distances
+from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE
 from stopgo.planner.scan_simulation.scanning import CLOUD_DEG, SPARSE_M
 from stopgo.planner.scan_simulation.verification import _ScanSite as ScanSite
@@ -135,7 +135,7 @@ def _hits(
     met = scene.cast(towards[:, None])[:, 0]
     hit = met != NONE
     far, normal = np.full(len(towards), np.inf), np.zeros(towards.shape)
-    far[hit] = distances(site.solids, position, met[hit], towards[hit])
+    far[hit] = scene.distances(met[hit], towards[hit])
     normal[hit] = site.solids.normal[met[hit]]
     return towards, far, normal
 

@@ -140,7 +140,7 @@ def recording_process() -> Iterator[RecordingProcess]:
 def serve() -> None:
     """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
     look_seldom()
-    _leave_pandas_out()
+    leave_pandas_out()
     load_when_used(SPARED_OF_RERUN)
     asked, answers = sys.stdin.buffer, sys.stdout.buffer
     sys.stdout = sys.stderr
@@ -180,7 +180,7 @@ class _WithoutPandas:
             raise ModuleNotFoundError(name=name)
 
 
-def _leave_pandas_out() -> None:
+def leave_pandas_out() -> None:
     """Spare this process pandas, 0.2 s, which pyarrow loads to ask of each array whether it is a series."""
     sys.meta_path.insert(0, _WithoutPandas())
 

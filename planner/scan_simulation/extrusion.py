@@ -61,6 +61,17 @@ class ExtrudedFloor:
         across = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         return frozen(across / np.linalg.norm(across, axis=1, keepdims=True))
 
+    @cached_property
+    def level_edges(self) -> FloatArray:
+        """Edges of the level triangles, each once (k, 2, 3)."""
+        level = self.corners[2 * len(self.a) :]
+        edges = np.stack([level, np.roll(level, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+        turned = (edges[:, 0, 0] > edges[:, 1, 0]) | (
+            (edges[:, 0, 0] == edges[:, 1, 0]) & (edges[:, 0, 1] > edges[:, 1, 1])
+        )
+        ordered = np.where(turned[:, None, None], edges[:, ::-1], edges)
+        return frozen(np.unique(ordered.reshape(-1, 6), axis=0).reshape(-1, 2, 3))
+
 
 class _Upright(NamedTuple):
     a: FloatArray

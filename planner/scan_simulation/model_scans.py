@@ -151,7 +151,7 @@ def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulati
 
 def _widths(strips: Strips, cell: IntArray) -> FloatArray:
     """Widths of cells along the floor (n,): those of their units, whose first cells are as high as any."""
-    unit = strips.unit_of_cell[cell]
+    unit = strips.units_of(cell)
     width: FloatArray = strips.area[strips.first_cell[unit]] / np.minimum(strips.tall[unit], CELL_M)
     return width
 

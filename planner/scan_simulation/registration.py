@@ -8,22 +8,28 @@ software does. Otherwise the two sides of a wall would be matched with each othe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from stopgo.mission.geometry import BoolArray, FloatArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import ScanPair, Simulation, within_tolerance
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.scan_simulation.near_kernel import ALONG_X, ALONG_Y, SHIFT, mark_near
 
 VOXEL_M = 0.075
 """Clouds are thinned to a point per cube of this size."""
 NEIGHBOURS = 15
 TURNED_M = 0.5
 """Distance in metres that counts as much as one radian between two surface normals."""
+PER_METRE = 5.0
+"""Along 1 m, number of the cubes in which points near others are looked up; any gives the same."""
+REPEATED = 16
+"""Buckets repeated behind the last, so that cubes above one another lie in one row; few of these are near."""
 SAME_M = 0.1
 """Largest distance between points of the same surface under the true poses."""
 STAGES = ((0.15, 0.1), (0.1, 0.05))
@@ -62,6 +68,43 @@ GLOBAL_ERROR_M = 0.25
 
 
 @dataclass(frozen=True, eq=False)
+class Buckets:
+    """Points with six coordinates in the order of their cubes' buckets."""
+
+    points: FloatArray
+    """(n + r, 6); those of the first REPEATED buckets come again behind the last."""
+    first: IntArray
+    """First point of each bucket, and their end."""
+    order: IntArray
+    """Number of each point (n + r,)."""
+
+    @classmethod
+    def of(cls, points: FloatArray) -> Buckets:
+        """The buckets of points (n, 6); eight and more for each point, so that few share one."""
+        count = 1 << len(points).bit_length() + 3
+        x, y, z = (points[:, :3] * PER_METRE + SHIFT).astype(np.int64).T
+        bucket = (x * ALONG_X + y * ALONG_Y + z) % count
+        order = np.argsort(bucket, kind="stable")
+        order = np.append(order, order[bucket[order] < REPEATED])
+        bucket = bucket[order]
+        bucket[len(points) :] += count
+        first = np.searchsorted(bucket, np.arange(count + REPEATED + 1))
+        return cls(frozen(points[order]), frozen(first, np.int32), frozen(order, np.int64))
+
+    def near(
+        self, kernel: Callable[..., None], queries: FloatArray, within: float
+    ) -> tuple[BoolArray, BoolArray]:
+        """True for points and queries (m, 6) nearer than `within` to one another, by `mark_near`."""
+        mask, count = len(self.first) - REPEATED - 2, len(queries)
+        query_near, point_near = np.zeros(count, np.int8), np.zeros(len(self.order), np.int8)
+        flat = np.ascontiguousarray(queries).ravel()
+        kernel(self.points.ravel(), self.first, mask, PER_METRE, flat, within, query_near, point_near)
+        points = np.zeros(self.order.max(initial=-1) + 1, dtype=bool)
+        points[self.order[point_near > 0]] = True
+        return frozen(points, np.bool_), frozen(query_near, np.bool_)
+
+
+@dataclass(frozen=True, eq=False)
 class OrientedCloud:
     """A thinned cloud with its surface normals, in its scanner's frame."""
 
@@ -75,6 +118,10 @@ class OrientedCloud:
         return cKDTree(self._both(np.eye(4)))
 
     @cached_property
+    def buckets(self) -> Buckets:
+        return Buckets.of(self._both(np.eye(4)))
+
+    @cached_property
     def upright(self) -> BoolArray:
         return frozen(np.abs(self.normals[:, 2]) < UPRIGHT, np.bool_)
 
@@ -85,9 +132,20 @@ class OrientedCloud:
 
     def near(self, other: OrientedCloud, there: FloatArray, within: float) -> BoolArray:
         """True for points of `other` that lie on surfaces of this cloud, at the pose `there` (4, 4)."""
-        distance, _ = self.tree.query(other._both(there), distance_upper_bound=within)
-        found: BoolArray = np.isfinite(distance)
-        return found
+        return self.near_each_other(other, there, within)[1]
+
+    def near_each_other(
+        self, other: OrientedCloud, there: FloatArray, within: float
+    ) -> tuple[BoolArray, BoolArray]:
+        """True for points of this cloud and of `other`, at the pose `there`, on surfaces of one another."""
+        kernel = compiled(mark_near, large=False)
+        if kernel is not None:
+            return self.buckets.near(kernel, other._both(there), within)
+        masks = []
+        for cloud, one, pose in ((other, self, frozen(np.linalg.inv(there))), (self, other, there)):
+            distance, _ = cloud.tree.query(one._both(pose), distance_upper_bound=within)
+            masks.append(frozen(np.isfinite(distance), np.bool_))
+        return masks[0], masks[1]
 
     def _both(self, there: FloatArray) -> FloatArray:
         turn = there[:3, :3].T
@@ -133,9 +191,10 @@ def registered(
 ) -> Iterator[Registered]:
     """Register every pair of scans with shared surfaces; `positions` (n, 3) are the scanner's."""
     for i in range(len(names)):
+        one = replace(surfaces[i])  # what is looked up in it goes with it
         for j in range(i + 1, len(names)):
             if math.dist(positions[i], positions[j]) < 2 * simulation.joining_m:
-                two = _CloudPair(surfaces[i], surfaces[j], _shift(positions[j] - positions[i]))
+                two = _CloudPair(one, surfaces[j], _shift(positions[j] - positions[i]))
                 if two.meets and two.shared_points >= LEAST_POINTS:
                     starts = _starts(two, simulation, (i, j))
                     yield _registered((names[i], names[j]), two, starts, simulation)
@@ -148,11 +207,13 @@ class _CloudPair:
     one: OrientedCloud
     other: OrientedCloud
     truth: FloatArray
+    prepared: dict[tuple[bool, bytes], tuple[Any, Any]] = field(default_factory=dict)
+    """Clouds prepared so far, by their masks: many starts come to the same points."""
 
     @cached_property
     def shared(self) -> tuple[BoolArray, BoolArray]:
         """True for upright points of each cloud that lie on surfaces of the other."""
-        one, other = _shared(self.one, self.other, self.truth, SAME_M)
+        one, other = self.one.near_each_other(self.other, self.truth, SAME_M)
         return one & self.one.upright, other & self.other.upright
 
     @property
@@ -225,17 +286,23 @@ class _CloudPair:
         import small_gicp
 
         for within, matched in stages:
-            one, other = _shared(self.one, self.other, there, within)
+            one, other = self.one.near_each_other(self.other, there, within)
             if min(one.sum(), other.sum()) <= NEIGHBOURS:
                 return there
-            target, tree = _prepared(self.one.points[one])
-            source, _ = _prepared(self.other.points[other])
+            target, tree = self._prepared(self.one, one)
+            source, _ = self._prepared(self.other, other)
             there = small_gicp.align(
                 target, source, tree, there,
                 max_correspondence_distance=matched, num_threads=1, max_iterations=MOST_ITERATIONS,
                 rotation_epsilon=FINE, translation_epsilon=FINE,
             ).T_target_source  # fmt: skip
         return there
+
+    def _prepared(self, cloud: OrientedCloud, mask: BoolArray) -> tuple[Any, Any]:
+        key = (cloud is self.one, mask.tobytes())
+        if key not in self.prepared:
+            self.prepared[key] = _prepared(cloud.points[mask])
+        return self.prepared[key]
 
     def error(self, there: FloatArray) -> tuple[float, float]:
         """Error of a pose, metres and degrees."""
@@ -298,13 +365,6 @@ def _without_pose(one: FloatArray, other: FloatArray, *, turn: float) -> FloatAr
     there = np.eye(4)
     there[:3, :3], there[:3, 3] = found.rotation, np.ravel(found.translation)
     return there @ away
-
-
-def _shared(
-    one: OrientedCloud, other: OrientedCloud, there: FloatArray, within: float
-) -> tuple[BoolArray, BoolArray]:
-    """True for points of each cloud on surfaces of the other, whose pose in the first is `there`."""
-    return other.near(one, frozen(np.linalg.inv(there)), within), one.near(other, there, within)
 
 
 def _prepared(points: FloatArray) -> tuple[Any, Any]:

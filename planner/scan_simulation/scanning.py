@@ -10,8 +10,9 @@ import numpy as np
 from stopgo.mission.document import Stop
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation
-from stopgo.planner.scan_simulation.casting import Hits, RayFan, SolidScene, distances
+from stopgo.planner.scan_simulation.casting import Hits, RayFan, RayRuns, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor
+from stopgo.planner.scan_simulation.ray_runs import ranges
 from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 CLOUD_DEG = 0.4
@@ -52,29 +53,27 @@ class ScanCount:
     """Some of the points, relative to the scanner, with noise (n, 3)."""
 
 
-def scanned(solids: ExtrudedFloor, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:
+def scene_at(solids: ExtrudedFloor, pose: ScannerPose, *, see_through: bool = False) -> SolidScene:
+    """The solids around a scanner; `see_through` ones too if asked for."""
+    return SolidScene(solids, pose.position, see_through=see_through, open_door=pose.open_door)
+
+
+def scanned(scene: SolidScene, strips: Strips, pose: ScannerPose, simulation: Simulation) -> ScanCount:
     """Simulate one scan, block by block; the same seed gives the same noise."""
-    random = np.random.default_rng([simulation.seed, pose.number])
-    scene = SolidScene(solids, pose.position, see_through=False, open_door=pose.open_door)
-    more = (
-        SolidScene(solids, pose.position, see_through=True, open_door=pose.open_door)
-        if solids.passed.any()
-        else None
-    )
-    counts = _CellCounts(solids, strips, pose.position, simulation)
+    random, solids = np.random.default_rng([simulation.seed, pose.number]), scene.solids
+    more = scene_at(solids, pose, see_through=True) if solids.passed.any() else None
+    counts = _CellCounts(strips, scene, simulation)
     fan = RayFan.of(simulation, pose.heading)
     every = max(1, round(CLOUD_DEG / simulation.step_deg))
     cloud = []
     for block in fan.blocks():
-        directions = fan.directions(block)
-        met = scene.cast(directions)
-        counts.take(met, fan, block, directions)
+        runs = scene.runs(fan, block)
+        counts.take(runs)
         if more is not None:
-            beyond = more.cast(directions)
-            counts.take(np.where(_passed(solids, beyond), beyond, NONE), fan, block, directions)
-        kept = _in_cloud(solids, pose.position, met, directions, -block.start % every, every)
-        cloud.append(_points(solids, pose.position, met[kept], directions[kept], simulation, random))
-    cell = np.flatnonzero(counts.points)
+            beyond = more.runs(fan, block)
+            counts.take(beyond._replace(met=np.where(_passed(solids, beyond.met), beyond.met, NONE)))
+        cloud.append(_cloud(scene, runs, every, simulation, random))
+    cell = np.flatnonzero(counts.hit)
     towards = strips.middle[cell] - pose.position
     return ScanCount(
         cell=frozen(cell, np.int64),
@@ -91,20 +90,30 @@ def _passed(solids: ExtrudedFloor, met: Hits) -> Hits:
     return np.append(solids.passed, False)[met]
 
 
-def _in_cloud(
-    solids: ExtrudedFloor, position: FloatArray, met: Hits, directions: FloatArray, first: int, every: int
-) -> BoolArray:
-    """True for rays (columns, rows) kept in the cloud: few where points are dense, else all.
-
-    `first` is the first of the columns always kept, one of `every`.
-    """
-    few, towards = met[first::every, ::every], directions[first::every, ::every]
-    hit = few != NONE
-    far = distances(solids, position, few[hit], towards[hit])
-    slope = np.abs(np.einsum("ij,ij->i", towards[hit], solids.normal[few[hit]]))
-    sparse = np.zeros(few.shape, dtype=bool)
-    sparse[hit] = is_sparse(far, slope)
-    return spread(sparse, met.shape, first, every)
+def _cloud(
+    scene: SolidScene,
+    runs: RayRuns,
+    every: int,
+    simulation: Simulation,
+    random: np.random.Generator,
+) -> FloatArray:
+    """Measured ends of a block's rays, relative to the scanner (n, 3): few where dense enough, else all."""
+    met, first = runs.hits, -runs.block.start % every
+    few = met.reshape(runs.shape)[first::every, ::every]
+    sparse, hit = np.zeros(few.shape, dtype=bool), few != NONE
+    column, row = (every * part for part in np.nonzero(hit))
+    towards, few_met = runs.towards((column + first) * runs.shape[1] + row), few[hit]
+    far = scene.distances(few_met, towards)
+    sparse[hit] = is_sparse(far, np.abs(np.einsum("ij,ij->i", towards, scene.solids.normal[few_met])))
+    kept = np.flatnonzero(spread(sparse, runs.shape, first, every).ravel() & (met != NONE))
+    towards = runs.towards(kept)
+    far = scene.distances(met[kept], towards)
+    if not far.max(initial=0.0) * (1 + 1e-9) < simulation.joining_m:  # along the floor it is no farther
+        near = _within(far, towards, simulation.joining_m, slant=simulation.slant)
+        far, towards = far[near], towards[near]
+    far += random.normal(0.0, simulation.noise_m, len(far))
+    found: FloatArray = far[:, None] * towards
+    return found
 
 
 def is_sparse(far: FloatArray, slope: FloatArray) -> BoolArray:
@@ -121,23 +130,6 @@ def spread(sparse: BoolArray, shape: tuple[int, ...], first: int, every: int) ->
         kept[:] = sparse[np.maximum(columns - first, 0) // every][:, rows // every]
         kept[first::every, ::every] = True
     return kept
-
-
-def _points(
-    solids: ExtrudedFloor,
-    position: FloatArray,
-    met: IntArray,
-    directions: FloatArray,
-    simulation: Simulation,
-    random: np.random.Generator,
-) -> FloatArray:
-    """Measured ends of rays, relative to the scanner (n, 3)."""
-    hit = met != NONE
-    far = distances(solids, position, met[hit], directions[hit])
-    near = _within(far, directions[hit], simulation.joining_m, slant=simulation.slant)
-    far = far[near] + random.normal(0.0, simulation.noise_m, int(near.sum()))
-    found: FloatArray = far[:, None] * directions[hit][near]
-    return found
 
 
 def _within(far: FloatArray, directions: FloatArray, reach: float, *, slant: bool) -> BoolArray:
@@ -162,10 +154,9 @@ class _CellCounts:
     once, and the number of rays on each cell follows from the elevations of the cell's edges.
     """
 
-    def __init__(
-        self, solids: ExtrudedFloor, strips: Strips, position: FloatArray, simulation: Simulation
-    ) -> None:
-        self._solids, self._strips, self._position = solids, strips, position
+    def __init__(self, strips: Strips, scene: SolidScene, simulation: Simulation) -> None:
+        solids = scene.solids
+        self._solids, self._strips, self._scene, self._position = solids, strips, scene, scene.position
         self._simulation, self._reach = simulation, simulation.range_m
         self._face = np.append(solids.face, NONE)
         self._under = np.append(solids.under, NONE)
@@ -174,14 +165,16 @@ class _CellCounts:
         self._along = along / self._length[:, None]
         self.points = np.zeros(strips.cells, np.int64)
         self.columns = np.zeros(strips.cells, np.int64)
+        self.hit = np.zeros(strips.cells, dtype=bool)
 
-    def take(self, met: Hits, fan: RayFan, block: slice, directions: FloatArray) -> None:
-        self._take_upright(self._face[met], fan, fan.azimuth[block])
+    def take(self, runs: RayRuns) -> None:
+        self._take_upright(runs, runs.fan.elevation)
         if len(self._strips.patch):
-            self._take_under(met, directions)
+            self._take_under(runs)
 
-    def _take_upright(self, face: IntArray, fan: RayFan, azimuth: FloatArray) -> None:
-        column, begin, end, face = _runs(face)
+    def _take_upright(self, runs: RayRuns, elevation: FloatArray) -> None:
+        column, begin, end, face = _on_faces(runs, self._face[runs.met])
+        azimuth = runs.fan.azimuth[runs.block]
         towards = np.column_stack([np.cos(azimuth), np.sin(azimuth)])[column]
         along, to = self._along[face], self._solids.a[face] - self._position[:2]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -192,9 +185,9 @@ class _CellCounts:
         column, begin, end, away, unit = (item[good] for item in (column, begin, end, away, unit))
         if self._simulation.slant:
             steepest = np.arccos(np.clip(away / self._reach, 0.0, 1.0))
-            begin = np.maximum(begin, np.searchsorted(fan.elevation, -steepest))
-            end = np.minimum(end, np.searchsorted(fan.elevation, steepest, side="right"))
-        self._count(unit, away, begin, end, fan.elevation)
+            begin = np.maximum(begin, np.searchsorted(elevation, -steepest))
+            end = np.minimum(end, np.searchsorted(elevation, steepest, side="right"))
+        self._count(unit, away, begin, end, elevation)
 
     def _unit(self, face: IntArray, at: FloatArray, side: IntArray) -> IntArray:
         """Unit at a distance along a face, on one of its sides."""
@@ -218,27 +211,31 @@ class _CellCounts:
             after = np.where(last, len(elevation), np.searchsorted(elevation, np.arctan2(edge, away)))
             many = np.maximum(np.minimum(after, end) - np.maximum(before, begin), 0)
             kept = (row < rows) & (many > 0)
-            np.add.at(self.points, strips.first_cell[unit[kept]] + row, many[kept])
-            np.add.at(self.columns, strips.first_cell[unit[kept]] + row, 1)
+            cell = strips.first_cell[unit[kept]] + row
+            np.add.at(self.points, cell, many[kept])
+            np.add.at(self.columns, cell, 1)
+            self.hit[cell] = True
             before = after
 
-    def _take_under(self, met: Hits, directions: FloatArray) -> None:
-        hit = self._under[met] != NONE
-        towards = directions[hit]
-        far = distances(self._solids, self._position, met[hit], towards)
+    def _take_under(self, runs: RayRuns) -> None:
+        under = np.flatnonzero(self._under[runs.met] != NONE)
+        of, ray = ranges(runs.start[under], np.append(runs.start, runs.rays)[under + 1])
+        towards = runs.towards(ray)
+        far = self._scene.distances(runs.met[under[of]], towards)
         unit = self._strips.under_at(self._position[:2] + far[:, None] * towards[:, :2])
         good = (unit != NONE) & _within(far, towards, self._reach, slant=self._simulation.slant)
-        np.add.at(self.points, self._strips.first_cell[unit[good] + 1] - 1, 1)
+        cell = self._strips.first_cell[unit[good] + 1] - 1
+        np.add.at(self.points, cell, 1)
+        self.hit[cell] = True
 
 
-def _runs(face: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Runs of rays of one column on the same face: column, first row, row after the last, face."""
-    columns, rows = face.shape
-    begins = np.ones((columns, rows), dtype=bool)
-    begins[:, 1:] = face[:, 1:] != face[:, :-1]
-    start = np.flatnonzero(begins)
-    behind = np.append(start[1:], face.size)
-    met = face.ravel()[start]
+def _on_faces(runs: RayRuns, face: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Rays of one column on the same upright face: column, first row, row after the last, face."""
+    rows = runs.shape[1]
+    begins = runs.start % rows == 0
+    begins[1:] |= face[1:] != face[:-1]
+    start, met = runs.start[begins], face[begins]
+    behind = np.append(start[1:], runs.rays)
     kept = met != NONE
     start, behind, met = start[kept], behind[kept], met[kept]
     column = start // rows

@@ -65,6 +65,10 @@ class Strips:
     def unit_of_cell(self) -> IntArray:
         return frozen(np.repeat(np.arange(len(self.low)), np.diff(self.first_cell)), np.int64)
 
+    def units_of(self, cell: IntArray) -> IntArray:
+        """Unit of some cells (n,)."""
+        return np.searchsorted(self.first_cell, cell, side="right") - 1
+
     def under_at(self, xy: FloatArray) -> IntArray:
         """Unit of the underside at each position (n, 2), else NONE."""
         if not len(self.patch):

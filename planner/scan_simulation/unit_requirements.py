@@ -55,7 +55,7 @@ class UnitRequirements:
 
     def shown(self, scan: ScanCount) -> BoolArray:
         """True for each unit that a scan shows as required (units,)."""
-        unit = self.strips.unit_of_cell[scan.cell]
+        unit = self.strips.units_of(scan.cell)
         good = self.cells[scan.cell] & self._steep(scan) & self._dense(scan, unit)
         many = np.bincount(unit, good, minlength=len(self.needed))
         any_point = np.bincount(unit, minlength=len(self.needed)) > 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -38,7 +39,7 @@ from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extrud
 from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model, sloped
 from stopgo.planner.scan_simulation.registration import OrientedCloud, registered, surface_of
 from stopgo.planner.scan_simulation.scan_network import scan_network
-from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, pose_of, scanned
+from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, pose_of, scanned, scene_at
 from stopgo.planner.scan_simulation.strips import Strips, strips_of
 from stopgo.planner.scan_simulation.unit_requirements import UnitRequirements
 
@@ -168,10 +169,22 @@ class _ScanSite:
         strips, sloping = sloped(strips, scene, section_height(space.settings))
         return cls(space, simulation, doors, solids, strips, scene, sloping)
 
-    def scanned(self, pose: ScannerPose) -> ScanCount:
-        """Simulate one scan, at the model's solids if they are known."""
+    @cached_property
+    def unit_xy(self) -> FloatArray:
+        """Midpoint of each unit, from the solids' origin (units, 2)."""
+        return frozen(self.space.targets.unit_xy - self.solids.origin)
+
+    @cached_property
+    def unit_heights(self) -> FloatArray:
+        """Lower and upper height of each unit (units, 2)."""
+        targets, ceiling = self.space.targets, self.simulation.ceiling_m
+        spans = np.array([heights_of(item, ceiling) for item in self.space.floor.elements]).reshape(-1, 2)
+        return frozen(spans[targets.element[targets.unit_segment]])
+
+    def scanned(self, scene: SolidScene, pose: ScannerPose) -> ScanCount:
+        """Simulate one scan in the scene around a pose, or at the model's solids if they are known."""
         if self.scene is None:
-            return scanned(self.solids, self.strips, pose, self.simulation)
+            return scanned(scene, self.strips, pose, self.simulation)
         return scanned_model(self.scene, self.strips, pose, self.simulation)
 
     def pose_of(self, stop: Stop, number: int) -> ScannerPose:
@@ -189,8 +202,9 @@ def _scans(
     ceiling, origin = site.simulation.ceiling_m, site.solids.origin
     for stop, pose in zip(mission.stops, poses, strict=True):
         say(f"scanning from {stop.id}, {len(clouds) + 1} of {len(poses)}")
-        scan = site.scanned(pose)
-        tally.take(scan, _sighted(site.space, site.solids, pose, ceiling))
+        scene = scene_at(site.solids, pose)
+        scan = site.scanned(scene, pose)
+        tally.take(scan, _sighted(site, scene, pose))
         surfaces.append(surface_of(scan.cloud, site.simulation))
         clouds.append(ScanCloud(stop.id, _drawn(pose, scan, MOST_DRAWN // len(poses), ceiling, origin)))
     return surfaces, clouds
@@ -261,7 +275,6 @@ class _PointTally:
         self.views = np.zeros(len(strips.low), np.int16)
         """Stops that show each unit as well as required (units,)."""
         self._spacing = np.full(strips.cells, np.inf)
-        self._unit = strips.unit_of_cell
         self._points = np.zeros(strips.cells)
         self._stops = np.zeros(strips.cells, np.int16)
         self._incidence = np.full(strips.cells, np.inf)
@@ -406,22 +419,22 @@ class _PromisedCoverage:
         return PromisedCoverage(name, amount(promised), acquired, beyond, coverage, required)
 
 
-def _sighted(space: NavigableSpace, solids: ExtrudedFloor, pose: ScannerPose, ceiling: float) -> BoolArray:
+def _sighted(site: _ScanSite, scene: SolidScene, pose: ScannerPose) -> BoolArray:
     """True for each unit whose midpoint the stop sees, at the scanner's height or the nearest (units,)."""
-    targets, elements = space.targets, space.floor.elements
-    spans = np.array([heights_of(item, ceiling) for item in elements]).reshape(-1, 2)
-    low, high = spans[targets.element[targets.unit_segment]].T
-    z = np.clip(pose.position[2], low, high)
-    points = np.column_stack([targets.unit_xy - solids.origin, z]) - pose.position
-    near = np.hypot(points[:, 0], points[:, 1]) <= space.settings.range + REACH_SLACK_M
-    along = (targets.b - targets.a)[targets.unit_segment]
+    space, targets = site.space, site.space.targets
+    reach = space.settings.range + REACH_SLACK_M
+    unit = np.flatnonzero((np.abs(site.unit_xy - pose.position[:2]) <= reach).all(axis=1))
+    segment = targets.unit_segment[unit]
+    z = np.clip(pose.position[2], *site.unit_heights[unit].T)
+    points = np.column_stack([site.unit_xy[unit], z]) - pose.position
+    near = np.hypot(points[:, 0], points[:, 1]) <= reach
+    along = (targets.b - targets.a)[segment]
     before = along[:, 0] * points[:, 1] - along[:, 1] * points[:, 0] < 0  # the stop is left of a -> b
-    wanted = near & (before | ~targets.occluding[targets.unit_segment])
+    wanted = near & (before | ~targets.occluding[segment])
     wanted &= _in_view(space, pose, points) & _within_limits(space, points, along)
     found = np.zeros(targets.total, dtype=bool)
     if wanted.any():
-        scene = SolidScene(solids, pose.position, see_through=False, open_door=pose.open_door)
-        found[wanted] = scene.unobstructed(frozen(points[wanted]))
+        found[unit[wanted]] = scene.unobstructed(frozen(points[wanted]))
     return found
 
 

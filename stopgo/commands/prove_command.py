@@ -12,6 +12,7 @@ import typer
 from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable
 from stopgo.mission.files.atomic import must_be_writable, replacing
+from stopgo.recording_process import leave_pandas_out
 from stopgo.result_files import JsonOption, report_missing_rerun, result_folder
 
 if TYPE_CHECKING:
@@ -184,6 +185,7 @@ def _write_proof(proof: PlanProof, floor: FloorPlan, files: dict[str, Path]) -> 
     from stopgo.mission.files.mission_text import json_text
     from stopgo.mission.proof.proof_text import proof_json
 
+    leave_pandas_out()
     try:
         from stopgo.recordings.page.proof_page import proof_html
         from stopgo.recordings.plan.proof_recording import proof_recording

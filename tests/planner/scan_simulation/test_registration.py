@@ -10,7 +10,9 @@ import pytest
 
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.proof.plan_proof import Simulation, within_tolerance
+from stopgo.planner.scan_simulation.near_kernel import mark_near
 from stopgo.planner.scan_simulation.registration import OrientedCloud, _CloudPair, _shift, _turned, surface_of
+from tests.planner.kernels import interpret, machine_code
 
 SIMULATION = Simulation(range_m=20.0, ceiling_m=2.5)
 
@@ -64,6 +66,28 @@ def test_no_column_is_taken_for_the_next_one_of_a_row(shift: tuple[float, float]
     two = _CloudPair(columns(one), columns(other), _shift(other - one))
     start = _shift(np.array([*shift, 0.0])) @ two.truth @ _turned(math.radians(degrees))
     assert within_tolerance(*two.error(two.aligned(start, SIMULATION)))
+
+
+def scattered(seed: int) -> OrientedCloud:
+    """Points and directions at random."""
+    random = np.random.default_rng(seed)
+    normals = random.normal(size=(1500, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return OrientedCloud(frozen(random.uniform(-2, 2, (1500, 3))), frozen(normals))
+
+
+@pytest.mark.parametrize("within", [0.2, 0.35])
+def test_points_near_one_another_are_the_same_by_every_way_to_look_them_up(
+    within: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other, there = scattered(1), scattered(2), _shift(np.array([1.0, 0.5, 0.0])) @ _turned(0.3)
+    ways = [one.buckets.near(way, other._both(there), within) for way in (mark_near, machine_code(mark_near))]
+    interpret(monkeypatch)
+    ways.append(one.near_each_other(other, there, within))
+    for masks in zip(*ways, strict=True):
+        assert 0 < masks[0].sum() < len(masks[0])
+        np.testing.assert_array_equal(masks[0], masks[1])
+        np.testing.assert_array_equal(masks[0], masks[2])
 
 
 def test_level_surfaces_are_thinned_where_a_pose_is_known() -> None:

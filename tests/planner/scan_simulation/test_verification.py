@@ -36,7 +36,7 @@ from stopgo.planner.scan_simulation.registration import (
     registered,
     surface_of,
 )
-from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
+from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned, scene_at
 from stopgo.planner.scan_simulation.strips import strips_of
 from stopgo.planner.scan_simulation.verification import verify
 from stopgo.planner.space.navigable import navigable
@@ -85,7 +85,8 @@ def test_points_on_a_wall_are_as_many_as_its_angle_has_rays() -> None:
     solids = extruded(space.floor, [], simulation.ceiling_m)
     strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
     place = np.array([3.0, 2.0, 1.3]) - [*solids.origin, 0.0]
-    found = scanned(solids, strips, ScannerPose(place, 0.0), simulation)
+    pose = ScannerPose(place, 0.0)
+    found = scanned(scene_at(solids, pose), strips, pose, simulation)
     cell = strips.middle[found.cell]
     level = np.abs(cell[:, 2] - 1.25) < 0.06
     south = level & (np.abs(cell[:, 1] - place[1] + 2.0) < 1e-6)
@@ -199,7 +200,7 @@ def clouds_of(
         triangles = solids.corners + np.array([*solids.origin, 0.0])
         scene = ModelScene(ModelSolids(frozen(triangles), simulation.ceiling_m), solids.origin)
         return [scanned_model(scene, strips, stand, simulation).cloud for stand in stands]
-    return [scanned(solids, strips, stand, simulation).cloud for stand in stands]
+    return [scanned(scene_at(solids, stand), strips, stand, simulation).cloud for stand in stands]
 
 
 def pair_of(floor: FloorPlan, a: tuple[float, float], b: tuple[float, float], simulation: Simulation):
