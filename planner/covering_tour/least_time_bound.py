@@ -149,8 +149,10 @@ class _PathTimes:
 def _quickest(direct: FloatArray) -> FloatArray:
     """Floyd's algorithm, in whole numbers."""
     steps = np.minimum(direct / STEP_S, 2**30).astype(np.int32)
+    around = np.empty_like(steps)
     for k in range(len(steps)):
-        np.minimum(steps, steps[:, k, None] + steps[None, k, :], out=steps)
+        np.add(steps[:, k, None], steps[None, k, :], out=around)
+        np.minimum(steps, around, out=steps)
     return np.multiply(steps, STEP_S, dtype=np.float64)
 
 
