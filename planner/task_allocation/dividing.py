@@ -166,20 +166,32 @@ def _check_reach(clock: TourTimes, route: Route, key: str, limit_s: float) -> No
 
 def _fewest(clock: TourTimes, route: Route, bound: int, limit_s: float, *, seed: int) -> Tours:
     """The fewest tours found within the time."""
-    greedy = _cut_in_time(clock, route, limit_s)
-    for count in range(bound, len(greedy)):
-        for turning in TURNING:
-            found = vehicle_tours(
-                clock.estimate(turning),
-                stops=clock.stops, depots=[clock.stops] * count, pause_s=clock.pause_s,
-                limit_s=limit_s, closed=True, seed=seed,
-            )  # fmt: skip
-            if found is None:
-                break  # more time for turning finds none either
-            tours = shorter_longest(clock, tuple(tour for _, tour in found), [0] * len(found))
-            if _longest(clock, tours, [0] * len(tours)) <= limit_s:
-                return tours
-    return greedy
+    best = _cut_in_time(clock, route, limit_s)
+    low, high = bound, len(best)
+    while low < high:
+        count = (low + high) // 2
+        found = _tours_in_time(clock, count, limit_s, seed=seed)
+        if found is None:
+            low = count + 1
+        else:
+            best, high = found, count
+    return best
+
+
+def _tours_in_time(clock: TourTimes, count: int, limit_s: float, *, seed: int) -> Tours | None:
+    """So many tours or fewer within the time, if any are found."""
+    for turning in TURNING:
+        found = vehicle_tours(
+            clock.estimate(turning),
+            stops=clock.stops, depots=[clock.stops] * count, pause_s=clock.pause_s,
+            limit_s=limit_s, closed=True, seed=seed,
+        )  # fmt: skip
+        if found is None:
+            return None  # more time for turning finds none either
+        tours = shorter_longest(clock, tuple(tour for _, tour in found), [0] * len(found))
+        if _longest(clock, tours, [0] * len(tours)) <= limit_s:
+            return tours
+    return None
 
 
 def _cut_in_time(clock: TourTimes, route: Route, limit_s: float) -> Tours:

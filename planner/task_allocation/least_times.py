@@ -32,7 +32,7 @@ def least_makespan(clock: TourTimes, starts: IntArray) -> float:
     together = stops * clock.pause_s + driven_together(times, stops, closed=clock.closed)
     if clock.closed:
         together = max(together, stops * clock.pause_s + driven_and_turned(clock, tours))
-    even = seconds_of(clock, times, math.ceil(stops / tours))
+    even = float(seconds_by_count(clock, times)[math.ceil(stops / tours) - 1])
     farthest = float(alone(clock, times).max()) + clock.pause_s
     return max(together / tours, even, farthest) - NOISE
 
@@ -45,7 +45,7 @@ def least_tours(clock: TourTimes, limit_s: float) -> int:
     """
     times, stops = clock.least, clock.stops
     together = stops * clock.pause_s + driven_together(times, stops, closed=True) - NOISE
-    most = next((n for n in range(stops, 1, -1) if seconds_of(clock, times, n) - NOISE <= limit_s), 1)
+    most = max(1, int(np.count_nonzero(seconds_by_count(clock, times) - NOISE <= limit_s)))
     count = max(1, math.ceil(together / limit_s), math.ceil(stops / most))
     while count < stops and stops * clock.pause_s + driven_and_turned(clock, count) > count * limit_s:
         count += 1
@@ -58,16 +58,17 @@ def alone(clock: TourTimes, times: FloatArray) -> FloatArray:
     return 2 * there if clock.closed else there
 
 
-def seconds_of(clock: TourTimes, times: FloatArray, stops: int) -> float:
-    """Lower bound in seconds on a tour of so many stops.
+def seconds_by_count(clock: TourTimes, times: FloatArray) -> FloatArray:
+    """Lower bounds in seconds on a tour of one stop, of two and so on, ascending (stops,).
 
     Its first stop is reached from a start, each other one from a stop, by at least its shortest path.
     """
     among = times[: clock.stops, : clock.stops].copy()
     np.fill_diagonal(among, np.inf)
-    shortest = np.sort(among.min(axis=1))[: stops - 1].sum() if stops > 1 else 0.0
+    shortest = np.concatenate([[0.0], np.cumsum(np.sort(among.min(axis=1))[:-1])])
     out = float(times[: clock.stops, clock.stops :].min())
-    return stops * clock.pause_s + float(shortest) + (2 * out if clock.closed else out)
+    paused = np.arange(1, clock.stops + 1) * clock.pause_s
+    return np.asarray(paused + shortest + (2 * out if clock.closed else out), dtype=np.float64)
 
 
 def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:

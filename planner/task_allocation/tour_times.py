@@ -30,6 +30,8 @@ MICROSECONDS = 1e6
 """Per second."""
 NEAR = 30
 """Nearest points of each point to which corners of paths are counted in advance."""
+DETOURS_UP_TO = 500
+"""Points up to which lower bounds allow for detours; this takes time with the cube of their number."""
 
 
 class _LegTimes(NamedTuple):
@@ -148,10 +150,12 @@ class TourTimes:
 
     @cached_property
     def least(self) -> FloatArray:
-        """Lower bounds in seconds (n, n) on every path, for which no detour is shorter.
+        """Lower bounds in seconds (n, n) on every path; of few points no detour is shorter than these.
 
         Where corners were not counted, a path takes at least as long as a straight one of its length.
         """
+        if len(self.points) > DETOURS_UP_TO:
+            return self._driven_s
         times = np.array(self._driven_s)
         for k in range(len(times)):
             times = np.minimum(times, times[:, k, None] + times[None, k, :])

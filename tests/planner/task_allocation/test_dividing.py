@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from itertools import permutations
 from pathlib import Path
@@ -33,6 +34,8 @@ from stopgo.planner.checking.network_claims import network_overclaims
 from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.commands.shared_report import shared_report
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
+from stopgo.planner.task_allocation import dividing
+from stopgo.planner.task_allocation import tour_times as tour_times_module
 from stopgo.planner.task_allocation.least_times import least_makespan, least_tours
 from stopgo.planner.task_allocation.tour_times import TourTimes, tour_times
 from tests.planner.worlds import column, hall, planned, two_rooms
@@ -112,6 +115,24 @@ def test_the_tours_of_a_shift_are_as_few_as_any(world: str, limit: float) -> Non
     assert least_tours(clock, limit) <= made.bound + 1e-9 <= fewest + 1e-9
     assert len(made.shares) == fewest
     assert all(schedule(share.mission).total_s <= limit for share in made.shares)
+
+
+def test_the_number_of_searches_grows_slower_than_that_of_tours(monkeypatch: pytest.MonkeyPatch) -> None:
+    route = route_of("hall")
+    counts: list[int] = []
+    monkeypatch.setattr(dividing, "least_tours", lambda clock, limit_s: 1)
+    monkeypatch.setattr(dividing, "vehicle_tours", lambda times, *, depots, **_: counts.append(len(depots)))
+    made = dividing._shifts(route, replace(route.settings, shift=160.0))
+    assert len(counts) <= math.ceil(math.log2(len(made.routes) + 1))
+
+
+def test_bounds_without_detours_hold_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    with_detours = [least_makespan(clock_of(route_of("hall")), np.zeros(k, np.int64)) for k in (1, 2)]
+    monkeypatch.setattr(tour_times_module, "DETOURS_UP_TO", 0)
+    clock = clock_of(route_of("hall"))
+    known: dict[Any, float] = {}
+    assert [least_makespan(clock, np.zeros(k, np.int64)) for k in (1, 2)] >= with_detours
+    assert least_makespan(clock, np.zeros(1, np.int64)) <= best_time(clock, [*range(clock.stops)], 0, known)
 
 
 @cache
