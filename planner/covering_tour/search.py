@@ -20,7 +20,7 @@ from stopgo.planner.selection.cover import Cover
 
 STEPS = 400
 """Changes made at most; a count, so that no plan depends on speed."""
-WORK = 10_000_000
+WORK = 6_000_000
 """Exchanges evaluated for all those changes together, so that large floors get fewer changes."""
 SWEEPS = 10
 """Most rounds in which each stop in turn is exchanged for a better one."""

@@ -30,6 +30,8 @@ SPARE_S = 1e-3
 """Seconds that a tour stays below its limit, since missions are rounded to micrometres."""
 WIDER = (1.0, 1.02, 1.05, 1.1, 1.2, 1.4, 2.0, 4.0, 16.0)
 """Multiples of the bound used as time limit in the search for a fleet's tours."""
+SEARCH_UP_TO = 500
+"""Stops up to which tours of a fleet are searched; of more a search this short finds none that are better."""
 HALVINGS = 4
 """Bisections between a time limit with tours and one without."""
 METHOD = "PyVRP, then moves and exchanges by the schedule's times"
@@ -85,6 +87,8 @@ def _fleet(route: Route, settings: Settings) -> DividedRoute:
 def _balanced(clock: TourTimes, numbers: list[int], bound: float, route: Route, *, seed: int) -> Tours:
     """Tours, one from each of the starts `numbers`, with the shortest longest tour found."""
     best = shorter_longest(clock, _cut(clock, route, numbers), numbers)
+    if clock.stops > SEARCH_UP_TO:
+        return best
     low, high = bound, _longest(clock, best, numbers)
     for factor in WIDER:
         if bound * factor >= high:

@@ -29,7 +29,7 @@ from stopgo.mission.settings import Settings, recorded_values
 from stopgo.mission.settings.parameter import seconds
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.network import network_of
-from stopgo.planner import plan
+from stopgo.planner import pipeline, plan
 from stopgo.planner.checking.network_claims import network_overclaims
 from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.commands.shared_report import shared_report
@@ -324,3 +324,23 @@ def test_a_mission_of_another_plan_is_no_share() -> None:
     known = PlannedFloor(one.floor, one.space.settings, one.mission)
     with pytest.raises(InputError, match="not of the same divided plan"):
         top_up(known, np.empty((0, 3)), others=[replace_struct(two.mission, origin=origin)])
+
+
+def test_of_many_stops_only_the_route_of_least_time_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
+    selection, divisions = route_of("rooms", minimise="time").selection, []
+    monkeypatch.setattr(dividing, "divided", divisions.append)
+    monkeypatch.setattr(pipeline, "BOTH_UP_TO", 0)
+    route, _ = pipeline._divided(selection)
+    assert divisions == [route]
+    assert route.time is not None and route.time.seconds <= route.time.two_step_s
+
+
+def test_of_many_stops_equal_stretches_are_improved(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dividing, "SEARCH_UP_TO", 0)
+    monkeypatch.setattr(dividing, "vehicle_tours", None)
+    route = route_of("hall", robots=2)
+    made = dividing.divided(route)
+    assert sorted(np.concatenate([part.selection.chosen for part in made.routes])) == sorted(
+        route.selection.chosen
+    )
+    assert made.bound <= dividing.division_cost(made)[0]
