@@ -182,7 +182,17 @@ class TourTimes:
         start has no shares. Legs whose corners were not counted may leave in any direction, so that their
         share is the negative of the largest other one.
         """
-        driven = self._driven_s  # which times the legs counted
+        return frozen(self._driven_s + (self._shares + self._shares.T))
+
+    @property
+    def largest_share_s(self) -> FloatArray:
+        """The largest share in seconds of any leg at each stop (stops,)."""
+        return np.maximum(0.0, self._shares[: self.stops].max(axis=1))
+
+    @cached_property
+    def _shares(self) -> FloatArray:
+        """Seconds (n, n) of turning at the first point that count for the leg to the second."""
+        _ = self._driven_s  # which times the legs counted
         shares = np.zeros((len(self.points), len(self.points)))
         for stop in range(self.stops):
             near = np.flatnonzero(self._counted[stop] & (self._table.leaving[stop] >= 0))
@@ -192,7 +202,7 @@ class TourTimes:
             found = turn_shares(away, turn_rate=self.robot.turn_rate, scan=scan)
             shares[stop] = -found.max(initial=0.0)
             shares[stop, near] = found
-        return frozen(driven + (shares + shares.T))
+        return frozen(shares)
 
     def estimate(self, turning: float) -> FloatArray:
         """Seconds (n, n) of every path, and of a fraction of half a turn before it."""
