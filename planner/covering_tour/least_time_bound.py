@@ -122,6 +122,7 @@ class _PathTimes:
         self._begin[list(outside)] = list(outside.values())
         few = len(route.lengths) <= MOST_POINTS
         self._quickest = _quickest(self._direct(np.arange(len(route.lengths)))) if few else None
+        self._zones: dict[bytes, tuple[FloatArray, FloatArray]] = {}
 
     def _direct(self, points: IntArray) -> FloatArray:
         """Seconds of the paths from these points, without a detour (points, all points)."""
@@ -135,22 +136,32 @@ class _PathTimes:
         direct[np.arange(len(points)), points] = 0.0
         return direct
 
-    def up_to(self, detour: float, points: IntArray) -> FloatArray:
-        """The direct times from these points, at most `detour` above the quickest detour."""
-        if self._quickest is None:
-            around = self._route.lengths[points] / self._route.robot.speed
-        else:
-            around = self._quickest[points]
-        paths = np.minimum(self._direct(points), around + detour)
-        paths[np.arange(len(points)), points] = 0.0
+    def up_to(self, detour: float, zone: IntArray) -> FloatArray:
+        """The least direct times from a zone to all points, at most `detour` above the quickest detour."""
+        direct, around = self._from_zone(zone)
+        paths = np.minimum(direct, around + detour)
+        paths[zone] = 0.0
         return paths
+
+    def _from_zone(self, zone: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Least direct times, and least times of detours, from the points of a zone to all (points,)."""
+        key = zone.tobytes()
+        if key not in self._zones:
+            if self._quickest is None:
+                around = self._route.lengths[zone] / self._route.robot.speed
+            else:
+                around = self._quickest[zone]
+            self._zones[key] = self._direct(zone).min(axis=0), around.min(axis=0)
+        return self._zones[key]
 
 
 def _quickest(direct: FloatArray) -> FloatArray:
     """Floyd's algorithm, in whole numbers."""
     steps = np.minimum(direct / STEP_S, 2**30).astype(np.int32)
+    around = np.empty_like(steps)
     for k in range(len(steps)):
-        np.minimum(steps, steps[:, k, None] + steps[None, k, :], out=steps)
+        np.add(steps[:, k, None], steps[None, k, :], out=around)
+        np.minimum(steps, around, out=steps)
     return np.multiply(steps, STEP_S, dtype=np.float64)
 
 
@@ -169,10 +180,10 @@ def _by_zones(
 def _tour_over(
     route: RouteRequirements, zones: list[IntArray], seconds: Callable[[IntArray], FloatArray]
 ) -> float:
-    """Lower bound in seconds on a tour over the zones, ends included; `seconds` are from points to all."""
+    """Lower bound in seconds on a tour over the zones, ends included; `seconds` are from a zone to all."""
     if len(zones) < 2:
         return 0.0
-    between = np.array([seconds(zone).min(axis=0) for zone in zones])
+    between = np.array([seconds(zone) for zone in zones])
     between = np.array([between[:, zone].min(axis=1) for zone in zones])
     np.fill_diagonal(between, 0.0)
     between = np.minimum(between, between.T)

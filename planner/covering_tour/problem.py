@@ -27,7 +27,7 @@ Invariants
 - `cover` is what required and scanned rows leave of `whole`. In `task` the stop `begin` is taken off too.
 - Required rows are positions of every line. Rows in `done` count as seen and are never on a line.
 - A heading is an angle counted in microseconds of turning (`LegTable`); `NO_HEADING` is -1.
-- `connected` takes row numbers here, and position numbers in `LineTask`.
+- `joins` takes and gives row numbers here, and position numbers in `LineTask`.
 - The cached properties are computed once, in any order: they depend only on the fields.
 """
 
@@ -36,12 +36,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from stopgo.mission.document.specs import robot_of
-from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Route, Visibility
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements
@@ -63,8 +63,8 @@ MOST_BOUNDED = 5000
 """Candidates up to which the bound includes driving."""
 
 
-ConnectionTest = Callable[[IntArray], bool]
-"""Returns True if the scans of some rows are connected as required."""
+ConnectionTest = Callable[[IntArray], BoolArray]
+"""Returns, for some rows, True for each row with which they are connected as required (all rows,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class TourProblem:
     """Required rows: a stop must be at each."""
     done: IntArray
     """Rows scanned before: they count as seen and are no stops."""
-    connected: ConnectionTest
+    joins: ConnectionTest
 
     @property
     def candidates(self) -> Candidates:
@@ -173,7 +173,7 @@ class TourProblem:
             cover=_of_rows(cover, self.rows),
             stays=stays,
             rank=None if self.begin is not None else rank,
-            connected=lambda positions: self.connected(self.rows[positions]),
+            joins=lambda positions: self.joins(self.rows[positions])[self.rows],
         )
 
     @cached_property
@@ -244,18 +244,16 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
     """The covering tour problem of a route's selection; rows `done` were scanned before."""
     visibility, chosen = route.visibility, np.unique(route.selection.chosen)
     stays: IntArray = np.empty(0, dtype=np.int64)
-    connected: ConnectionTest = _any_rows
-    joins = visibility.settings.registers
+    joins: ConnectionTest = partial(_any_rows, visibility.rows)
+    registers = visibility.settings.registers
     if done is not None:
         whole, cover = remaining_cover(visibility, done)
-        if joins:
-            cover, connected = _joined(
-                visibility, whole, done, chosen, offered_for_follow_up(visibility, done)
-            )
+        if registers:
+            cover, joins = _joined(visibility, whole, done, chosen, offered_for_follow_up(visibility, done))
     else:
         whole, stays, cover = cover_problem(visibility)
-        if joins:
-            cover, connected = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
+        if registers:
+            cover, joins = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
     offered = np.flatnonzero(np.diff(cover.sees.indptr)).astype(np.int64)
     nearest = _nearest(visibility.candidates, offered, chosen)
     return TourProblem(
@@ -266,12 +264,12 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
         rows=frozen(np.union1d(nearest, np.union1d(chosen, stays)), np.int64),
         stays=stays,
         done=np.empty(0, np.int64) if done is None else done,
-        connected=connected,
+        joins=joins,
     )
 
 
-def _any_rows(rows: IntArray) -> bool:
-    return True
+def _any_rows(count: int, rows: IntArray) -> BoolArray:
+    return np.ones(count, dtype=bool)
 
 
 def _joined(
@@ -286,7 +284,7 @@ def _joined(
     task = ConnectedCover(cover, links_of(visibility.candidates), offered)
     most = task.parts(np.union1d(chosen, fixed))
     left = whole.after(fixed).offering(np.sort(np.concatenate(task.regions)))
-    return left, lambda rows: task.parts(np.union1d(rows, fixed)) <= most
+    return left, lambda rows: task.parts_with_each(np.union1d(rows, fixed)) <= most
 
 
 def _nearest(candidates: Candidates, offered: IntArray, chosen: IntArray) -> IntArray:

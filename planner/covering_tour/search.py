@@ -2,8 +2,8 @@
 
 Demands may be violated during the search. A shortfall is a penalty in time, which grows while the demand
 stays unmet (Gendreau, Hertz and Laporte, "A tabu search heuristic for the vehicle routing problem",
-Management Science 1994). Each step makes the best change, even if it is worse. The result is the best line
-that met every demand.
+Management Science 1994). Each step makes the best change, even if it is worse. Then each stop of the best
+line that met every demand is exchanged where that saves time, until no exchange does.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from stopgo.planner.selection.cover import Cover
 
 STEPS = 400
 """Changes made at most; a count, so that no plan depends on speed."""
-LOOKS = 40_000
-"""Stops evaluated for all those changes together, so that large floors get fewer changes."""
+WORK = 6_000_000
+"""Exchanges evaluated for all those changes together, so that large floors get fewer changes."""
+SWEEPS = 10
+"""Most rounds in which each stop in turn is exchanged for a better one."""
 TENURE, LULL = 8, 10
 """Removed positions that may not return: 1, one more after each LULL changes up to TENURE, then again 1."""
 SCALE = 1024
@@ -30,8 +32,6 @@ DEARER, CHEAPER = (9, 8), (15, 16)
 """Factors of a penalty at each step: for an unmet demand, and for all demands if all are met."""
 RANGE = 256
 """Factor by which a penalty may rise above and fall below its first value."""
-TRIED = 30
-"""Changes tried, the best first, until one leaves the scans connected."""
 NEVER = 2**60
 
 
@@ -45,8 +45,8 @@ class LineTask:
     """True for required positions (positions,)."""
     rank: IntArray | None
     """The position of the lowest rank comes first on a line (positions,); None: any may."""
-    connected: Callable[[IntArray], bool]
-    """Returns True if the scans of stops at these positions are connected as required."""
+    joins: Callable[[IntArray], BoolArray]
+    """Returns, for stops at some positions, True for each position where scans are connected with theirs."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,12 @@ class _Change:
 def shorter_line(times: LineTimes, task: LineTask, line: PointLine) -> PointLine:
     """A line between the same ends that meets every demand and takes no longer."""
     search = _TourSearch(times, task, line)
-    stops = max(1, len(line) - 2)
-    for _ in range(min(STEPS, max(50, LOOKS // stops))):
+    for _ in range(min(STEPS, WORK // max(1, times.positions * len(line)))):
         if not search.step():
+            break
+    search = _TourSearch(times, task, search.best)
+    for _ in range(SWEEPS):
+        if not search.sweep():
             break
     return search.best
 
@@ -104,6 +107,35 @@ class _TourSearch:
                 self.best, self._least = self._line, total
         return True
 
+    def sweep(self) -> bool:
+        """Exchange or remove each stop where that saves time; return False if it never does.
+
+        Every demand is met before and after.
+        """
+        before = self._least
+        for position in self._places(self._line):
+            change = self._saving(self._line.index(position))
+            if change is not None:
+                self._make(change)
+        self._line = self._times.turned(self._line, self._first_free(self._line))
+        self.best, self._least = self._line, self._times.total(self._line)
+        return self._least < before
+
+    def _saving(self, at: int) -> _Change | None:
+        """The exchange or removal of a stop that saves most time and leaves every demand met."""
+        times, position = self._times, self._line[at]
+        if self._task.stays[position]:
+            return None
+        saved = times.removed(self._line, at)
+        barred = np.zeros(times.positions, dtype=bool)
+        barred[self._places(self._line)] = True
+        value = self._allowed(self._least_near(at) - saved, barred, at)
+        value[(self._missing_with(at) > 0) | (value >= 0)] = NEVER
+        found: list[tuple[int | None, IntArray]] = [(at, value)]
+        if not self._leads(at) and not self._missing_without(at):
+            found.append((at, np.array([-saved])))
+        return self._best_of(found)
+
     def _price(self, missing: IntArray) -> None:
         """Raise the penalties of unmet demands; lower all penalties if every demand is met."""
         (up, by), (down, of) = DEARER, CHEAPER
@@ -141,27 +173,28 @@ class _TourSearch:
 
     def _best_change(self) -> _Change | None:
         """The allowed change with the least sum of time and penalties."""
-        found = list(self._changes())
-        values = np.concatenate([value for _, value in found]) if found else np.empty(0, np.int64)
-        ends = np.cumsum([len(value) for _, value in found])
-        for _ in range(TRIED):
-            k = int(np.argmin(values)) if len(values) else 0
-            if not len(values) or values[k] >= NEVER:
-                return None
-            which = int(np.searchsorted(ends, k, side="right"))
-            at, value = found[which]
-            into = k - (int(ends[which]) - len(value))
-            change = _Change(at, into if len(value) > 1 else None)
-            if self._task.connected(self._after(change)):
-                return change
-            values[k] = NEVER
+        return self._best_of(list(self._changes()))
+
+    def _best_of(self, found: list[tuple[int | None, IntArray]]) -> _Change | None:
+        """The change with the least cost after which scans are connected as required."""
+        least = [int(value.min(initial=NEVER)) for _, value in found]
+        connected: set[int] = set()
+        while found and (value := min(least)) < NEVER:
+            which = least.index(value)
+            at, values = found[which]
+            if which in connected:
+                return _Change(at, int(np.argmin(values)) if len(values) > 1 else None)
+            connected.add(which)
+            found[which] = at, self._connected(at, values)
+            least[which] = int(found[which][1].min(initial=NEVER))
         return None
 
-    def _after(self, change: _Change) -> IntArray:
-        """The stops after a change, ascending."""
-        rest = self._line if change.at is None else without(self._line, change.at)
-        more = [] if change.into is None else [change.into]
-        return np.array(sorted({*self._places(rest), *more}), dtype=np.int64)
+    def _connected(self, at: int | None, values: IntArray) -> IntArray:
+        """The costs, NEVER for each change after which scans are not connected as required."""
+        rest = self._line if at is None else without(self._line, at)
+        stops = np.array(sorted(self._places(rest)), dtype=np.int64)
+        joins = self._task.joins(stops)
+        return np.where(joins if len(values) > 1 else joins[stops[:1]], values, NEVER)
 
     def _changes(self) -> Iterator[tuple[int | None, IntArray]]:
         """Costs of changes, for each removable stop and for none: of adding each position (positions,).
@@ -197,18 +230,23 @@ class _TourSearch:
 
     def _least_added(self, at: int, ahead: IntArray, behind: IntArray) -> IntArray:
         """Least time that each position adds after the stop at index `at` is removed (positions,)."""
-        times, line = self._times, self._line
-        rest = without(line, at)
+        least = self._least_near(at)
         if self._leads(at):
-            return times.inserted(rest, 0)
-        first = self._first_free(line) - 1
-        near = [leg for leg in (at - 2, at - 1, at) if first <= leg < len(rest) - 1]
-        least = np.minimum.reduce([times.inserted(rest, leg) for leg in near])
+            return least
         if at - 3 >= 0:
             least = np.minimum(least, ahead[at - 3])
         if at + 2 < len(behind):
             least = np.minimum(least, behind[at + 2])
         return least
+
+    def _least_near(self, at: int) -> IntArray:
+        """Least time that each position adds near the stop at index `at`, which is removed (positions,)."""
+        times, rest = self._times, without(self._line, at)
+        if self._leads(at):
+            return times.inserted(rest, 0)
+        first = self._first_free(self._line) - 1
+        near = [leg for leg in (at - 2, at - 1, at) if first <= leg < len(rest) - 1]
+        return np.minimum.reduce([times.inserted(rest, leg) for leg in near])
 
     def _barred(self) -> BoolArray:
         """True for positions that may not be added: those on the line, and those removed recently."""

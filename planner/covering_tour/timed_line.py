@@ -99,35 +99,53 @@ class LineTimes:
             line = [*line[:i], *line[i : j + 1][::-1], *line[j + 1 :]]
 
     def _best_turn(self, line: PointLine, first: int) -> tuple[int, int, int]:
-        """The stretch from `i` to `j` whose reversal saves most, and the time saved."""
+        """The stretch from `i` to `j` whose reversal saves most, and the time saved.
+
+        Turns are counted only where the reversal could save time if no turns were left at its ends.
+        """
         points = np.array(line, dtype=np.int64)
-        i, j = np.triu_indices(len(line) - 1 - first, 1)
-        if not len(i):
+        if len(line) - first < 3:
             return 0, 0, 0
-        i, j = i + first, j + first
         come, go = self._headings(points)
         spent, leaving, arriving = self.table.spent, self.table.leaving, self.table.arriving
-        a, x, y, b = (points[k] for k in (i - 1, i, j, j + 1))
         at = self._at(points, come, go)
+        saved = self._saved_inside(points, at)
+        i, j = self._likely_turns(points, at, saved, first)
+        if not len(i):
+            return 0, 0, 0
+        a, x, y, b = (points[k] for k in (i - 1, i, j, j + 1))
         old = spent[a, x] + spent[y, b] + at[i - 1] + at[i] + at[j] + at[j + 1]
         new = spent[a, y] + spent[x, b]
         new = new + self._at(a, come[i - 1], leaving[a, y]) + self._at(b, arriving[x, b], go[j + 1])
         new = new + self._at(y, arriving[a, y], leaving[y, points[j - 1]])
         new = new + self._at(x, arriving[points[i + 1], x], leaving[x, b])
-        gain = old - new + self._inner(points, at, i, j)
+        gain = old - new + saved[j - 1] - saved[i]
         best = int(np.argmax(gain))
         return int(i[best]), int(j[best]), int(gain[best])
 
-    def _inner(self, points: IntArray, at: IntArray, i: IntArray, j: IntArray) -> IntArray:
-        """Time saved inside reversed stretches; 0 unless scans have headings."""
+    def _likely_turns(
+        self, points: IntArray, at: IntArray, saved: IntArray, first: int
+    ) -> tuple[IntArray, IntArray]:
+        """Stretches, from i to j, whose reversal may save time (n,)."""
+        away = self.table.spent[np.ix_(points, points)]
+        step = np.diagonal(away, 1)
+        begins = step[first - 1 : -1] + at[first - 1 : -2] + at[first:-1] - saved[first:]
+        ends = step[first:] + at[first:-1] + at[first + 1 :] + saved[first - 1 : -1]
+        most = begins[:, None] + ends[None, :] - away[first - 1 : -2, first:-1] - away[first:-1, first + 1 :]
+        i, j = np.nonzero(np.triu(most > 0, 1))
+        return i + first, j + first
+
+    def _saved_inside(self, points: IntArray, at: IntArray) -> IntArray:
+        """Time saved inside a stretch that is reversed, summed up to each index (len(points) - 1,).
+
+        All 0 unless scans have headings.
+        """
         back = self._at(
             points[1:-1],
             self.table.arriving[points[2:], points[1:-1]],
             self.table.leaving[points[1:-1], points[:-2]],
         )
-        saved = np.concatenate([[0], np.cumsum(at[1:-1] - back)])
-        inner: IntArray = saved[j - 1] - saved[i]
-        return inner
+        return np.concatenate([[0], np.cumsum(at[1:-1] - back)])
 
 
 def without(line: PointLine, at: int) -> PointLine:

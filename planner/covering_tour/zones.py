@@ -43,6 +43,8 @@ class _Growth:
         self._first = cover.seen_by.indptr[self._seen]
         worth = cover.worth.tocoo()
         self._demand, self._column = (np.asarray(at, dtype=np.int64) for at in worth.coords)
+        few = len(cover.needed) <= np.iinfo(np.int16).max
+        self._short_demand = self._demand.astype(np.int16) if few else self._demand  # sorted in one pass
         self._worth = worth.data.astype(np.int64)
         self._begin = np.searchsorted(np.sort(self._demand), np.arange(len(cover.needed)))
         self._sees = [self._seers(demand) for demand in range(len(cover.needed))]
@@ -58,7 +60,8 @@ class _Growth:
         farthest = np.full(cover.columns, -np.inf)
         farthest[self._seen] = np.maximum.reduceat(away[cover.seen_by.indices], self._first)
         reach = farthest[self._column]
-        order = np.lexsort((-reach, self._demand))
+        order = np.argsort(-reach)
+        order = order[np.argsort(self._short_demand[order], kind="stable")]
         sums = np.cumsum(self._worth[order])
         before = np.concatenate([[0], sums])[self._begin]
         radius, which = np.inf, -1

@@ -161,11 +161,15 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     return Plan(made.shares, made)
 
 
+BOTH_UP_TO = 40
+"""Stops up to which two routes are divided: of many stops a division takes as long as all else."""
+
+
 def _divided(selection: Selection) -> tuple[Route, DividedRoute]:
     """Return the route over all stops, and their division among robots or tours.
 
     For the least time, both the route of least time and the route of fewest stops are divided. The route
-    that is quicker for one robot is not always quicker for several.
+    that is quicker for one robot is not always quicker for several. Of many stops only the quicker one is.
     """
     from stopgo.planner.covering_tour import with_known_time
     from stopgo.planner.routing import route
@@ -175,6 +179,8 @@ def _divided(selection: Selection) -> tuple[Route, DividedRoute]:
     if selection.settings.minimise == "stops":
         return driven, divided(driven)
     quicker = _in_least_time(driven)
+    if len(quicker.order) > BOTH_UP_TO:
+        return quicker, divided(quicker)
     both = [(one, divided(one)) for one in (with_known_time(driven, quicker), quicker)]
     return min(both, key=lambda one: division_cost(one[1]))
 

@@ -97,6 +97,18 @@ class ConnectedCover:
         inside = rows[self._region_of[rows] >= 0]  # no link leads out of a region
         return len(components_of(self.links, inside)) - len(np.unique(self._region_of[inside]))
 
+    def parts_with_each(self, rows: IntArray) -> IntArray:
+        """Surplus components of these rows and one more, for each other row (all rows,)."""
+        inside = rows[self._region_of[rows] >= 0]
+        components, begun = components_of(self.links, inside), np.unique(self._region_of[inside])
+        met = [np.empty(0, np.int64), *map(self.graph.neighbours, components)]
+        joined = np.bincount(np.concatenate(met), minlength=len(self._region_of))
+        added = np.isin(self._region_of, begun).astype(np.int64) - joined
+        added[self._region_of < 0] = 0
+        added[rows] = 0
+        parts: IntArray = len(components) - len(begun) + added
+        return parts
+
     def in_region(self, rows: IntArray, number: int) -> IntArray:
         """Those of the rows that are in the region of this number."""
         return rows[self._region_of[rows] == number]

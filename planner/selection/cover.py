@@ -147,11 +147,15 @@ class Cover:
         """Fewest views, by weight, with which each demand could be met (demands,)."""
         if self.once:
             return self.needed
-        order = np.argsort(self.asks, kind="stable")
-        worth, asks = self.worth.toarray()[:, order].astype(np.int64), self.asks[order]
-        before = np.cumsum(worth, axis=1) - worth
-        taken = np.clip(self.needed[:, None] - before, 0, worth)
-        return np.asarray(taken @ asks, dtype=np.int64)
+        begin, demand = self.worth.indptr, np.repeat(np.arange(len(self.needed)), np.diff(self.worth.indptr))
+        asks = self.asks[self.worth.indices]
+        order = np.lexsort((asks, demand))  # of each demand the columns with the fewest views first
+        worth, asks = self.worth.data[order].astype(np.int64), asks[order]
+        sums = np.concatenate([[0], np.cumsum(worth)])
+        before = sums[:-1] - sums[begin[demand]]
+        taken = np.clip(self.needed[demand] - before, 0, worth) * asks
+        views: IntArray = np.diff(np.concatenate([[0], np.cumsum(taken)])[begin])
+        return views
 
     def with_one_of_each(self, sets: Sequence[IntArray]) -> Cover:
         """The problem with one more demand for each set of rows (n,): one of the set must be chosen."""

@@ -30,6 +30,8 @@ SPARE_S = 1e-3
 """Seconds that a tour stays below its limit, since missions are rounded to micrometres."""
 WIDER = (1.0, 1.02, 1.05, 1.1, 1.2, 1.4, 2.0, 4.0, 16.0)
 """Multiples of the bound used as time limit in the search for a fleet's tours."""
+SEARCH_UP_TO = 500
+"""Stops up to which tours of a fleet are searched; of more a search this short finds none that are better."""
 HALVINGS = 4
 """Bisections between a time limit with tours and one without."""
 METHOD = "PyVRP, then moves and exchanges by the schedule's times"
@@ -85,6 +87,8 @@ def _fleet(route: Route, settings: Settings) -> DividedRoute:
 def _balanced(clock: TourTimes, numbers: list[int], bound: float, route: Route, *, seed: int) -> Tours:
     """Tours, one from each of the starts `numbers`, with the shortest longest tour found."""
     best = shorter_longest(clock, _cut(clock, route, numbers), numbers)
+    if clock.stops > SEARCH_UP_TO:
+        return best
     low, high = bound, _longest(clock, best, numbers)
     for factor in WIDER:
         if bound * factor >= high:
@@ -166,20 +170,32 @@ def _check_reach(clock: TourTimes, route: Route, key: str, limit_s: float) -> No
 
 def _fewest(clock: TourTimes, route: Route, bound: int, limit_s: float, *, seed: int) -> Tours:
     """The fewest tours found within the time."""
-    greedy = _cut_in_time(clock, route, limit_s)
-    for count in range(bound, len(greedy)):
-        for turning in TURNING:
-            found = vehicle_tours(
-                clock.estimate(turning),
-                stops=clock.stops, depots=[clock.stops] * count, pause_s=clock.pause_s,
-                limit_s=limit_s, closed=True, seed=seed,
-            )  # fmt: skip
-            if found is None:
-                break  # more time for turning finds none either
-            tours = shorter_longest(clock, tuple(tour for _, tour in found), [0] * len(found))
-            if _longest(clock, tours, [0] * len(tours)) <= limit_s:
-                return tours
-    return greedy
+    best = _cut_in_time(clock, route, limit_s)
+    low, high = bound, len(best)
+    while low < high:
+        count = (low + high) // 2
+        found = _tours_in_time(clock, count, limit_s, seed=seed)
+        if found is None:
+            low = count + 1
+        else:
+            best, high = found, count
+    return best
+
+
+def _tours_in_time(clock: TourTimes, count: int, limit_s: float, *, seed: int) -> Tours | None:
+    """So many tours or fewer within the time, if any are found."""
+    for turning in TURNING:
+        found = vehicle_tours(
+            clock.estimate(turning),
+            stops=clock.stops, depots=[clock.stops] * count, pause_s=clock.pause_s,
+            limit_s=limit_s, closed=True, seed=seed,
+        )  # fmt: skip
+        if found is None:
+            return None  # more time for turning finds none either
+        tours = shorter_longest(clock, tuple(tour for _, tour in found), [0] * len(found))
+        if _longest(clock, tours, [0] * len(tours)) <= limit_s:
+            return tours
+    return None
 
 
 def _cut_in_time(clock: TourTimes, route: Route, limit_s: float) -> Tours:

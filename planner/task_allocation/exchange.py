@@ -20,6 +20,8 @@ LONG = 30
 """Stops of a tour above which not all changes are timed."""
 LIKELY = 60
 """Changes of a long tour that are timed, the best by driving time."""
+MANY = 2000
+"""Exchanges of stops of a tour with all others above which not all are timed."""
 
 Tours = tuple[Tour, ...]
 NewTours = dict[int, Tour]
@@ -104,7 +106,7 @@ def _exchanged(
 ) -> Iterator[NewTours]:
     """Changes that move a stop of the longest tour to another, or exchange it for one of another."""
     longest = times.index(max(times))
-    if len(tours[longest]) > LONG:
+    if len(tours[longest]) > LONG or len(tours[longest]) * clock.stops > MANY:
         yield from _likely_exchanges(clock, tours, times, starts)
         return
     own = tours[longest]

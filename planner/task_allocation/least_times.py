@@ -1,7 +1,7 @@
 """Lower bounds on every division of the stops: on the longest tour's seconds, and on the number of tours.
 
-Most bounds count paths by `TourTimes.least`, a metric below every path's time, without turns at stops. The
-time of closed tours together counts these turns too (`TourTimes.turned_s`).
+Most bounds count paths by `TourTimes.least`, a lower bound on every path's time, without turns at stops. The
+time of tours together counts these turns too (`TourTimes.turned_s`).
 """
 
 from __future__ import annotations
@@ -30,9 +30,8 @@ def least_makespan(clock: TourTimes, starts: IntArray) -> float:
     times = clock.least
     tours, stops = len(starts), clock.stops
     together = stops * clock.pause_s + driven_together(times, stops, closed=clock.closed)
-    if clock.closed:
-        together = max(together, stops * clock.pause_s + driven_and_turned(clock, tours))
-    even = seconds_of(clock, times, math.ceil(stops / tours))
+    together = max(together, stops * clock.pause_s + driven_and_turned(clock, tours))
+    even = float(seconds_by_count(clock, times)[math.ceil(stops / tours) - 1])
     farthest = float(alone(clock, times).max()) + clock.pause_s
     return max(together / tours, even, farthest) - NOISE
 
@@ -45,7 +44,7 @@ def least_tours(clock: TourTimes, limit_s: float) -> int:
     """
     times, stops = clock.least, clock.stops
     together = stops * clock.pause_s + driven_together(times, stops, closed=True) - NOISE
-    most = next((n for n in range(stops, 1, -1) if seconds_of(clock, times, n) - NOISE <= limit_s), 1)
+    most = max(1, int(np.count_nonzero(seconds_by_count(clock, times) - NOISE <= limit_s)))
     count = max(1, math.ceil(together / limit_s), math.ceil(stops / most))
     while count < stops and stops * clock.pause_s + driven_and_turned(clock, count) > count * limit_s:
         count += 1
@@ -58,16 +57,17 @@ def alone(clock: TourTimes, times: FloatArray) -> FloatArray:
     return 2 * there if clock.closed else there
 
 
-def seconds_of(clock: TourTimes, times: FloatArray, stops: int) -> float:
-    """Lower bound in seconds on a tour of so many stops.
+def seconds_by_count(clock: TourTimes, times: FloatArray) -> FloatArray:
+    """Lower bounds in seconds on a tour of one stop, of two and so on, ascending (stops,).
 
     Its first stop is reached from a start, each other one from a stop, by at least its shortest path.
     """
     among = times[: clock.stops, : clock.stops].copy()
     np.fill_diagonal(among, np.inf)
-    shortest = np.sort(among.min(axis=1))[: stops - 1].sum() if stops > 1 else 0.0
+    shortest = np.concatenate([[0.0], np.cumsum(np.sort(among.min(axis=1))[:-1])])
     out = float(times[: clock.stops, clock.stops :].min())
-    return stops * clock.pause_s + float(shortest) + (2 * out if clock.closed else out)
+    paused = np.arange(1, clock.stops + 1) * clock.pause_s
+    return np.asarray(paused + shortest + (2 * out if clock.closed else out), dtype=np.float64)
 
 
 def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:
@@ -88,20 +88,40 @@ def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:
 
 
 def driven_and_turned(clock: TourTimes, tours: int) -> float:
-    """Lower bound in seconds on driving and turning of so many closed tours together.
+    """Lower bound in seconds on driving and turning of so many tours together.
 
-    One closed tour over the stops and over as many copies of the nearest start as there are tours, no two
-    copies next to each other, takes as long. It is bounded by the legs' times with their shares of turns.
+    One closed tour over the stops and over points between tours takes as long. It is bounded by the legs'
+    times with their shares of turns.
     """
-    stops, robot = clock.stops, clock.robot
-    among = clock.turned_s[:stops, :stops]
-    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
-    apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
-    whole = np.block([[among, there], [there.T, apart]])
+    whole = _closed_together(clock, tours) if clock.closed else _open_together(clock, tours)
     lowest = min(0.0, float(whole.min()))  # below 0 where a leg's share is
     whole -= lowest
     np.fill_diagonal(whole, 0.0)
-    legs = stops + tours
+    legs = clock.stops + (tours if clock.closed else 0)
     least = tour_proof(nanometres(whole), shortest_tour(whole, seed=1)).bound / NANOMETRES
-    rounding = ROUNDING_M / robot.speed + 2 * ROUNDING_RAD / robot.turn_rate
-    return least + legs * (lowest - rounding)
+    rounding = ROUNDING_M / clock.robot.speed + 2 * ROUNDING_RAD / clock.robot.turn_rate
+    return least + len(whole) * lowest - legs * rounding
+
+
+def _closed_together(clock: TourTimes, tours: int) -> FloatArray:
+    """Seconds between stops and as many copies of the nearest start as tours, no two next to each other."""
+    stops = clock.stops
+    among = clock.turned_s[:stops, :stops]
+    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
+    apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
+    return np.block([[among, there], [there.T, apart]])
+
+
+def _open_together(clock: TourTimes, tours: int) -> FloatArray:
+    """Seconds between stops, copies of the nearest start, and as many ends of tours.
+
+    Each end is next to a stop and to the start of the next tour. The last stop has no turn, so that its
+    one leg's share is taken off.
+    """
+    stops = clock.stops
+    among = clock.turned_s[:stops, :stops]
+    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
+    last = np.repeat(-clock.largest_share_s[:, None], tours, axis=1)
+    apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
+    following = apart * (1 - np.eye(tours))
+    return np.block([[among, there, last], [there.T, apart, following], [last.T, following, apart]])

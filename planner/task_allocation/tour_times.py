@@ -30,6 +30,8 @@ MICROSECONDS = 1e6
 """Per second."""
 NEAR = 30
 """Nearest points of each point to which corners of paths are counted in advance."""
+DETOURS_UP_TO = 500
+"""Points up to which lower bounds allow for detours; this takes time with the cube of their number."""
 
 
 class _LegTimes(NamedTuple):
@@ -148,10 +150,12 @@ class TourTimes:
 
     @cached_property
     def least(self) -> FloatArray:
-        """Lower bounds in seconds (n, n) on every path, for which no detour is shorter.
+        """Lower bounds in seconds (n, n) on every path; of few points no detour is shorter than these.
 
         Where corners were not counted, a path takes at least as long as a straight one of its length.
         """
+        if len(self.points) > DETOURS_UP_TO:
+            return self._driven_s
         times = np.array(self._driven_s)
         for k in range(len(times)):
             times = np.minimum(times, times[:, k, None] + times[None, k, :])
@@ -178,7 +182,17 @@ class TourTimes:
         start has no shares. Legs whose corners were not counted may leave in any direction, so that their
         share is the negative of the largest other one.
         """
-        driven = self._driven_s  # which times the legs counted
+        return frozen(self._driven_s + (self._shares + self._shares.T))
+
+    @property
+    def largest_share_s(self) -> FloatArray:
+        """The largest share in seconds of any leg at each stop (stops,)."""
+        return np.maximum(0.0, self._shares[: self.stops].max(axis=1))
+
+    @cached_property
+    def _shares(self) -> FloatArray:
+        """Seconds (n, n) of turning at the first point that count for the leg to the second."""
+        _ = self._driven_s  # which times the legs counted
         shares = np.zeros((len(self.points), len(self.points)))
         for stop in range(self.stops):
             near = np.flatnonzero(self._counted[stop] & (self._table.leaving[stop] >= 0))
@@ -188,7 +202,7 @@ class TourTimes:
             found = turn_shares(away, turn_rate=self.robot.turn_rate, scan=scan)
             shares[stop] = -found.max(initial=0.0)
             shares[stop, near] = found
-        return frozen(driven + (shares + shares.T))
+        return frozen(shares)
 
     def estimate(self, turning: float) -> FloatArray:
         """Seconds (n, n) of every path, and of a fraction of half a turn before it."""

@@ -21,6 +21,7 @@ from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour.least_time_bound import least_time
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import problem_of
+from stopgo.planner.covering_tour.search import shorter_line
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
 from stopgo.planner.routing.assemble import assemble
@@ -260,6 +261,35 @@ def test_what_a_change_takes_is_what_the_whole_line_then_takes_more(world: str) 
         turned = times.turned(line, 1)
         assert sorted(turned) == sorted(line)
         assert times.total(turned) <= times.total(line)
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_no_reversal_shortens_a_line_that_was_turned(world: str) -> None:
+    for case in (0, 2, 9):
+        times, random = problem_of(two_step(world, case)).times, np.random.default_rng(case)
+        inner = random.permutation(times.positions)[:6].tolist()
+        free = len(times.scan) - 1
+        line = times.turned([free, *inner, free], 1)
+        total = times.total(line)
+        for i in range(1, len(inner) + 1):
+            for j in range(i + 1, len(inner) + 1):
+                assert times.total([*line[:i], *line[i : j + 1][::-1], *line[j + 1 :]]) >= total
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_the_search_goes_on_where_the_best_changes_leave_scans_unconnected(world: str) -> None:
+    """Scans are connected only if every other position is unused: the search finds the same without them."""
+    problem = problem_of(two_step(world, 1))
+    task, positions = problem.task, problem.times.positions
+    used = np.zeros(positions, dtype=bool)
+    used[::2] = True
+    used[problem.stops_of(problem.line)] = True
+    none = np.where(used, 0, 10**9)
+    found = shorter_line(problem.times, replace(task, joins=lambda stops: used), problem.line)
+    dear = replace(problem.times, scan=problem.times.scan)
+    dear.inserted = lambda line, leg: problem.times.inserted(line, leg) + none  # type: ignore[method-assign]
+    assert found == shorter_line(dear, task, problem.line)
+    assert used[problem.stops_of(found)].all()
 
 
 def test_a_zone_is_left_by_no_selection_that_sees_enough() -> None:

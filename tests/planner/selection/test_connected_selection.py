@@ -128,3 +128,16 @@ def test_components_are_the_same_compiled_interpreted_and_by_scipy(
     assert [component.tolist() for component in components_of(links, rows)] == compiled
     assert interpreted.max() + 1 == len(compiled) > 1
     assert all(len(set(interpreted[component].tolist())) == 1 for component in compiled)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_components_with_each_further_row_are_counted_at_once(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    upper = np.triu(random.random((30, 30)) < 0.06, 1)
+    links = csr_array((upper | upper.T).astype(np.int8))
+    cover = Cover.of_whole(csr_array(np.eye(30, dtype=np.int8)), np.ones(30, np.int64), 24)
+    task = ConnectedCover(cover, links, np.arange(30))
+    for count in (0, 1, 8):
+        rows = np.sort(random.choice(30, count, replace=False))
+        each = [task.parts(np.union1d(rows, [row]).astype(np.int64)) for row in range(30)]
+        assert task.parts_with_each(rows).tolist() == each

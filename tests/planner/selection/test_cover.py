@@ -1,0 +1,35 @@
+"""The covering problem's own sums, against the same sums over dense matrices."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, eye_array
+
+from stopgo.planner.selection.cover import Cover
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_fewest_views_take_the_columns_that_need_few_first(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    worth, asks = random.integers(0, 6, (4, 25)), random.integers(2, 5, 25)
+    needed = random.integers(0, worth.sum(axis=1) + 1)
+    cover = Cover(csr_array(np.ones((3, 25), np.int8)), csr_array(worth), needed, asks)
+    each = [np.repeat(asks, own)[np.argsort(np.repeat(asks, own), kind="stable")] for own in worth]
+    assert cover.views_needed.tolist() == [
+        int(own[:least].sum()) for own, least in zip(each, needed.tolist(), strict=True)
+    ]
+
+
+def test_the_fewest_views_of_many_demands_take_little_memory() -> None:
+    """A dense matrix of these demands and columns has 32 MB."""
+    worth = csr_array(eye_array(2000, dtype=np.int64))
+    cover = Cover(csr_array(np.ones((1, 2000), np.int8)), worth, np.ones(2000, np.int64), 2)
+    tracemalloc.start()
+    try:
+        assert cover.views_needed.tolist() == [2] * 2000
+        assert tracemalloc.get_traced_memory()[1] < 2e6
+    finally:
+        tracemalloc.stop()
