@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.document import RobotSpec
 from stopgo.mission.document.schedule import turn_time
@@ -83,7 +82,7 @@ def _followed(paths: Paths, count: int, robot: RobotSpec) -> tuple[FloatArray, F
     seconds, leaving, arriving = (np.zeros((count, count)) for _ in range(3))
     for first in range(0, count, SOURCES):
         source = np.arange(first, min(count, first + SOURCES))
-        before = dijkstra(paths.graph, False, source, return_predecessors=True)[1]
+        before = paths.before(source)
         start, end = np.nonzero(source[:, None] < np.arange(count)[None, :])
         found = _back(paths.xy, before, source, start, end, robot)
         for table, values in zip((seconds, leaving, arriving), found, strict=True):

@@ -124,7 +124,7 @@ class TourProblem:
 
     @cached_property
     def legs(self) -> Legs:
-        return legs_between(self.route.space, np.concatenate([self._xy, self._ends]))
+        return legs_between(self.route.space, np.concatenate([self._xy, self._ends]), trees=True)
 
     @cached_property
     def line(self) -> PointLine:

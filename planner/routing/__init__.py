@@ -129,10 +129,14 @@ def _not_connected(selection: Selection) -> NegativeResult:
     return NegativeResult(f"{selection.space.floor.name}: the route's end is not connected with its stops")
 
 
-def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
-    """The paths between all pairs of points (n, 2), by the graph of the settings."""
+def legs_between(space: NavigableSpace, points: FloatArray, *, trees: bool = False) -> Legs:
+    """The paths between all pairs of points (n, 2), by the graph of the settings.
+
+    With `trees` many paths of the exact graph are to be followed.
+    """
     graph = variant("graph", space.settings.graph, GRAPHS)
-    return Legs(graph, graph.of_kind(graph.called(space, points), Paths), points)
+    more = {"trees": trees} if graph.name == "exact" else {}
+    return Legs(graph, graph.of_kind(graph.called(space, points, **more), Paths), points)
 
 
 def points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:

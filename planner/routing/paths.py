@@ -52,6 +52,14 @@ class Paths:
         self._trees[start] = found if again else None
         return found
 
+    def before(self, points: IntArray) -> IntArray:
+        """The node before each node on its shortest path from each of these points (n, nodes)."""
+        kept = [self._trees.get(point) for point in points.tolist()]
+        if any(tree is None for tree in kept):
+            found: IntArray = dijkstra(self.graph, False, points, return_predecessors=True)[1]
+            return found
+        return np.array(kept)
+
     way = path  # its name in 0.1; ends with 0.3
 
 
@@ -64,12 +72,21 @@ def straightened(line: FloatArray) -> FloatArray:
     return frozen(np.concatenate([line[:1], inner, line[-1:]]))
 
 
-def shortest_paths(xy: FloatArray, edges: IntArray, points: int) -> Paths:
-    """Shortest paths between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
-    graph = edge_lengths(xy, edges)
-    chunks = [np.arange(points)[k : k + CHUNK] for k in range(0, points, CHUNK)]
-    lengths = [dijkstra(graph, directed=False, indices=chunk)[:, :points] for chunk in chunks]
-    return Paths(xy=frozen(xy), lengths=frozen(np.concatenate(lengths)), graph=graph)
+def shortest_paths(xy: FloatArray, edges: IntArray, points: int, *, trees: bool = False) -> Paths:
+    """Shortest paths between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2).
+
+    With `trees` what leads to each node is kept, if there is room for it.
+    """
+    graph, kept = edge_lengths(xy, edges), {}
+    lengths = np.empty((points, points))
+    for chunk in np.split(np.arange(points), range(CHUNK, points, CHUNK)):
+        if trees and points * len(xy) <= MOST_KEPT:
+            away, before = dijkstra(graph, directed=False, indices=chunk, return_predecessors=True)
+            kept.update(zip(chunk.tolist(), before, strict=True))
+        else:
+            away = dijkstra(graph, directed=False, indices=chunk)
+        lengths[chunk] = away[:, :points]
+    return Paths(xy=frozen(xy), lengths=frozen(lengths), graph=graph, _trees=kept)
 
 
 def edge_lengths(xy: FloatArray, edges: IntArray) -> csr_array:

@@ -39,9 +39,9 @@ TOUCH = 1e-9
 """Products of areas (m⁴) below this are floating-point noise."""
 
 
-def paths_between(space: NavigableSpace, points: FloatArray) -> Paths:
-    """Shortest paths between all pairs of points (n, 2) of the drive area."""
-    return shortest_paths(*_graph_of(space, points), len(points))
+def paths_between(space: NavigableSpace, points: FloatArray, *, trees: bool = False) -> Paths:
+    """Shortest paths between all pairs of points (n, 2) of the drive area; `trees` as in `shortest_paths`."""
+    return shortest_paths(*_graph_of(space, points), len(points), trees=trees)
 
 
 def nearby_paths_between(space: NavigableSpace, points: FloatArray) -> NearbyPaths:

@@ -14,6 +14,7 @@ from stopgo.mission.geometry import polyline_length
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner import routing
+from stopgo.planner.routing import paths as paths_module
 from stopgo.planner.routing import roadmap, route
 from stopgo.planner.routing.dijkstra_kernel import reach
 from stopgo.planner.routing.nearby_paths import NearbyPaths
@@ -148,3 +149,14 @@ def test_the_nearest_are_those_of_a_stable_order(many: int) -> None:
     near, apart = nearest(cost, many)
     assert np.array_equal(near, np.argsort(away, axis=1, kind="stable")[:, :many])
     assert np.array_equal(apart, np.take_along_axis(away, near, axis=1))
+
+
+def test_trees_that_are_kept_are_those_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    xy, edges = network(2)
+    few, again = np.array([3, 0, 11]), shortest_paths(xy, edges, 12)
+    for room in (10**6, 0):
+        monkeypatch.setattr(paths_module, "MOST_KEPT", room)
+        kept = shortest_paths(xy, edges, 12, trees=True)
+        assert kept.lengths.tolist() == again.lengths.tolist()
+        assert kept.before(few).tolist() == again.before(few).tolist()
+        assert all(kept.path(a, 5).tolist() == again.path(a, 5).tolist() for a in few.tolist())
