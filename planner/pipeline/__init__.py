@@ -83,9 +83,9 @@ def _seen(found: Candidates, observe: Observe) -> Visibility:
     many = len(found.kept) >= MANY and settings.registers and settings.fov >= 360  # else with headings
     with SideWork(lambda: links_of(found), forked=many) as links:
         seen = visibility(found)
+        observe(seen)
         if many:
             store(links_of, seen.candidates, links.result())
-    observe(seen)
     return seen
 
 
