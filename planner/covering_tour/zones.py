@@ -60,7 +60,7 @@ class _Growth:
         farthest = np.full(cover.columns, -np.inf)
         farthest[self._seen] = np.maximum.reduceat(away[cover.seen_by.indices], self._first)
         reach = farthest[self._column]
-        order = np.argsort(-reach)
+        order = np.argsort(-reach, kind="stable")
         order = order[np.argsort(self._short_demand[order], kind="stable")]
         sums = np.cumsum(self._worth[order])
         before = np.concatenate([[0], sums])[self._begin]
