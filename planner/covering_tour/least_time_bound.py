@@ -30,9 +30,9 @@ DETOUR_S = 3.0
 """Cost of each stop at first, when only their number has a price."""
 EARNED = (0.0, 0.3)
 """Fractions of a stop's cost that targets and demands may pay at first; the rest is the number's price."""
-WORK = 500_000_000
+WORK = 330_000_000
 """Pieces of paths evaluated in all steps together."""
-FEWEST_STEPS, MOST_STEPS = 40, 240
+FEWEST_STEPS, MOST_STEPS = 60, 240
 FIRST_STEP, AIM, SMOOTHING, PATIENCE = 1.5, 1.03, 0.2, 8
 """The first step as a multiple of Polyak's for AIM times the best bound; as in the multiplier bound."""
 FEW_NODES = 2_000_000
@@ -102,13 +102,17 @@ def least_time(route: RouteRequirements) -> float:
     directions = np.full(route.graph.nodes, np.nan)
     directions[: len(route.directions)] = route.directions
     turned = route.graph.with_turns(directions)
-    graphs = [(route.graph, 0.0), (turned, route.legs_without_turn * turned.half_turn_s / 2)]
     sets = route.zones.packings
     if len(sets[0]) > MANY_ZONES:
         sets = sets[:1]
-    found = [_Relaxation(route, graph, zones, lost) for graph, lost in graphs for zones in sets]
-    values = [max(one.at(one.first_prices(0.0, each)).seconds for each in (0.0, DETOUR_S)) for one in found]
-    return max(0.0, *values, _highest(found[int(np.argmax(values))]))
+    found = [_Relaxation(route, route.graph, zones, 0.0) for zones in sets]
+    values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in found]
+    plain = found[int(np.argmax(values))]
+    lost = route.legs_without_turn * turned.half_turn_s / 2
+    both = [plain, _Relaxation(route, turned, plain.zones, lost)]
+    values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in both]
+    best = both[int(np.argmax(values))]
+    return max(0.0, best.at(best.first_prices(0.0, 0.0)).seconds, _highest(best))
 
 
 class _Bound(NamedTuple):
@@ -131,6 +135,7 @@ class _Relaxation:
         self._route, self._graph, self._lost = route, graph, lost
         self._priced = PricedCover(route.cover)
         self._sees = route.cover.sees.astype(float)
+        self.zones = zones
         self._outer = [np.array([end]) for end in route.outer]
         self._zones = [*self._outer, *zones]
         self.known_s, self._rows = route.known_s, route.cover.rows
