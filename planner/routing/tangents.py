@@ -77,7 +77,7 @@ def _off_corners(point: IntArray, triangle: IntArray, corners: IntArray) -> tupl
 
 
 def _in_triangles(mesh: Mesh, item: IntArray, triangle: IntArray) -> list[IntArray]:
-    """Where the nodes of each triangle begin (t + 1,), and the nodes."""
+    """The begin of each triangle's nodes (t + 1,), and these nodes."""
     order = np.argsort(triangle, kind="stable")
     return [np.searchsorted(triangle[order], np.arange(mesh.triangles + 1)), item[order]]
 
