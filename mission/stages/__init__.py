@@ -5,6 +5,7 @@ Distances are metres, areas m², angles radians counter-clockwise from +x. Array
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
@@ -254,6 +255,10 @@ class Candidates(InSpace):
         return frozen(np.flatnonzero(flag[self.kept]) if len(flag) else [], np.int64)
 
 
+ROWS_AT_A_TIME = 1000
+"""Candidates whose runs are sorted at a time, for the memory that this takes."""
+
+
 @dataclass(frozen=True, eq=False)
 class Visibility(InSpace):
     """Units that each reachable candidate sees, as runs of units on segments.
@@ -301,9 +306,15 @@ class Visibility(InSpace):
 
         They are sorted by row and, within a row, by unit.
         """
-        row = np.repeat(np.arange(self.rows), np.diff(self.pointer))
-        order = np.lexsort((self.first, row))
-        row, first, last = row[order], self.first[order], self.last[order]
+        a, b, c, d = (frozen(array, np.int64) for array in self._apart(0, self.rows))
+        return a, b, c, d
+
+    def _apart(self, low: int, high: int) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        """`runs_apart` of the rows from `low` to below `high`."""
+        own = slice(self.pointer[low], self.pointer[high])
+        row = np.repeat(np.arange(low, high), np.diff(self.pointer[low : high + 1]))
+        order = np.lexsort((self.first[own], row))
+        row, first, last = row[order], self.first[own][order], self.last[own][order]
         far = row * (self.targets.total + 1)
         reached = np.maximum.accumulate(last + far) - far
         same = np.diff(row) == 0
@@ -311,16 +322,16 @@ class Visibility(InSpace):
             [first[:1], np.where(same, np.maximum(first[1:], reached[:-1] + 1), first[1:])]
         )
         real = first <= last
-        arrays = (row, self.segment[order], first, last)
-        a, b, c, d = (frozen(array[real], np.int64) for array in arrays)
-        return a, b, c, d
+        return row[real], self.segment[own][order][real], first[real], last[real]
 
     @cached_property
     def units_seen(self) -> IntArray:
         """Number of units that each candidate sees (rows,)."""
-        row, _, first, last = self.runs_apart
         counts = np.zeros(self.rows, dtype=np.int64)
-        np.add.at(counts, row, last - first + 1)
+        begins = [*range(0, self.rows, ROWS_AT_A_TIME), self.rows]
+        for low, high in itertools.pairwise(begins):
+            row, _, first, last = self._apart(low, high)
+            np.add.at(counts, row, last - first + 1)
         return frozen(counts, np.int64)
 
     @cached_property
