@@ -6,14 +6,24 @@ Distances are metres, areas m², angles radians counter-clockwise from +x. Array
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stopgo.mission.floor import Element, Finding, FloorPlan, Opening, Room
-from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen, polyline_length
+from stopgo.mission.geometry import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Polygon,
+    frozen,
+    polyline_length,
+    read_only,
+)
 from stopgo.mission.settings import Settings
 
 
@@ -270,6 +280,7 @@ class Visibility(InSpace):
     candidates: Candidates
     pointer: IntArray
     segment: IntArray
+    """Whole numbers of 32 bits, as are `first` and `last`, or of 64: long ranges have many runs (runs,)."""
     first: IntArray
     last: IntArray
     method: str
@@ -306,12 +317,17 @@ class Visibility(InSpace):
 
         They are sorted by row and, within a row, by unit.
         """
-        a, b, c, d = (frozen(array, np.int64) for array in self._apart(0, self.rows))
+        parts = zip(*(self._apart(low, high) for low, high in self._blocks()), strict=True)
+        a, b, c, d = (read_only(np.concatenate(part)) for part in parts)
         return a, b, c, d
 
-    def _apart(self, low: int, high: int) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    def _blocks(self) -> Iterable[tuple[int, int]]:
+        """The first row and the row after the last one, of some rows at a time."""
+        return itertools.pairwise([*range(0, max(1, self.rows), ROWS_AT_A_TIME), self.rows])
+
+    def _apart(self, low: int, high: int) -> tuple[NDArray[Any], ...]:
         """`runs_apart` of the rows from `low` to below `high`."""
-        own = slice(self.pointer[low], self.pointer[high])
+        own, kind = slice(self.pointer[low], self.pointer[high]), self.first.dtype
         row = np.repeat(np.arange(low, high), np.diff(self.pointer[low : high + 1]))
         order = np.lexsort((self.first[own], row))
         row, first, last = row[order], self.first[own][order], self.last[own][order]
@@ -322,14 +338,13 @@ class Visibility(InSpace):
             [first[:1], np.where(same, np.maximum(first[1:], reached[:-1] + 1), first[1:])]
         )
         real = first <= last
-        return row[real], self.segment[own][order][real], first[real], last[real]
+        return row[real].astype(kind), self.segment[own][order][real], first[real].astype(kind), last[real]
 
     @cached_property
     def units_seen(self) -> IntArray:
         """Number of units that each candidate sees (rows,)."""
         counts = np.zeros(self.rows, dtype=np.int64)
-        begins = [*range(0, self.rows, ROWS_AT_A_TIME), self.rows]
-        for low, high in itertools.pairwise(begins):
+        for low, high in self._blocks():
             row, _, first, last = self._apart(low, high)
             np.add.at(counts, row, last - first + 1)
         return frozen(counts, np.int64)
