@@ -79,7 +79,6 @@ class PricedCover:
     def __init__(self, cover: Cover) -> None:
         self.cover = cover
         scale = max(1.0, float((cover.sees @ cover.weight).max(initial=1)))
-        self._sees = cover.sees.astype(float)
         self.weight = cover.weight / scale
         self.needed = cover.needed / scale
         self.worth = csr_array(cover.worth.astype(float) / scale)
@@ -95,13 +94,13 @@ class PricedCover:
         """The lower bound at these prices, and its subgradient."""
         cover = self.cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
-        paid_to, paid, gained = self._sees @ column, cover.asks * column, self._rest_of_column @ demand
+        paid_to, paid, gained = cover.paid_to(column), cover.asks * column, self._rest_of_column @ demand
         spare, cost = 1.0 - paid_to, paid - gained
         bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self.needed[1:])
         amounts = paid_to.sum() + paid.sum() + gained.sum() + demand @ self.needed[1:]
         value = whole + float((cost * bought).sum()) - ROUNDING * float(amounts)
-        seen = self._sees.T @ (spare < 0).astype(float)
+        seen = cover.covered_by(np.flatnonzero(spare < 0))
         return value, np.concatenate([cover.asks * bought - seen, self.needed[1:] - self._rest @ bought])
 
     def price_of_whole(self, prices: FloatArray) -> float:

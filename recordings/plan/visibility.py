@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import rerun as rr
 
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import Visibility
 from stopgo.recordings.drawing import entities, palette, strokes
-from stopgo.recordings.drawing.canvas import Canvas, on_screen
+from stopgo.recordings.drawing.canvas import Canvas, arrow_of_lines, on_screen
 from stopgo.recordings.drawing.pens import BOLD, HAIR, ORDER, Pen, style
 from stopgo.recordings.plan.story import CANDIDATES
 
@@ -18,17 +16,17 @@ MOST_FANS = 5000
 """Number of candidates above which rays are left out: they are most of a large floor's recording."""
 
 
-BLOCK = 500_000
-"""Lines that are drawn at a time, for the memory that this takes."""
-
-
 def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     """Draw what each candidate sees on the candidate timeline: its position, rays and visible lines."""
     if not visibility.rows:
         return
     eyes = visibility.candidates.xy[visibility.candidates.kept]
-    for low, high in pairwise(_blocks(visibility.pointer)):
-        _draw_rows(canvas, visibility, eyes, low, high)
+    begin, none = 0, (np.empty(0, dtype=np.int64),) * 4
+    for runs in visibility.runs_apart_by_rows():
+        end = int(runs[0].max(initial=begin - 1)) + 1
+        _draw_rows(canvas, visibility, range(begin, end), runs)
+        begin = end
+    _draw_rows(canvas, visibility, range(begin, visibility.rows), none)
     if visibility.rows <= MOST_FANS:
         style(canvas, entities.RAYS, Pen(palette.RAY, "ray", HAIR))
     style(canvas, entities.SEEN, Pen(palette.SEEN.colour, "target", BOLD))
@@ -44,23 +42,25 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     canvas.say(text, step=CANDIDATES)
 
 
-def _blocks(pointer: IntArray) -> list[int]:
-    """Return rows at which blocks of about `BLOCK` lines begin, and their number."""
-    begins = np.searchsorted(pointer, np.arange(0, max(1, pointer[-1]), BLOCK), side="right") - 1
-    return np.unique([0, *begins.tolist(), len(pointer) - 1]).tolist()
-
-
-def _draw_rows(canvas: Canvas, visibility: Visibility, eyes: FloatArray, low: int, high: int) -> None:
-    """Draw what the candidates from `low` to below `high` see."""
-    index = rr.TimeColumn(entities.CANDIDATE, sequence=np.arange(low, high))
-    counts = np.diff(visibility.pointer[low : high + 1])
-    own = slice(visibility.pointer[low], visibility.pointer[high])
-    runs = (visibility.segment[own], visibility.first[own], visibility.last[own])
-    seen = strokes.range_lines(visibility.targets, *runs)
+def _draw_rows(canvas: Canvas, visibility: Visibility, rows: range, runs: tuple[IntArray, ...]) -> None:
+    """Draw what some candidates see: runs by row, and by unit."""
+    if not rows:
+        return
+    row, segment, first, last = runs
+    index = rr.TimeColumn(entities.CANDIDATE, sequence=np.array(rows))
+    lines = canvas.local(strokes.range_lines(visibility.targets, segment, first, last))
     if visibility.rows <= MOST_FANS:
-        fans = np.stack([seen[:, 0], np.repeat(eyes[low:high], counts, axis=0), seen[:, 1]], axis=1)
-        _rows_of_lines(canvas, entities.RAYS, index, fans, counts)
-    _rows_of_lines(canvas, entities.SEEN, index, seen, counts)
+        eyes = canvas.local(visibility.candidates.xy[visibility.candidates.kept[row]])
+        fans = np.stack([lines[:, 0], eyes, lines[:, 1]], axis=1)
+        columns = rr.LineStrips2D.columns(strips=fans)
+        canvas.columns(entities.RAYS, index, columns.partition(_counts(row, rows)))
+    columns = rr.LineStrips2D.columns(strips=arrow_of_lines(lines))
+    canvas.columns(entities.SEEN, index, columns.partition(_counts(row, rows)))
+
+
+def _counts(row: IntArray, rows: range) -> IntArray:
+    """Return how many of the lines each row has (rows,)."""
+    return np.bincount(row - rows.start, minlength=len(rows))
 
 
 def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) -> None:
@@ -69,10 +69,3 @@ def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) ->
     sight = entities.CANDIDATE_COVERAGE
     canvas.columns(sight, index, rr.Scalars.columns(scalars=seen))
     canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="visible from the candidate", widths=1))
-
-
-def _rows_of_lines(
-    canvas: Canvas, entity: str, index: rr.TimeColumn, lines: FloatArray, counts: IntArray
-) -> None:
-    columns = rr.LineStrips2D.columns(strips=canvas.local(lines))
-    canvas.columns(entity, index, columns.partition(counts))
