@@ -41,5 +41,10 @@ def taken(cached: Callable[[Instance], T], instance: Instance) -> T:
     return result
 
 
+def forget(cached: Callable[[Instance], T], instance: Instance) -> None:
+    """Forget the result of an `instance_cached` function, if there is one."""
+    vars(instance).pop(_name_of(cached), None)
+
+
 def _name_of(function: Callable[[Instance], T]) -> str:
     return f"_cached_{function.__module__}.{function.__qualname__}"

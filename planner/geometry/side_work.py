@@ -35,6 +35,11 @@ class SideWork(Generic[T]):
         if forked and _can_fork():
             self._fork()
 
+    @property
+    def is_beside(self) -> bool:
+        """True if another process has begun with it, so that its result costs nothing here."""
+        return self._process > 0 or bool(self._found)
+
     def result(self) -> T:
         """The result, also when it is requested again; an error of the work is raised."""
         if not self._found:

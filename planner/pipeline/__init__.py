@@ -100,7 +100,8 @@ def _figures_before(seen: Visibility, planned: frozenset[int]) -> Iterator[Calla
         def before(route: Route) -> FiguresBefore:
             if route.visibility is seen:
                 return work.result()
-            return FiguresBefore.of(route.visibility, planned, before=seen)
+            known = work.result().estimates if work.is_beside else None
+            return FiguresBefore.of(route.visibility, planned, before=seen, known=known)
 
         yield before
 

@@ -89,10 +89,14 @@ class Cover:
     @cached_property
     def adds(self) -> csr_array:
         """Worth that each row adds to each demand before any is chosen (rows, demands)."""
-        return csr_array(vstack([part @ self.adds_to for part in self._parts()], format="csr"))
+        return self.sums_of(self.adds_to)
+
+    def sums_of(self, values: csr_array) -> csr_array:
+        """Sums of values of the columns (columns, n) that each row sees (rows, n)."""
+        return csr_array(vstack([part @ values for part in self._parts()], format="csr"))
 
     def _parts(self) -> Iterator[csr_array]:
-        """What some rows at a time see (n, columns); products are computed in 64 bits for each entry."""
+        """The matrix by some rows at a time (n, columns): products are computed in 64 bits for each entry."""
         begins = np.searchsorted(self.sees.indptr, np.arange(0, self.sees.nnz, BLOCK)).tolist()
         rows = np.unique([0, *begins, self.rows]).tolist()
         yield from (self.sees[low:high] for low, high in pairwise(rows) if len(rows) > 2)
@@ -190,7 +194,9 @@ class Cover:
         """The problem with one more demand for each set of rows (n,): one of the set must be chosen."""
         if not sets:
             return self
-        worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, to guide greedy
+        worth = max(
+            1, int(self.paid_to(self.weight.astype(float)).mean())
+        )  # about what a row sees, to guide greedy
         sizes = [len(rows) for rows in sets]
         entries = (
             np.ones(sum(sizes), np.int8),
@@ -217,6 +223,7 @@ def cover_of(visibility: Visibility, demands: Demands) -> Cover:
     seen = group >= 0
     _, first = np.unique(group[seen], return_index=True)
     merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
+    del sees
     worth = _worth(demands, np.repeat(group, np.diff(np.append(stretch_first, len(demands.weight)))))
     needed = demands.needed(np.asarray(worth.sum(axis=1)).ravel())
     return Cover(merged, worth, needed, visibility.asked[stretch_first[seen][first]])

@@ -78,7 +78,7 @@ class PricedCover:
 
     def __init__(self, cover: Cover) -> None:
         self.cover = cover
-        scale = max(1.0, float((cover.sees @ cover.weight).max(initial=1)))
+        scale = float(cover.paid_to(cover.weight.astype(float)).max(initial=1.0))
         self.weight = cover.weight / scale
         self.needed = cover.needed / scale
         self.worth = csr_array(cover.worth.astype(float) / scale)

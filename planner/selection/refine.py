@@ -19,7 +19,7 @@ from stopgo.mission.stages import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.selection import greedy_count, select
+from stopgo.planner.selection import forget_large_cover, greedy_count, select
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -50,7 +50,10 @@ def _select_joined(seen: Visibility) -> Selection:
         return select(seen)
     first = select(seen, joined=False)
     nearby = _nearby_candidates(first) if _refines(seen.settings, len(first.chosen)) else None
-    return select(seen if nearby is None else merged(seen, visibility(nearby)))
+    if nearby is None:
+        return select(seen)
+    forget_large_cover(seen)
+    return select(merged(seen, visibility(nearby)))
 
 
 def _refines(settings: Settings, stops: int) -> bool:
