@@ -143,9 +143,9 @@ def serve() -> None:
     load_when_used(SPARED_OF_RERUN)
     asked, answers = sys.stdin.buffer, sys.stdout.buffer
     sys.stdout = sys.stderr
-    import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
-
     with looking_seldom(), contextlib.suppress(EOFError):
+        import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
+
         while True:
             _serve_one(asked, answers)
 
