@@ -201,7 +201,7 @@ def test_foreign_early_and_doubled_answers_do_not_end_a_transfer(seed: int) -> N
 
 
 class AcceptsTooEarly(Scripted):
-    """Misses an item of every transfer, and accepts the list when an item arrives that it does not wait for."""
+    """Misses an item of every transfer, and accepts the list when an item arrives ahead of another."""
 
     missed = False
 
