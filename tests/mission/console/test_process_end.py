@@ -1,4 +1,4 @@
-"""A process ends after its threads and exit functions, with all its output, and frees nothing piece by piece."""
+"""A process ends after its threads and exit functions, with all its output, and frees nothing."""
 
 from __future__ import annotations
 
