@@ -274,9 +274,12 @@ def _selection(
 def coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     """Fraction of the whole that is covered after each row."""
     counted, steps = np.zeros(cover.columns, dtype=np.int64), []
+    seen = cover.seen_weight(counted)
     for row in rows:
-        counted[cover.columns_of(int(row))] += 1
-        steps.append(cover.seen_weight(counted) / cover.total)
+        columns = cover.columns_of(int(row))
+        counted[columns] += 1
+        seen += int(cover.weight[columns[counted[columns] == cover.asks[columns]]].sum())
+        steps.append(seen / cover.total)
     return np.array(steps)
 
 

@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
-from stopgo.planner.geometry.nested_clips import NestedClips
+from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape
 from stopgo.planner.space.local_shapes import obstacles_of, room_shapes
 
@@ -26,7 +26,7 @@ class StopFeasibility:
         self._walls = boundary_lines(self.obstacles)
         self._edges = boundary_lines(self.outline)
         self._wall_tree, self._edge_tree = shapely.STRtree(self._walls), shapely.STRtree(self._edges)
-        self._obstacle_clips, self._outline_clips = NestedClips(self.obstacles), NestedClips(self.outline)
+        self._obstacle_rings, self._outline_rings = RingIndex(self.obstacles), RingIndex(self.outline)
         for shape in (self.outline, self.obstacles, *self.rooms):
             shapely.prepare(shape)
 
@@ -39,9 +39,7 @@ class StopFeasibility:
         """Index into DROP_REASONS for each position (n, 2) in the drawing's coordinates."""
         local = np.asarray(xy, dtype=np.float64).reshape(-1, 2) - self.origin
         points = shapely.points(local)
-        in_room = np.array(
-            [shapely.dwithin(self.rooms[k], p, SLACK) for k, p in zip(room, points, strict=True)], dtype=bool
-        )
+        in_room = shapely.dwithin(np.array(self.rooms, dtype=object)[room], points, SLACK)
         on_floor = shapely.dwithin(self.outline, points, SLACK)
         clear = (self.to_element(local) >= self.element_clearance - SLACK) & ~shapely.contains(
             self.obstacles, points
@@ -56,8 +54,8 @@ class StopFeasibility:
     def around(self, shape: BaseGeometry, margin: float) -> tuple[BaseGeometry, BaseGeometry]:
         """Obstacles and outline in the box that reaches `margin` metres beyond a shape."""
         low_x, low_y, high_x, high_y = shape.bounds
-        box = np.array([low_x - margin, low_y - margin, high_x + margin, high_y + margin])
-        return self._obstacle_clips.within(box), self._outline_clips.within(box)
+        box = (low_x - margin, low_y - margin, high_x + margin, high_y + margin)
+        return self._obstacle_rings.within(box), self._outline_rings.within(box)
 
     def avoided(self, xy: FloatArray) -> BoolArray:
         """True for each point (n, 2) in a circle where the user allows no stop."""
