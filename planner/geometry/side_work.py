@@ -28,12 +28,16 @@ T = TypeVar("T")
 class SideWork(Generic[T]):
     """Work that goes on at the same time as other work; the end of the block ends it."""
 
-    def __init__(self, work: Callable[[], T], *, forked: bool) -> None:
-        """Begin the work in a process of its own if `forked`, and if this process can be forked."""
+    def __init__(self, work: Callable[[], T], *, forked: bool, again: Callable[[], T] | None = None) -> None:
+        """Begin the work in a process of its own if `forked`, and if this process can be forked.
+
+        `again` is done if that process ends without a result: what the work holds is then not kept.
+        """
         self._work, self._process, self._answer = work, 0, -1
         self._found: list[T] = []
-        if forked and _can_fork():
+        if forked and can_fork():
             self._fork()
+            self._work = work if again is None or not self._process else again
 
     def result(self) -> T:
         """The result, also when it is requested again; an error of the work is raised."""
@@ -106,7 +110,7 @@ def _pickled(value: object) -> bytes:
     return file.getvalue()
 
 
-def _can_fork() -> bool:
+def can_fork() -> bool:
     """True on Linux with several cores, for a process whose threads hold nothing that the work needs.
 
     Other threads do not outlive a fork, and their locks are never released.

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
     from stopgo.mission.stages.division import DividedRoute
     from stopgo.planner.appraisal.figures_of_route import FiguresBefore
+    from stopgo.planner.selection.later_bound import LaterBound
 
 Observe = Callable[[Any], None]
 
@@ -26,7 +27,8 @@ def plan(
 ) -> Plan:
     """Plan the part of the floor that holds the start, else the largest; with `all_parts` the others too.
 
-    Every stage result goes to `observe` as soon as it exists.
+    Every stage result goes to `observe` as soon as it exists; the selection of a large floor goes there again
+    after the figures, with its bound.
 
     Raises
     ------
@@ -57,14 +59,14 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     from stopgo.planner.routing import route
 
     seen = _seen(found, observe)
-    with _figures_before(seen, planned) as before:
-        selection = _selected(seen)
-        settings = found.space.settings
+    settings = found.space.settings
+    with _figures_before(seen, planned) as before, _later_bound(seen) as later:
+        selection = _selected(seen, later)
         driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
         observe(selection if driven is None else driven.selection)
         driven = driven or route(selection)
         observe(driven)
-        return _part(driven, number, before(driven), observe)
+        return _part(driven, number, before(driven), observe, later)
 
 
 MANY = 5000
@@ -105,13 +107,29 @@ def _figures_before(seen: Visibility, planned: frozenset[int]) -> Iterator[Calla
         yield before
 
 
-def _selected(seen: Visibility) -> Selection:
+@contextmanager
+def _later_bound(seen: Visibility) -> Iterator[LaterBound | None]:
+    """Yield what finds the bound of a selection during its route; None where that is no gain."""
+    from stopgo.planner.geometry.side_work import can_fork
+    from stopgo.planner.selection.later_bound import LaterBound
+
+    if seen.rows < MANY or seen.settings.minimise == "time" or not can_fork():
+        yield None  # the least time goes by the bound
+        return
+    with LaterBound(lambda: _selected(seen)) as later:
+        yield later
+
+
+def _selected(seen: Visibility, later: LaterBound | None = None) -> Selection:
     """Select the fewest stops, and more where the accuracy required needs them."""
     from stopgo.planner.selection.accurate import accurate
+    from stopgo.planner.selection.bound import lower_bound
     from stopgo.planner.selection.continuous_selection import SELECTOR, select_anywhere
     from stopgo.planner.selection.refine import select_refined
 
-    return accurate((select_anywhere if seen.settings.selector == SELECTOR else select_refined)(seen))
+    if seen.settings.selector == SELECTOR:
+        return accurate(select_anywhere(seen))
+    return accurate(select_refined(seen, bound_of=later or lower_bound))
 
 
 def _in_least_time(route: Route) -> Route:
@@ -120,8 +138,10 @@ def _in_least_time(route: Route) -> Route:
     return least_time_route(route)
 
 
-def _part(driven: Route, number: int, before: FiguresBefore, observe: Observe) -> PartPlan:
-    """Return the plan of a route."""
+def _part(
+    driven: Route, number: int, before: FiguresBefore, observe: Observe, later: LaterBound | None = None
+) -> PartPlan:
+    """Return the plan of a route; a bound that is known later is waited for, and observed."""
     from stopgo.mission.plan import PartPlan
     from stopgo.planner.appraisal.figures_of_route import figures_of
     from stopgo.planner.routing.assemble import assemble
@@ -129,8 +149,11 @@ def _part(driven: Route, number: int, before: FiguresBefore, observe: Observe) -
     figures = figures_of(driven, before)
     observe(figures)
     mission = assemble(driven, part=number)
+    proved = driven if later is None else later.proved(driven)
+    if proved is not driven:
+        observe(proved.selection)
     observe(mission)
-    return PartPlan(driven, figures, mission)
+    return PartPlan(proved, figures, mission)
 
 
 UNDIVIDED = -1
