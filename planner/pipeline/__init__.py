@@ -78,6 +78,7 @@ def _seen(found: Candidates, observe: Observe) -> Visibility:
     from stopgo.planner.geometry.instance_cache import store
     from stopgo.planner.geometry.side_work import SideWork
     from stopgo.planner.overlap import links_of
+    from stopgo.planner.selection import cover_problem
     from stopgo.planner.visibility import visibility
 
     observe(found)
@@ -87,6 +88,7 @@ def _seen(found: Candidates, observe: Observe) -> Visibility:
         seen = visibility(found)
         observe(seen)
         if many:
+            cover_problem(seen)  # kept for the selection, and made while the pairs are found
             store(links_of, seen.candidates, links.result())
     return seen
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -20,13 +23,15 @@ from stopgo.planner.space.connected_parts import parts_of
 from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
 from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
-from stopgo.planner.space.opening_joins import Crossing, barrier
+from stopgo.planner.space.opening_joins import barrier
 from stopgo.planner.space.opening_states import opening_states
-from stopgo.planner.space.room_spaces import room_spaces
+from stopgo.planner.space.room_spaces import room_spaces, stop_area_of
 from stopgo.planner.space.targets import occluders_of, targets_of
 
 MANY = 1000
-"""Elements from which targets are found in a process of their own."""
+"""Elements from which targets, and what concerns rooms, are found in processes of their own."""
+NOTHING = np.empty((0, 2, 2))
+T = TypeVar("T")
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
@@ -34,19 +39,19 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
-    ground = Ground.of(floor, settings)
-    closed = np.array(
-        [line for c in ground.crossings if (line := _closed_door(c, settings, ground)) is not None]
-    )
-    scanned = partial(_occluders_and_targets, floor, closed, settings)
-    with SideWork(scanned, forked=len(floor.elements) >= MANY) as work:
+    with _SideWorks(forked=len(floor.elements) >= MANY) as works:
+        scanned = partial(_occluders_and_targets, floor, settings)
+        scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
+        ground = Ground.of(floor, settings)
+        scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
+        clearing = works.begun(partial(stop_area_of, ground, settings))
         drive_area, gaps = drivable(ground, settings)
+        dividing = works.begun(partial(room_spaces, floor, ground, drive_area, clearing.result()))
         drive_polygons, gaps = to_polygons(drive_area, origin), frozen(gaps + origin)
         drive_shape = to_shape(drive_polygons, origin)
         parts = parts_of(drive_shape, gaps - origin)
         states, findings = opening_states(ground, parts, settings)
-        rooms = room_spaces(floor, ground, drive_area, settings)
-        occluders, targets = work.result()
+        rooms, (occluders, targets) = dividing.result(), scanning.result()
     if targets.total == 0:
         raise NegativeResult(
             f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
@@ -71,8 +76,19 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     return space
 
 
+class _SideWorks(ExitStack):
+    """Work that goes on next to other work; the end of the block ends all of it."""
+
+    def __init__(self, *, forked: bool) -> None:
+        super().__init__()
+        self._forked = forked
+
+    def begun(self, work: Callable[[], T]) -> SideWork[T]:
+        return self.enter_context(SideWork(work, forked=self._forked))
+
+
 def _occluders_and_targets(
-    floor: FloorPlan, closed: FloatArray, settings: Settings
+    floor: FloorPlan, settings: Settings, closed: FloatArray
 ) -> tuple[BaseGeometry, Targets]:
     occluders = occluders_of(floor, closed)
     return occluders, targets_of(floor, occluders, d_dis=settings.d_dis)
@@ -89,8 +105,7 @@ def _kinds(floor: FloorPlan) -> str:
     return ", ".join(sorted({item.kind for item in floor.elements})) or "none"
 
 
-def _closed_door(crossing: Crossing, settings: Settings, ground: Ground) -> FloatArray | None:
-    """The line of a door that blocks the laser, with `doors = closed`; else None."""
-    if settings.doors == "open" or crossing.opening.kind != "door":
-        return None
-    return barrier(crossing, ground.origin, ground.obstacle_rings)
+def _closed_doors(ground: Ground, settings: Settings) -> FloatArray:
+    """Lines (k, 2, 2) of doors that block the laser: with `doors = closed` all of them."""
+    doors = [item for item in ground.crossings if settings.doors != "open" and item.opening.kind == "door"]
+    return np.array([barrier(item, ground.origin, ground.obstacle_rings) for item in doors])
