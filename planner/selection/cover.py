@@ -157,17 +157,22 @@ class Cover:
         views: IntArray = np.diff(np.concatenate([[0], np.cumsum(taken)])[begin])
         return views
 
+    @cached_property
+    def usual_worth(self) -> int:
+        """About what a row sees, to guide greedy among other demands."""
+        return max(1, int((self.sees @ self.weight).mean()))
+
     def with_one_of_each(self, sets: Sequence[IntArray]) -> Cover:
         """The problem with one more demand for each set of rows (n,): one of the set must be chosen."""
         if not sets:
             return self
-        worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, to guide greedy
+        worth = self.usual_worth
         sizes = [len(rows) for rows in sets]
         entries = (
             np.ones(sum(sizes), np.int8),
             (np.concatenate(sets).astype(np.int32), np.repeat(np.arange(len(sets), dtype=np.int32), sizes)),
         )
-        chosen = coo_array(entries, shape=(self.rows, len(sets)))
+        chosen = csr_array(entries, shape=(self.rows, len(sets)))  # as `sees` is: else both are made anew
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
         made = Cover(
