@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.frames.geodesy import out_of_reach
-from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.geometry import FloatArray, Polygon, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Targets
 from stopgo.planner.geometry.instance_cache import store
@@ -22,7 +22,7 @@ from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.space.connected_parts import parts_of
 from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
-from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
+from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of, obstacles_of
 from stopgo.planner.space.opening_joins import barrier
 from stopgo.planner.space.opening_states import opening_states
 from stopgo.planner.space.room_spaces import room_spaces, stop_area_of
@@ -44,14 +44,15 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
         ground = Ground.of(floor, settings)
         scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
+        keeping = works.begun(partial(_kept, ground.obstacles, origin))
         clearing = works.begun(partial(stop_area_of, ground, settings))
         drive_area, gaps = drivable(ground, settings)
         dividing = works.begun(partial(room_spaces, floor, ground, drive_area, clearing.result()))
-        drive_polygons, gaps = to_polygons(drive_area, origin), frozen(gaps + origin)
-        drive_shape = to_shape(drive_polygons, origin)
+        (drive_polygons, drive_shape), gaps = _kept(drive_area, origin), frozen(gaps + origin)
         parts = parts_of(drive_shape, gaps - origin)
         states, findings = opening_states(ground, parts, settings)
         rooms, (occluders, targets) = dividing.result(), scanning.result()
+        obstacles, obstacle_shape = keeping.result()
     if targets.total == 0:
         raise NegativeResult(
             f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
@@ -61,7 +62,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         settings=settings,
         rooms=rooms,
         openings=states,
-        obstacles=to_polygons(ground.obstacles, origin),
+        obstacles=obstacles,
         occluders=to_polygons(occluders, origin),
         barriers=frozen(ground.barriers + origin),
         drive_area=drive_polygons,
@@ -72,6 +73,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         findings=(*floor.findings, *findings),
     )
     store(drive_area_of, space, drive_shape)
+    store(obstacles_of, space, obstacle_shape)
     store(drive_parts_of, space, parts)
     return space
 
@@ -92,6 +94,12 @@ def _occluders_and_targets(
 ) -> tuple[BaseGeometry, Targets]:
     occluders = occluders_of(floor, closed)
     return occluders, targets_of(floor, occluders, d_dis=settings.d_dis)
+
+
+def _kept(shape: BaseGeometry, origin: FloatArray) -> tuple[tuple[Polygon, ...], BaseGeometry]:
+    """A shape as polygons in the drawing's coordinates, and the shape that these are in the local frame."""
+    polygons = to_polygons(shape, origin)
+    return polygons, to_shape(polygons, origin)
 
 
 def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -36,20 +38,23 @@ class StopFeasibility:
         return max(self.space.settings.d_sec, self.space.settings.radius)
 
     def reasons(self, xy: FloatArray, room: IntArray) -> IntArray:
-        """Index into DROP_REASONS for each position (n, 2) in the drawing's coordinates."""
+        """Index into DROP_REASONS of each position (n, 2) in the drawing's coordinates, the first that holds."""
         local = np.asarray(xy, dtype=np.float64).reshape(-1, 2) - self.origin
-        points = shapely.points(local)
-        in_room = shapely.dwithin(np.array(self.rooms, dtype=object)[room], points, SLACK)
-        on_floor = shapely.dwithin(self.outline, points, SLACK)
-        clear = (self.to_element(local) >= self.element_clearance - SLACK) & ~shapely.contains(
-            self.obstacles, points
-        )
-        off_edge = self.to_edge(local) >= self.space.settings.edge - SLACK
-        return np.select(
-            [~in_room, ~on_floor, ~clear, ~off_edge, self.avoided(local + self.origin)],
-            [OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, AVOIDED],
-            KEPT,
-        ).astype(np.int64)
+        rooms, found = np.array(self.rooms, dtype=object), np.full(len(local), KEPT, dtype=np.int64)
+        tests: list[tuple[int, Callable[[FloatArray, IntArray], BoolArray]]] = [
+            (OUTSIDE, lambda at, room: ~shapely.dwithin(rooms[room], shapely.points(at), SLACK)),
+            (IN_HOLE, lambda at, _: ~shapely.dwithin(self.outline, shapely.points(at), SLACK)),
+            (TOO_CLOSE, lambda at, _: self.to_element(at) < self.element_clearance - SLACK),
+            (TOO_CLOSE, lambda at, _: shapely.contains(self.obstacles, shapely.points(at))),
+            (AT_EDGE, lambda at, _: self.to_edge(at) < self.space.settings.edge - SLACK),
+            (AVOIDED, lambda at, _: self.avoided(at + self.origin)),
+        ]
+        left = np.arange(len(local))
+        for reason, holds in tests:
+            dropped = holds(local[left], np.asarray(room)[left])
+            found[left[dropped]] = reason
+            left = left[~dropped]
+        return found
 
     def around(self, shape: BaseGeometry, margin: float) -> tuple[BaseGeometry, BaseGeometry]:
         """Obstacles and outline in the box that reaches `margin` metres beyond a shape."""
