@@ -53,10 +53,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         states, findings = opening_states(ground, parts, settings)
         rooms, (occluders, targets) = dividing.result(), scanning.result()
         obstacles, obstacle_shape = keeping.result()
-    if targets.total == 0:
-        raise NegativeResult(
-            f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
-        )
+    _check_targets(floor, targets)
     space = NavigableSpace(
         floor=floor,
         settings=settings,
@@ -109,8 +106,11 @@ def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings
         raise InputError(f"{floor.name}: its corner {far}, or plan without --origin")
 
 
-def _kinds(floor: FloorPlan) -> str:
-    return ", ".join(sorted({item.kind for item in floor.elements})) or "none"
+def _check_targets(floor: FloorPlan, targets: Targets) -> None:
+    """Refuse a floor without targets."""
+    if targets.total == 0:
+        kinds = ", ".join(sorted({item.kind for item in floor.elements})) or "none"
+        raise NegativeResult(f"{floor.name}: no target on the floor; elements: {kinds} (see --targets)")
 
 
 def _closed_doors(ground: Ground, settings: Settings) -> FloatArray:

@@ -38,7 +38,7 @@ class StopFeasibility:
         return max(self.space.settings.d_sec, self.space.settings.radius)
 
     def reasons(self, xy: FloatArray, room: IntArray) -> IntArray:
-        """Index into DROP_REASONS of each position (n, 2) in the drawing's coordinates, the first that holds."""
+        """Index into DROP_REASONS of each position (n, 2) in the drawing's coordinates: the first."""
         local = np.asarray(xy, dtype=np.float64).reshape(-1, 2) - self.origin
         rooms, found = np.array(self.rooms, dtype=object), np.full(len(local), KEPT, dtype=np.int64)
         tests: list[tuple[int, Callable[[FloatArray, IntArray], BoolArray]]] = [
