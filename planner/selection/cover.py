@@ -106,11 +106,15 @@ class Cover:
         """Columns that a row sees."""
         return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]].astype(np.int64)
 
-    def covered_by(self, rows: IntArray) -> IntArray:
-        """Number of `rows` that see each column (columns,)."""
+    def columns_of_each(self, rows: IntArray) -> IntArray:
+        """Columns that each of the rows sees, one row after the other (n,)."""
         begin = self.sees.indptr[rows]
         entries = ranges(begin, self.sees.indptr[np.asarray(rows) + 1] - begin)
-        return np.bincount(self.sees.indices[entries], minlength=self.columns)
+        return self.sees.indices[entries].astype(np.int64)
+
+    def covered_by(self, rows: IntArray) -> IntArray:
+        """Number of `rows` that see each column (columns,)."""
+        return np.bincount(self.columns_of_each(rows), minlength=self.columns)
 
     def seen_weight(self, covered: IntArray) -> int:
         """Weight of the columns that have all views they need."""
