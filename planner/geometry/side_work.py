@@ -39,6 +39,11 @@ class SideWork(Generic[T]):
             self._fork()
             self._work = work if again is None or not self._process else again
 
+    @property
+    def is_apart(self) -> bool:
+        """True until the result is there, if another process does the work."""
+        return self._process != 0
+
     def result(self) -> T:
         """The result, also when it is requested again; an error of the work is raised."""
         if not self._found:
