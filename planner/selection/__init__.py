@@ -112,10 +112,12 @@ def quick_count(visibility: Visibility) -> int:
     return len(fixed) + len(improved(problem, greedy(problem), at_least=0, swaps=QUICK_SWAPS))
 
 
-def greedy_count(visibility: Visibility) -> int:
-    """Number of stops of a greedy selection whose scans need not register."""
+def greedy_takes_at_most(most: int, visibility: Visibility) -> bool:
+    """True if a greedy selection whose scans need not register has so many stops or fewer."""
     _, fixed, problem = cover_problem(visibility)
-    return len(fixed) + len(greedy(problem))
+    if len(fixed) + counting_bound(problem) > most:
+        return False
+    return len(fixed) + len(greedy(problem)) <= most
 
 
 @instance_cached
@@ -296,7 +298,7 @@ __all__ = [
     "Selector",
     "cover_problem",
     "coverage_steps",
-    "greedy_count",
+    "greedy_takes_at_most",
     "offered_for_follow_up",
     "quick_count",
     "quick_estimate",

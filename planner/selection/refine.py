@@ -19,7 +19,7 @@ from stopgo.mission.stages import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.selection import BoundOf, greedy_count, select
+from stopgo.planner.selection import BoundOf, greedy_takes_at_most, select
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
@@ -50,7 +50,8 @@ def select_refined(seen: Visibility, *, bound_of: BoundOf = lower_bound) -> Sele
 
 def _select_joined(seen: Visibility, bound_of: BoundOf) -> Selection:
     """The selection whose scans register, also from positions near the stops of one that need not."""
-    if not _refines(seen.settings, greedy_count(seen)):
+    asked = seen.settings.refine
+    if not (greedy_takes_at_most(MOST, seen) if asked is None else asked):
         return select(seen, bound_of=bound_of)
     first = select(seen, joined=False)
     nearby = _nearby_candidates(first) if _refines(seen.settings, len(first.chosen)) else None
