@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -44,15 +44,14 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
         ground = Ground.of(floor, settings)
         scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
-        keeping = works.begun(partial(_kept, ground.obstacles, origin))
-        clearing = works.begun(partial(stop_area_of, ground, settings))
+        clearing = works.begun(partial(_stop_area_and_obstacles, ground, settings), after=scanning)
         drive_area, gaps = drivable(ground, settings)
-        dividing = works.begun(partial(room_spaces, floor, ground, drive_area, clearing.result()))
         (drive_polygons, drive_shape), gaps = _kept(drive_area, origin), frozen(gaps + origin)
         parts = parts_of(drive_shape, gaps - origin)
+        stop_area, obstacles, obstacle_shape = clearing.result()
+        dividing = works.begun(partial(room_spaces, floor, ground, drive_area, stop_area))
         states, findings = opening_states(ground, parts, settings)
         rooms, (occluders, targets) = dividing.result(), scanning.result()
-        obstacles, obstacle_shape = keeping.result()
     _check_targets(floor, targets)
     space = NavigableSpace(
         floor=floor,
@@ -82,8 +81,9 @@ class _SideWorks(ExitStack):
         super().__init__()
         self._forked = forked
 
-    def begun(self, work: Callable[[], T]) -> SideWork[T]:
-        return self.enter_context(SideWork(work, forked=self._forked))
+    def begun(self, work: Callable[[], T], *, after: SideWork[Any] | None = None) -> SideWork[T]:
+        """The work, begun now or once that `after` is done."""
+        return self.enter_context(SideWork(work, forked=self._forked, after=after))
 
 
 def _occluders_and_targets(
@@ -91,6 +91,12 @@ def _occluders_and_targets(
 ) -> tuple[BaseGeometry, Targets]:
     occluders = occluders_of(floor, closed)
     return occluders, targets_of(floor, occluders, d_dis=settings.d_dis)
+
+
+def _stop_area_and_obstacles(
+    ground: Ground, settings: Settings
+) -> tuple[BaseGeometry, tuple[Polygon, ...], BaseGeometry]:
+    return stop_area_of(ground, settings), *_kept(ground.obstacles, ground.origin)
 
 
 def _kept(shape: BaseGeometry, origin: FloatArray) -> tuple[tuple[Polygon, ...], BaseGeometry]:
