@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.freed_memory import give_back, look_seldom
+from stopgo.freed_memory import give_back, looking_seldom
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
@@ -57,7 +57,7 @@ def plan_files(
     With `beside` the recordings are drawn in a process of their own, which loads Rerun during planning.
     `observe` is called with the result of each stage as soon as it is there.
     """
-    with running(f"reading {floor}") as step, recording_process() as recorder:
+    with running(f"reading {floor}") as step, recording_process() as recorder, looking_seldom():
         watch = Stopwatch(step, observe)
         writing = _Writing(out, print_options or PrintOptions(), watch, recorder, beside)
         return _planned(floor, settings, writing, all_parts)
@@ -77,7 +77,6 @@ class _Writing:
 def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool) -> list[PlanReport]:
     from stopgo.planner.commands.outputs import names
 
-    look_seldom()
     load_when_used()
     from stopgo.planner.floors import options_of, read_floor, standing_bodies
 
