@@ -24,6 +24,7 @@ from stopgo.planner.overlap.surfaces import smooth_surfaces
 from stopgo.planner.space.targets import face_segments, units_on, without_needless_vertices
 from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
+from stopgo.planner.visibility.sight.mesh import Mesh
 from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
 from stopgo.planner.visibility.unit_ranges import ranges, runs_of
 
@@ -120,7 +121,7 @@ class ShownBoundary:
 
 def boundary_of(space: NavigableSpace) -> Boundary:
     """All faces of what stops the laser."""
-    ends = np.rint(face_segments(_solids(space))) * GRID
+    ends = np.rint(face_segments(solids_of(space))) * GRID
     pieces = units_on(np.hypot(*(ends[:, 1] - ends[:, 0]).T), d_dis=PIECE_M)
     order, first, closed = smooth_surfaces(ends)
     a, b = frozen(ends[order, 0]), frozen(ends[order, 1])
@@ -129,7 +130,7 @@ def boundary_of(space: NavigableSpace) -> Boundary:
 
 
 @instance_cached
-def _solids(space: NavigableSpace) -> BaseGeometry:
+def solids_of(space: NavigableSpace) -> BaseGeometry:
     """Solids that stop the laser, in whole grid steps, with one face for each straight side.
 
     Targets have a face for each element, and vertices where other elements touch them. Which element owns
@@ -140,6 +141,12 @@ def _solids(space: NavigableSpace) -> BaseGeometry:
     return whole_steps(without_needless_vertices(local))
 
 
+@instance_cached
+def mesh_around(candidates: Candidates) -> Mesh:
+    """A mesh of the open space around the solids."""
+    return open_space_around(candidates, solids_of(candidates.space))
+
+
 def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
     """The boundary that some rows see within `overlap_range` and the scanner's field of view.
 
@@ -147,8 +154,7 @@ def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
     """
     boundary = boundary_of(candidates.space)
     faces = np.ones(len(boundary.a), dtype=bool)
-    mesh = open_space_around(candidates, _solids(candidates.space))
-    scene = scene_of(mesh, boundary.a, boundary.b, boundary.pieces, faces)
+    scene = scene_of(mesh_around(candidates), boundary.a, boundary.b, boundary.pieces, faces)
     blocks = np.split(rows, range(BLOCK, len(rows), BLOCK))
     return _together([_shown_from(candidates, block, boundary, scene) for block in blocks])
 

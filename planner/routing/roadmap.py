@@ -115,7 +115,8 @@ def _drive_area(space: NavigableSpace) -> BaseGeometry:
 
 
 @instance_cached
-def _mesh(space: NavigableSpace) -> Mesh:
+def drive_mesh(space: NavigableSpace) -> Mesh:
+    """A mesh of the drive area."""
     return mesh_of(whole_steps(_drive_area(space)))
 
 
@@ -139,7 +140,7 @@ def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first
     sides = np.zeros((len(nodes), 2, 2))
     sides[first : first + len(corners.xy)] = corners.sides
     ones = np.ones(len(nodes), dtype=np.int64)
-    scene = scene_of(_mesh(space), nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
+    scene = scene_of(drive_mesh(space), nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
     node, between = views_of(to_grid(nodes), to_grid(sides))
     fewest, done, found = 1 + PAIRS // len(nodes), 0, []
     rows = fewest
