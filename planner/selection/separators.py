@@ -13,8 +13,13 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.greedy import greedy
+from stopgo.planner.selection.improve import improved
 from stopgo.planner.selection.link_graph import LinkedParts, LinkGraph, adjacency_of
 from stopgo.planner.selection.running_coverage import RunningCoverage
+
+FEW = 2
+"""Components of which one is needed at least; more are searched for fewer."""
 
 
 def components_of(links: csr_array, rows: IntArray) -> list[IntArray]:
@@ -39,7 +44,17 @@ def _labels(links: csr_array, rows: IntArray) -> IntArray:
 
 
 def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
-    """The components needed to meet every demand: the smallest superfluous ones are dropped first."""
+    """The components needed to meet every demand, as few as are found.
+
+    The smallest superfluous ones are dropped first. Where many remain, a search for the fewest often leaves
+    half of them.
+    """
+    dropped = _without_superfluous(cover, components)
+    fewest = _fewest(cover, components) if len(dropped) > FEW else dropped
+    return fewest if len(fewest) < len(dropped) else dropped
+
+
+def _without_superfluous(cover: Cover, components: list[IntArray]) -> list[IntArray]:
     needed: list[IntArray] = []
     coverage = RunningCoverage(cover, np.concatenate([np.empty(0, np.int64), *components]))
     for before, component in reversed(list(enumerate(components))):
@@ -48,6 +63,19 @@ def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
             coverage.add(component)
             needed.append(component)
     return needed[::-1]
+
+
+def _fewest(cover: Cover, components: list[IntArray]) -> list[IntArray]:
+    """Few components that meet every demand, by the search for few stops; all of them if it finds none."""
+    sizes = [len(component) for component in components]
+    ends = (np.repeat(np.arange(len(components)), sizes), np.concatenate(components))
+    members = csr_array((np.ones(len(ends[0]), np.int64), ends), shape=(len(components), cover.rows))
+    sees = csr_array(members @ cover.sees)
+    sees.data = np.ones(len(sees.data), np.int8)
+    together = Cover(sees, cover.worth, cover.needed)
+    chosen = [components[k] for k in np.sort(improved(together, greedy(together), at_least=1))]
+    enough = RunningCoverage(cover, np.concatenate([np.empty(0, np.int64), *chosen])).is_enough
+    return chosen if enough else components
 
 
 @dataclass(frozen=True, eq=False)

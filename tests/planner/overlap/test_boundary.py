@@ -45,7 +45,7 @@ def test_what_is_found_block_by_block_is_what_is_found_at_once(
     whole = shown(found, rows)
     monkeypatch.setattr(boundary, "BLOCK", 7)
     parts = shown(found, rows)
-    assert len(rows) > 3 * 7 and len(whole.face)
-    for name in ("pointer", "face", "begin", "end", "xy"):
+    assert len(rows) > 3 * 7 and len(whole.surface)
+    for name in ("pointer", "surface", "begin", "end", "xy"):
         assert np.array_equal(getattr(parts, name), getattr(whole, name)), name
-    assert len(shown(found, rows[:0]).face) == 0
+    assert len(shown(found, rows[:0]).surface) == 0
