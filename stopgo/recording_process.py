@@ -19,7 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any
 
-from stopgo.freed_memory import look_seldom
+from stopgo.freed_memory import looking_seldom
 from stopgo.mission.errors import InputError
 from stopgo.spared_modules import SPARED_OF_RERUN, load_when_used
 
@@ -142,14 +142,13 @@ def recording_process() -> Iterator[RecordingProcess]:
 
 def serve() -> None:
     """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
-    look_seldom()
     leave_pandas_out()
     load_when_used(SPARED_OF_RERUN)
     asked, answers = sys.stdin.buffer, sys.stdout.buffer
     sys.stdout = sys.stderr
-    import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
+    with looking_seldom(), contextlib.suppress(EOFError):
+        import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
 
-    with contextlib.suppress(EOFError):
         while True:
             _serve_one(asked, answers)
 

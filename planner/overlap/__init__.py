@@ -6,16 +6,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.sparse import csr_array
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates
 from stopgo.mission.stages.network import CONFIDENCE, FLOOR_M, NOISE_M, noise_factor
 from stopgo.planner.geometry.compiling import compiled
-from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.overlap.boundary import shown
+from stopgo.planner.geometry.instance_cache import instance_cached, store
+from stopgo.planner.overlap.boundary import mesh_around, shown, solids_of
 from stopgo.planner.overlap.pair_kernel import firm_pairs
 from stopgo.planner.overlap.pairs import DIGITS, Overlaps, Pairs
+from stopgo.planner.visibility.sight.mesh import Mesh
 
 ACCURACY_M = 0.01
 """Error that a registered pair may have, also at LEVER_M from the scanner."""
@@ -58,6 +60,23 @@ def links_of(candidates: Candidates) -> csr_array:
     return (later + later.T).tocsr()
 
 
+PairsFound = tuple[csr_array, BaseGeometry, Mesh]
+"""Links, and from what they were found: the solids, and the open space around them."""
+
+
+def pairs_found(candidates: Candidates) -> PairsFound:
+    """The links of candidates with all that later questions about pairs need."""
+    return links_of(candidates), solids_of(candidates.space), mesh_around(candidates)
+
+
+def keep_pairs(candidates: Candidates, found: PairsFound) -> None:
+    """Keep what another process found, so that it is not found again."""
+    links, solids, mesh = found
+    store(links_of, candidates, links)
+    store(solids_of, candidates.space, solids)
+    store(mesh_around, candidates, mesh)
+
+
 def _links(overlaps: Overlaps, settings: Settings) -> Iterator[tuple[IntArray, IntArray]]:
     """Rows that register with later rows, and these, in numpy."""
     for pairs in overlaps.later(least_m=LEAST_COMMON_M):
@@ -80,8 +99,10 @@ __all__ = [
     "LEAST_COMMON_M",
     "Overlaps",
     "Pairs",
+    "keep_pairs",
     "least_hold_m",
     "links_of",
     "overlaps_of",
+    "pairs_found",
     "registers",
 ]

@@ -110,7 +110,8 @@ def _drive_area(space: NavigableSpace) -> BaseGeometry:
 
 
 @instance_cached
-def _mesh(space: NavigableSpace) -> Mesh:
+def drive_mesh(space: NavigableSpace) -> Mesh:
+    """A mesh of the drive area."""
     return mesh_of(whole_steps(_drive_area(space)))
 
 
@@ -133,7 +134,7 @@ def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first
     sides = np.zeros((len(nodes), 2, 2))
     of_corners = np.arange(first, first + len(corners.xy))
     sides[of_corners] = corners.sides
-    return _tangent(straight_pieces(_mesh(space), nodes, of_corners, corners.sides), nodes, sides)
+    return _tangent(straight_pieces(drive_mesh(space), nodes, of_corners, corners.sides), nodes, sides)
 
 
 def _tangent(edges: IntArray, nodes: FloatArray, sides: FloatArray) -> IntArray:

@@ -125,13 +125,17 @@ class Cover:
         """Columns that a row sees."""
         return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]].astype(np.int64)
 
+    def columns_of_each(self, rows: IntArray) -> IntArray:
+        """Columns that each of the rows sees, one row after the other (n,)."""
+        begin = self.sees.indptr[rows]
+        entries = ranges(begin, self.sees.indptr[np.asarray(rows) + 1] - begin)
+        return self.sees.indices[entries].astype(np.int64)
+
     def covered_by(self, rows: IntArray) -> IntArray:
         """Number of `rows` that see each column (columns,)."""
         kernel = compiled(add_views, large=False)
         if kernel is None:
-            begin = self.sees.indptr[rows]
-            entries = ranges(begin, self.sees.indptr[np.asarray(rows) + 1] - begin)
-            return np.bincount(self.sees.indices[entries], minlength=self.columns)
+            return np.bincount(self.columns_of_each(rows), minlength=self.columns)
         views = np.zeros(self.columns, dtype=np.int64)
         kernel(np.ascontiguousarray(rows, np.int64), *self.seen_columns, views)
         return views
@@ -190,19 +194,22 @@ class Cover:
         views: IntArray = np.diff(np.concatenate([[0], np.cumsum(taken)])[begin])
         return views
 
+    @cached_property
+    def usual_worth(self) -> int:
+        """About what a row sees, to guide greedy among other demands."""
+        return max(1, int(self.paid_to(self.weight.astype(float)).mean()))
+
     def with_one_of_each(self, sets: Sequence[IntArray]) -> Cover:
         """The problem with one more demand for each set of rows (n,): one of the set must be chosen."""
         if not sets:
             return self
-        worth = max(
-            1, int(self.paid_to(self.weight.astype(float)).mean())
-        )  # about what a row sees, to guide greedy
+        worth = self.usual_worth
         sizes = [len(rows) for rows in sets]
         entries = (
             np.ones(sum(sizes), np.int8),
             (np.concatenate(sets).astype(np.int32), np.repeat(np.arange(len(sets), dtype=np.int32), sizes)),
         )
-        chosen = coo_array(entries, shape=(self.rows, len(sets)))
+        chosen = csr_array(entries, shape=(self.rows, len(sets)))  # as `sees` is: else both are made anew
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
         made = Cover(

@@ -82,6 +82,28 @@ def test_the_end_of_the_block_ends_the_work(tmp_path: Path) -> None:
         os.kill(_workers(tmp_path / "workers")[0], 0)
 
 
+def test_work_begins_once_that_before_it_has_answered(tmp_path: Path) -> None:
+    def work_when_allowed() -> str:
+        wait_until((tmp_path / "allowed").exists)
+        return _noted(tmp_path / "workers")
+
+    with (
+        SideWork(work_when_allowed, forked=True) as one,
+        SideWork(lambda: len(_workers(tmp_path / "workers")), forked=True, after=one) as other,
+    ):
+        (tmp_path / "allowed").touch()
+        assert [other.result(), one.result()] == [1, "done"]
+
+
+def test_work_is_done_again_in_another_way_if_its_process_dies() -> None:
+    def die() -> str:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return "never"
+
+    with SideWork(die, forked=True, again=lambda: "again") as work:
+        assert work.result() == "again"
+
+
 def test_a_process_with_other_threads_is_not_forked(tmp_path: Path) -> None:
     ended = threading.Event()
     other = threading.Thread(target=ended.wait)
