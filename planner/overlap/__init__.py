@@ -55,7 +55,8 @@ def links_of(candidates: Candidates) -> csr_array:
     overlaps = Overlaps(shown(candidates, rows, only_wide=settings.least_overlap == 0))  # large, so not kept
     kernel = compiled(firm_pairs, large=False)
     pairs = _links(overlaps, settings) if kernel is None else links_by_kernel(kernel, overlaps, settings)
-    ends = tuple(np.concatenate([np.empty(0, np.int64), *ends]) for ends in zip(*pairs, strict=True))
+    pairs = (tuple(ends.astype(np.int32) for ends in some) for some in pairs)  # there are millions
+    ends = tuple(np.concatenate([np.empty(0, np.int32), *ends]) for ends in zip(*pairs, strict=True))
     later = csr_array((np.ones(len(ends[0]), np.int8), ends), shape=(overlaps.rows,) * 2)
     return (later + later.T).tocsr()
 
