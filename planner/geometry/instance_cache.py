@@ -42,6 +42,11 @@ def taken(cached: Callable[[Instance], T], instance: Instance) -> T:
     return result
 
 
+def forget(cached: Callable[[Instance], T], instance: Instance) -> None:
+    """Forget the result of an `instance_cached` function, if there is one."""
+    vars(instance).pop(_name_of(cached), None)
+
+
 def changed_copy(instance: Instance, **changes: Any) -> Instance:
     """A copy of a dataclass instance, with changes on which nothing depends that was derived from it."""
     made = dataclasses.replace(cast(Any, instance), **changes)

@@ -54,6 +54,11 @@ class SideWork(Generic[T]):
         """True until the result is there, if another process does the work."""
         return self._process != 0
 
+    @property
+    def is_beside(self) -> bool:
+        """True if another process has begun with it, so that its result costs nothing here."""
+        return self._process > 0 or bool(self._found)
+
     def result(self) -> T:
         """The result, also when it is requested again; an error of the work is raised."""
         if not self._found:

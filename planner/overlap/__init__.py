@@ -39,11 +39,6 @@ def least_hold_m(settings: Settings) -> float:
 @instance_cached
 def overlaps_of(candidates: Candidates) -> Overlaps:
     """The boundary that kept candidates see in common."""
-    return _overlaps_of(candidates)
-
-
-def _overlaps_of(candidates: Candidates) -> Overlaps:
-    """The same, not kept: of a large floor it is a tenth of all memory."""
     return Overlaps(shown(candidates, np.arange(len(candidates.kept))))
 
 
@@ -56,10 +51,12 @@ def registers(pairs: Pairs, settings: Settings) -> IntArray:
 @instance_cached
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
-    overlaps, settings = _overlaps_of(candidates), candidates.settings
+    settings, rows = candidates.settings, np.arange(len(candidates.kept))
+    overlaps = Overlaps(shown(candidates, rows, only_wide=settings.least_overlap == 0))  # large, so not kept
     kernel = compiled(firm_pairs, large=False)
     pairs = _links(overlaps, settings) if kernel is None else links_by_kernel(kernel, overlaps, settings)
-    ends = tuple(np.concatenate([np.empty(0, np.int64), *ends]) for ends in zip(*pairs, strict=True))
+    pairs = (tuple(ends.astype(np.int32) for ends in some) for some in pairs)  # there are millions
+    ends = tuple(np.concatenate([np.empty(0, np.int32), *ends]) for ends in zip(*pairs, strict=True))
     later = csr_array((np.ones(len(ends[0]), np.int8), ends), shape=(overlaps.rows,) * 2)
     return (later + later.T).tocsr()
 

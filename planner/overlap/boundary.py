@@ -95,8 +95,13 @@ class Boundary:
     @cached_property
     def around(self) -> FloatArray:
         """Metres around each closed surface, such as a round column; 0 for the others (surfaces,)."""
+        return np.where(self.closed, self.reach, 0.0)
+
+    @cached_property
+    def reach(self) -> FloatArray:
+        """Metres of each surface (surfaces,)."""
         last = np.append(self.first[1:], len(self.a))[: len(self.first)] - 1
-        return np.where(self.closed, self.along[last] + self.length[last], 0.0)
+        return self.along[last] + self.length[last]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,16 +152,19 @@ def mesh_around(candidates: Candidates) -> Mesh:
     return open_space_around(candidates, solids_of(candidates.space))
 
 
-def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
+def shown(candidates: Candidates, rows: IntArray, *, only_wide: bool = False) -> ShownBoundary:
     """The boundary that some rows see within `overlap_range` and the scanner's field of view.
 
-    `rows` (n,) are indices into `kept`; the result is in their order.
+    `rows` (n,) are indices into `kept`; the result is in their order. With `only_wide` the metres that a row
+    sees are those of surfaces on which a stretch can count: thin columns have others.
     """
     boundary = boundary_of(candidates.space)
-    faces = np.ones(len(boundary.a), dtype=bool)
-    scene = scene_of(mesh_around(candidates), boundary.a, boundary.b, boundary.pieces, faces)
+    wide = boundary.reach[boundary.surface] > WIDER_M
+    faces = np.flatnonzero(wide) if only_wide else np.arange(len(wide))
+    ends, on_boundary = (boundary.a[faces], boundary.b[faces]), np.ones(len(faces), dtype=bool)
+    scene = scene_of(mesh_around(candidates), *ends, boundary.pieces[faces], on_boundary)
     blocks = np.split(rows, range(BLOCK, len(rows), BLOCK))
-    return _together([_shown_from(candidates, block, boundary, scene) for block in blocks])
+    return _together([_shown_from(candidates, block, boundary, scene, faces) for block in blocks])
 
 
 def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
@@ -173,13 +181,15 @@ def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
     )
 
 
-def _shown_from(candidates: Candidates, rows: IntArray, boundary: Boundary, scene: Scene) -> ShownBoundary:
-    """`shown` in a prepared scene."""
+def _shown_from(
+    candidates: Candidates, rows: IntArray, boundary: Boundary, scene: Scene, faces: IntArray
+) -> ShownBoundary:
+    """`shown` in a prepared scene of some faces."""
     space = candidates.space
     origin = local_origin(space.floor)
     places, row = _viewpoints(candidates, rows)
     runs = sight(scene, to_grid(places - origin), reach=space.settings.farthest_overlap)
-    start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
+    start = (np.cumsum(boundary.pieces) - boundary.pieces)[faces[runs.segment]]
     stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)
     taken = candidates.kept[rows]
     xy, settings = candidates.xy[taken] - origin, space.settings

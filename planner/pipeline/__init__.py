@@ -132,7 +132,8 @@ class _Prepared:
 
         if route.visibility is self._seen:
             return self._work.result()[0]
-        return FiguresBefore.of(route.visibility, self._planned, before=self._seen)
+        known = self._work.result()[0].estimates if self._work.is_beside else None
+        return FiguresBefore.of(route.visibility, self._planned, before=self._seen, known=known)
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
-from stopgo.planner.geometry.instance_cache import instance_cached, taken
+from stopgo.planner.geometry.instance_cache import forget, instance_cached, taken
 from stopgo.planner.overlap import links_of
 from stopgo.planner.selection.bound import counting_bound, early_bound, first_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
@@ -123,6 +123,16 @@ def greedy_takes_at_most(most: int, visibility: Visibility) -> bool:
 @instance_cached
 def _whole(visibility: Visibility) -> Cover:
     return cover_of(visibility, demands_of(visibility))
+
+
+LARGE = 4_000_000
+"""Entries of a covering matrix, from which on it is not kept: 40 MB."""
+
+
+def forget_large_cover(visibility: Visibility) -> None:
+    """Forget the problem of a visibility from which nothing is selected soon, if it takes much memory."""
+    if _whole(visibility).sees.nnz > LARGE:
+        forget(_whole, visibility)
 
 
 def cover_problem(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
@@ -298,6 +308,7 @@ __all__ = [
     "Selector",
     "cover_problem",
     "coverage_steps",
+    "forget_large_cover",
     "greedy_takes_at_most",
     "offered_for_follow_up",
     "quick_count",

@@ -19,7 +19,7 @@ from stopgo.mission.stages import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.selection import BoundOf, greedy_takes_at_most, select
+from stopgo.planner.selection import BoundOf, forget_large_cover, greedy_takes_at_most, select
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
@@ -55,7 +55,10 @@ def _select_joined(seen: Visibility, bound_of: BoundOf) -> Selection:
         return select(seen, bound_of=bound_of)
     first = select(seen, joined=False)
     nearby = _nearby_candidates(first) if _refines(seen.settings, len(first.chosen)) else None
-    return select(seen if nearby is None else merged(seen, visibility(nearby)), bound_of=bound_of)
+    if nearby is None:
+        return select(seen, bound_of=bound_of)
+    forget_large_cover(seen)
+    return select(merged(seen, visibility(nearby)), bound_of=bound_of)
 
 
 def _refines(settings: Settings, stops: int) -> bool:

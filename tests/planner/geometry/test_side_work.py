@@ -45,6 +45,7 @@ def _workers(place: Path) -> list[int]:
 def test_work_is_done_once_in_the_process_asked_for(tmp_path: Path, *, forked: bool) -> None:
     place = tmp_path / "workers"
     with SideWork(partial(_noted, place), forked=forked) as work:
+        assert work.is_beside == forked
         assert [work.result(), work.result()] == ["done", "done"]
     (worker,) = _workers(place)
     assert (worker != os.getpid()) == forked
@@ -114,13 +115,15 @@ def test_a_process_with_other_threads_is_not_forked(tmp_path: Path) -> None:
     assert _workers(tmp_path / "workers") == [os.getpid()]
 
 
-@pytest.mark.parametrize("fov", [360.0, 270.0])
-def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatch, fov: float) -> None:
+@pytest.mark.parametrize(("fov", "refine"), [(360.0, False), (360.0, True), (270.0, False)])
+def test_a_plan_is_the_same_with_a_second_process(
+    monkeypatch: pytest.MonkeyPatch, fov: float, *, refine: bool
+) -> None:
     plans = []
     for many in (0, 10**9):
         monkeypatch.setattr(pipeline, "MANY", many)
         monkeypatch.setattr(navigable, "MANY", many)
-        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False, fov=fov)))
+        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=refine, fov=fov)))
     forked, alone = plans
     assert forked.figures == alone.figures
     assert forked.mission == alone.mission
