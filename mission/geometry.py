@@ -21,6 +21,12 @@ def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
     return array
 
 
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """A new contiguous array itself, read-only from now on."""
+    array.flags.writeable = False
+    return array
+
+
 def ring_area(ring: FloatArray) -> float:
     """Signed area in m² of a ring (n, 2): positive when counter-clockwise (shoelace formula)."""
     if len(ring) < 3:

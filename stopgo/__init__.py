@@ -84,7 +84,8 @@ def plan(
     all_parts
         Also plan parts of the floor that are not connected with the first.
     observe
-        Called with the result of each stage as soon as it is there.
+        Called with the result of each stage as soon as it is there; with the selection of a large floor again
+        after the figures, when its bound is known.
 
     Raises
     ------

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 from stopgo.mission.console.json_answer import answering
 from stopgo.mission.console.notice import notice
 from stopgo.mission.console.plain_output import have_plain_output
-from stopgo.mission.console.process import PIPE_CLOSED, Signals, drop_output, have_output, output_is_closed
+from stopgo.mission.console.process import (
+    PIPE_CLOSED,
+    ProcessEnd,
+    Signals,
+    drop_output,
+    have_output,
+    output_is_closed,
+)
 from stopgo.mission.errors import InputError, MissingExtra, StopgoError
 from stopgo.renamed_options import with_new_names
 from stopgo.root_help import must_be_command, root_help
@@ -68,6 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
     """
     if arguments is not None:
         return _with_signals(arguments, whole_process=False)
+    end = ProcessEnd()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its matrices are small: other threads only wait
     have_output()
     have_plain_output(escaped=not {"--json", "--print-config"}.isdisjoint(sys.argv))
@@ -77,6 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stderr.flush()
     except OSError:  # and not once more at the very end
         drop_output()
+    end.code = code
     return code
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import gc
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 LARGE = 400_000
 """Kilobytes that a process has taken at most; below, what it could give back is not worth the time."""
@@ -13,12 +15,18 @@ OBJECTS = 100_000
 """New objects after which Python looks for some that only refer to each other."""
 
 
-def look_seldom() -> None:
-    """Look for such objects seldom: a plan makes many objects, and nearly all are freed without it.
+@contextmanager
+def looking_seldom() -> Iterator[None]:
+    """Look for such objects seldom in the block: a plan makes many, and nearly all are freed without it.
 
     It is 3 % of the processor time of a small plan.
     """
+    before = gc.get_threshold()
     gc.set_threshold(OBJECTS, 10, 1)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def give_back() -> None:

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.freed_memory import give_back, look_seldom
+from stopgo.freed_memory import give_back, looking_seldom
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
 from stopgo.planner import plan
+from stopgo.planner.geometry.side_work import SideWork
 from stopgo.recording_process import recording_process
 from stopgo.result_files import is_missing, report_missing_rerun, result_folder
 from stopgo.spared_modules import load_when_used
@@ -56,7 +57,7 @@ def plan_files(
     With `beside` the recordings are drawn in a process of their own, which loads Rerun during planning.
     `observe` is called with the result of each stage as soon as it is there.
     """
-    with running(f"reading {floor}") as step, recording_process() as recorder:
+    with running(f"reading {floor}") as step, recording_process() as recorder, looking_seldom():
         watch = Stopwatch(step, observe)
         writing = _Writing(out, print_options or PrintOptions(), watch, recorder, beside)
         return _planned(floor, settings, writing, all_parts)
@@ -76,7 +77,6 @@ class _Writing:
 def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool) -> list[PlanReport]:
     from stopgo.planner.commands.outputs import names
 
-    look_seldom()
     load_when_used()
     from stopgo.planner.floors import options_of, read_floor, standing_bodies
 
@@ -127,6 +127,10 @@ WRITTEN = ("recording", "sheets", "coverage", "picture", "mission")
 """A plan's files in the order in which they appear: the mission when all else is there."""
 
 
+MANY = 200
+"""Stops from which the set of sheets is drawn in a process of its own."""
+
+
 def _write_part(
     plan: Plan,
     number: int,
@@ -146,18 +150,16 @@ def _write_part(
         del files["recording"]
     watch = writing.watch
     contents = _PartContents(part, plan, writing.options, _today(), _seen_from(part, watch))
-    sheets = contents.sheets(files["sheets"])
-    unwanted = [files.pop("sheets")] if sheets is None else []
-    unwanted += [files.pop("picture")] if plan.divided and number else []
+    unwanted = [files.pop("picture")] if plan.divided and number else []
+    with SideWork(contents.printed, forked=len(part.mission.stops) >= MANY) as printing:
+        data = {key: getattr(contents, key)() for key in ("coverage", "picture", "mission") if key in files}
+        data |= contents.sheets(files["sheets"], printing)
+    unwanted += [] if "sheets" in data else [files.pop("sheets")]
     keys = [key for key in WRITTEN if key in files]
     with replacing(*(files[key] for key in keys)) as paths:
         written = dict(zip(keys, paths, strict=True))
-        if sheets is not None:
-            written["sheets"].write_bytes(sheets)
-        written["coverage"].write_bytes(contents.coverage())
-        if "picture" in written:
-            written["picture"].write_bytes(contents.picture())
-        written["mission"].write_bytes(contents.mission())
+        for key, content in data.items():
+            written[key].write_bytes(content)
         watch.lap("files")
         if recording is not None:
             recording.write(written["recording"])
@@ -219,23 +221,26 @@ class _PartContents:
     date: str
     surface: SeenSurface | None = None
 
-    def sheets(self, path: Path) -> bytes | None:
-        """The set of sheets, if it is wanted; None, and a line on stderr, if reportlab is not installed."""
+    def printed(self) -> bytes | None:
+        """The set of sheets, if it is wanted."""
         from stopgo.mission.files.plan_sheets import needs_sheets, plan_pdf
 
         part, wanted = self.part, self.options.sheets
         if wanted is False or not (wanted or needs_sheets(part.route, part.mission)):
             return None
+        return plan_pdf(part.route, part.mission, part.figures, date=self.date, with_range=self.options.rings)
+
+    def sheets(self, path: Path, printing: SideWork[bytes | None]) -> dict[str, bytes]:
+        """The set of sheets; without one nothing, and a line on stderr if reportlab is not installed."""
         try:
-            return plan_pdf(
-                part.route, part.mission, part.figures, date=self.date, with_range=self.options.rings
-            )
+            found = printing.result()
         except ModuleNotFoundError as error:
-            if wanted or not is_missing(error, "reportlab"):
+            if self.options.sheets or not is_missing(error, "reportlab"):
                 raise
             problem = "not written, reportlab is not installed"
             typer.echo(f'{path.name}: {problem}; pip install "stopgo[plan]"', err=True)
-            return None
+            return {}
+        return {} if found is None else {"sheets": found}
 
     def coverage(self) -> bytes:
         """The bytes of coverage.json."""

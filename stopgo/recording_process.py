@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import copyreg
-import io
 import json
 import pickle
 import subprocess
@@ -20,7 +19,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any
 
-from stopgo.freed_memory import look_seldom
+from stopgo.freed_memory import looking_seldom
 from stopgo.mission.errors import InputError
 from stopgo.spared_modules import SPARED_OF_RERUN, load_when_used
 
@@ -37,6 +36,8 @@ serve()
 
 CACHED = "_cached_"
 """Begin of the names of values that are derived from a result, and that no drawing reads."""
+UNDRAWN = {"Visibility": "in_sight"}
+"""Values of classes that no drawing reads either, and without which their defaults hold."""
 
 
 class RecordingProcess:
@@ -62,7 +63,9 @@ class RecordingProcess:
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,  # Ctrl-C reaches this process, which ends the other
             )
-            self._send(json.dumps(sys.path).encode() + b"\n")
+            assert self._process.stdin is not None
+            self._process.stdin.write(json.dumps(sys.path).encode() + b"\n")
+            self._process.stdin.flush()
 
     def end(self) -> None:
         """End the process, also in the middle of its work."""
@@ -76,7 +79,7 @@ class RecordingProcess:
         results = tuple(results)
         if self._process is not None:
             try:
-                self._send(_pickled((recording_id, results)))
+                self._send((recording_id, results))
             except (pickle.PicklingError, TypeError, AttributeError):  # of a result that a plug-in made
                 self.end()
         return PlanDrawing(self, recording_id, results)
@@ -92,7 +95,7 @@ class RecordingProcess:
         if self._process is None:
             return False
         try:
-            self._send(pickle.dumps(path))
+            self._send(path)
             assert self._process is not None and self._process.stdout is not None
             problem = pickle.load(self._process.stdout)
         except (EOFError, AssertionError, pickle.UnpicklingError):
@@ -105,11 +108,11 @@ class RecordingProcess:
             raise problem
         return True
 
-    def _send(self, data: bytes) -> None:
-        """Send to the process; if it has ended, that is noticed when its answer is read."""
+    def _send(self, value: object) -> None:
+        """Send to the process without a copy; if it has ended, that is noticed when its answer is read."""
         assert self._process is not None and self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(data)
+            pickle_into(value, self._process.stdin)
             self._process.stdin.flush()
 
 
@@ -139,14 +142,13 @@ def recording_process() -> Iterator[RecordingProcess]:
 
 def serve() -> None:
     """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
-    look_seldom()
     leave_pandas_out()
     load_when_used(SPARED_OF_RERUN)
     asked, answers = sys.stdin.buffer, sys.stdout.buffer
     sys.stdout = sys.stderr
-    import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
+    with looking_seldom(), contextlib.suppress(EOFError):
+        import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
 
-    with contextlib.suppress(EOFError):
         while True:
             _serve_one(asked, answers)
 
@@ -196,10 +198,14 @@ class _Pickler(pickle.Pickler):
         values = getattr(value, "__dict__", None)
         if isinstance(value, type) or not isinstance(values, dict):
             return NotImplemented
-        if not any(name.startswith(CACHED) for name in values):
+        left = {name: held for name, held in values.items() if not _is_undrawn(value, name)}
+        if len(left) == len(values):
             return NotImplemented
-        left = {name: held for name, held in values.items() if not name.startswith(CACHED)}
         return copyreg.__newobj__, (type(value),), left  # type: ignore[attr-defined]
+
+
+def _is_undrawn(value: object, name: str) -> bool:
+    return name.startswith(CACHED) or name == UNDRAWN.get(type(value).__name__)
 
 
 def _unset() -> object:
@@ -212,7 +218,6 @@ def _read_only(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
     return MappingProxyType(values)
 
 
-def _pickled(value: object) -> bytes:
-    file = io.BytesIO()
+def pickle_into(value: object, file: IO[bytes]) -> None:
+    """Pickle results for a drawing."""
     _Pickler(file, protocol=pickle.HIGHEST_PROTOCOL).dump(value)
-    return file.getvalue()

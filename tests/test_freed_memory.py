@@ -34,13 +34,11 @@ def test_a_large_process_gives_all_it_can_back(monkeypatch: pytest.MonkeyPatch) 
     assert given == [0]
 
 
-def test_python_looks_seldom_for_objects_that_refer_to_each_other() -> None:
+def test_python_looks_seldom_for_objects_that_refer_to_each_other_and_then_as_before() -> None:
     before = gc.get_threshold()
-    try:
-        freed_memory.look_seldom()
+    with freed_memory.looking_seldom():
         assert gc.get_threshold()[0] == freed_memory.OBJECTS
-    finally:
-        gc.set_threshold(*before)
+    assert gc.get_threshold() == before
 
 
 def test_a_small_process_keeps_what_it_has(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -246,7 +246,7 @@ def test_a_simulated_robot_loads_nothing_of_autopilots() -> None:
     assert not {"pymavlink", "stopgo.mission.console.plugins"} & set(run(sys.executable, "-c", code).split())
 
 
-KERNELS = {"grow", "look", "look_all", "look_from_cell", "look_from_all_cells", "iterated_search"}
+KERNELS = {"grow", "look", "look_all", "look_from_cell", "look_from_all_cells", "iterated_search", "pieces"}
 """Compiled functions: each is one loop, so that it compiles to one."""
 
 

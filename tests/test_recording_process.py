@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import pickle
 import signal
@@ -12,15 +13,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
+import numpy as np
 import pytest
 
-import stopgo.recording_process
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Visibility
 from stopgo.mission.stages.sight import sight_of
 from stopgo.planner import plan
-from stopgo.recording_process import RecordingProcess, _pickled, recording_process
+from stopgo.recording_process import RecordingProcess, pickle_into, recording_process
 from stopgo.recordings.rrd.read import check
 from tests.disk import small_disk
 from tests.planner.worlds import two_rooms
@@ -60,6 +62,12 @@ def lasting() -> Iterator[RecordingProcess]:
         yield made
 
 
+def pickled(value: object) -> bytes:
+    file = io.BytesIO()
+    pickle_into(value, file)
+    return file.getvalue()
+
+
 def test_the_process_writes_what_would_be_written_here(
     lasting: RecordingProcess, results: tuple[object, ...], tmp_path: Path
 ) -> None:
@@ -84,7 +92,7 @@ def test_results_are_pickled_without_a_search_in_other_modules(
 
     others = {"stand-in": StandIn("stand-in"), **sys.modules}
     monkeypatch.setattr(sys, "modules", others)
-    assert pickle.loads(_pickled(results)) is not None
+    assert pickle.loads(pickled(results)) is not None
 
 
 @pytest.mark.parametrize("when", ["before", "during", "after"])
@@ -135,11 +143,19 @@ def test_a_file_that_does_not_hold_the_recording_is_an_error(
 def test_derived_values_stay_here_and_read_only_ones_stay_read_only(results: tuple[object, ...]) -> None:
     floor = results[0]
     vars(floor)["_cached_by_a_test"] = lambda: None
-    sent = pickle.loads(stopgo.recording_process._pickled(floor))
+    sent = pickle.loads(pickled(floor))
     del vars(floor)["_cached_by_a_test"]
     assert "_cached_by_a_test" not in vars(sent)
     assert isinstance(sent.status, MappingProxyType)
-    assert b"stopgo.planner" not in stopgo.recording_process._pickled(results)
+    assert b"stopgo.planner" not in pickled(results)
+
+
+def test_the_line_of_sight_without_limits_is_not_sent(results: tuple[object, ...]) -> None:
+    seen = next(result for result in results if isinstance(result, Visibility))
+    assert seen.in_sight is not None
+    sent = pickle.loads(pickled(seen))
+    assert sent.in_sight is None
+    assert np.array_equal(sent.first, seen.first)
 
 
 OWNER = """

@@ -171,13 +171,15 @@ class _Offers:
 
     def __init__(self, visibility: Visibility, totals: CoverageTotals) -> None:
         self._visibility, self._totals = visibility, totals
-        self._row, segment, self._first, self._last = visibility.runs_apart
         summed = np.concatenate([[0], np.cumsum(np.where(totals.visible, totals.weight, 0))])
-        gain = summed[self._last + 1] - summed[self._first]
         self.gain: IntArray = np.zeros(visibility.rows, dtype=np.int64)
-        np.add.at(self.gain, self._row, gain)
-        self._by_segment = np.argsort(segment, kind="stable")
-        self._segment = segment[self._by_segment]
+        parts = []
+        for row, _, first, last in visibility.runs_apart_by_rows():
+            np.add.at(self.gain, row, summed[last + 1] - summed[first])
+            order = np.argsort(first, kind="stable")
+            parts.append((row[order], first[order], last[order]))
+        self._parts = parts
+        """Row, first and last unit of runs (k,), by their first units; of some rows after the other."""
         self._lacking: IntArray = np.where(totals.visible, visibility.asked, 0)
         """Number of further views that each unit needs until it counts."""
         self._chosen: BoolArray = np.zeros(visibility.rows, dtype=np.bool_)
@@ -209,13 +211,15 @@ class _Offers:
 
     def _shared(self, fresh: IntArray) -> IntArray:
         """Return the amount of some units (ascending) that each candidate sees."""
-        segments = np.unique(self._visibility.targets.unit_segment[fresh])
-        low, high = (np.searchsorted(self._segment, segments, side=side) for side in ("left", "right"))
-        runs = self._by_segment[_ranges(low, high)]
+        targets, kind = self._visibility.targets, self._visibility.first.dtype
+        segments = np.unique(targets.unit_segment[fresh])
+        begins, ends = (targets.first_unit[segments + k].astype(kind) for k in range(2))
         summed = np.concatenate([[0], np.cumsum(self._totals.weight[fresh])])
-        begin, end = summed[np.searchsorted(fresh, np.stack([self._first[runs], self._last[runs] + 1]))]
         found: IntArray = np.zeros(len(self.gain), dtype=np.int64)
-        np.add.at(found, self._row[runs], end - begin)
+        for row, first, last in self._parts:
+            runs = _ranges(np.searchsorted(first, begins), np.searchsorted(first, ends))
+            begin, end = summed[np.searchsorted(fresh, np.stack([first[runs], last[runs] + 1]))]
+            np.add.at(found, row[runs], end - begin)
         return found
 
 

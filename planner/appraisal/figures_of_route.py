@@ -43,21 +43,24 @@ class FiguresBefore:
         planned: frozenset[int] | None = None,
         *,
         before: Visibility | None = None,
+        known: LimitEstimates | None = None,
     ) -> FiguresBefore:
         """`planned` are the parts of the floor that any plan enters.
 
-        `seen` may be the visibility `before` with more candidates; these do not change what limits cost.
+        `seen` may be the visibility `before` with more candidates; these do not change what limits cost,
+        which may be `known`.
         """
         candidates = seen.candidates
         space, parts = candidates.space, planned or frozenset([candidates.chosen_part])
         reached = _reached_m2(candidates, parts)
+        alike = before is not None and before.in_sight is seen.in_sight
         return cls(
             unreached=unreached(candidates, parts),
             reached_m2=reached,
             rooms_m2=sum(floor_of_rooms(space)),
             doubts=floor_doubts(space, reached_m2=reached),
             views=tuple(not_met(seen)),
-            estimates=limit_estimates(before if before and before.in_sight is seen.in_sight else seen),
+            estimates=(alike and known) or limit_estimates(before if before and alike else seen),
         )
 
 

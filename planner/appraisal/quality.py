@@ -15,7 +15,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.figures import LimitCost, Quality, percent
-from stopgo.planner.selection import quick_count, quick_estimate
+from stopgo.planner.selection import forget_large_cover, quick_count, quick_estimate
 from stopgo.planner.visibility import within_all_limits
 from stopgo.planner.visibility.limited import without_limit
 
@@ -46,6 +46,8 @@ def limit_estimates(seen: Visibility) -> LimitEstimates | None:
     in_sight = _in_sight(seen)
     alike = seen.candidates is in_sight.candidates
     limited = quick_count(seen if alike else _under(in_sight, settings))
+    if alike:
+        forget_large_cover(seen)
     free = {key: quick_estimate(_under(in_sight, without_limit(settings, key))) for key in limits}
     return LimitEstimates(limited, free)
 

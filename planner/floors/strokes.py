@@ -40,7 +40,8 @@ def sketch(shapes: Iterable[Shape]) -> list[FloatArray]:
 
 def _sketch(shape: Shape) -> list[FloatArray]:
     try:
-        return [points for points, _ in _placed_curves(shape, _COARSE)]
+        placed = _placed if _is_straight(shape) else _placed_curves
+        return [points for points, _ in placed(shape, _COARSE)]
     except BROKEN_INPUT:
         return []  # strokes_of meets it again and reports it
 

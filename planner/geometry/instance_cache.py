@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 Instance = TypeVar("Instance")
 T = TypeVar("T")
@@ -39,6 +40,18 @@ def taken(cached: Callable[[Instance], T], instance: Instance) -> T:
     result = cached(instance)
     del vars(instance)[_name_of(cached)]
     return result
+
+
+def forget(cached: Callable[[Instance], T], instance: Instance) -> None:
+    """Forget the result of an `instance_cached` function, if there is one."""
+    vars(instance).pop(_name_of(cached), None)
+
+
+def changed_copy(instance: Instance, **changes: Any) -> Instance:
+    """A copy of a dataclass instance, with changes on which nothing depends that was derived from it."""
+    made = dataclasses.replace(cast(Any, instance), **changes)
+    vars(made).update({name: held for name, held in vars(instance).items() if name not in vars(made)})
+    return cast(Instance, made)
 
 
 def _name_of(function: Callable[[Instance], T]) -> str:

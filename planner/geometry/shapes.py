@@ -83,12 +83,17 @@ def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
         return shapely.normalize(shapely.remove_repeated_points(found[0]))
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
     whole = shapely.union_all(ordered)
-    if len(found) > 1:
-        shapely.prepare(whole)
-        corners = shapely.points(shapely.get_coordinates(found))
-        if not shapely.dwithin(whole, corners, SLACK).all():
-            whole = shapely.union_all(ordered, grid_size=SLACK / 100)
+    if len(found) > 1 and not _has_corners(whole, shapely.get_coordinates(found)):
+        whole = shapely.union_all(ordered, grid_size=SLACK / 100)
     return shapely.normalize(whole)
+
+
+def _has_corners(whole: BaseGeometry, corners: FloatArray) -> bool:
+    """True if a shape contains all of these points (n, 2), or comes close; most are corners of its own."""
+    own = shapely.get_coordinates(whole).view(np.complex128).ravel()
+    others = corners[~np.isin(corners.view(np.complex128).ravel(), own)]
+    shapely.prepare(whole)
+    return bool(shapely.dwithin(whole, shapely.points(others), SLACK).all())
 
 
 def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:

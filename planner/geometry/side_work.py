@@ -10,6 +10,7 @@ import contextlib
 import io
 import os
 import pickle
+import select
 import signal
 import sys
 import threading
@@ -28,12 +29,35 @@ T = TypeVar("T")
 class SideWork(Generic[T]):
     """Work that goes on at the same time as other work; the end of the block ends it."""
 
-    def __init__(self, work: Callable[[], T], *, forked: bool) -> None:
-        """Begin the work in a process of its own if `forked`, and if this process can be forked."""
+    def __init__(
+        self,
+        work: Callable[[], T],
+        *,
+        forked: bool,
+        again: Callable[[], T] | None = None,
+        after: SideWork[Any] | None = None,
+    ) -> None:
+        """Begin the work in a process of its own if `forked`, and if this process can be forked.
+
+        `again` is done if that process ends without a result: what the work holds is then not kept. The
+        process waits until that of the work `after` answers, so that both do not take more than one core.
+        """
         self._work, self._process, self._answer = work, 0, -1
+        self._before = -1 if after is None else after._answer
         self._found: list[T] = []
-        if forked and _can_fork():
+        if forked and can_fork():
             self._fork()
+            self._work = work if again is None or not self._process else again
+
+    @property
+    def is_apart(self) -> bool:
+        """True until the result is there, if another process does the work."""
+        return self._process != 0
+
+    @property
+    def is_beside(self) -> bool:
+        """True if another process has begun with it, so that its result costs nothing here."""
+        return self._process > 0 or bool(self._found)
 
     def result(self) -> T:
         """The result, also when it is requested again; an error of the work is raised."""
@@ -65,6 +89,8 @@ class SideWork(Generic[T]):
         try:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
             os.close(self._answer)
+            if self._before >= 0:
+                select.select([self._before], [], [])  # there is something to read, or its process has ended
             with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
                 data = _pickled(self._work())  # a thread may have held the lock of the real one
             with open(end, "wb") as answer:
@@ -106,7 +132,7 @@ def _pickled(value: object) -> bytes:
     return file.getvalue()
 
 
-def _can_fork() -> bool:
+def can_fork() -> bool:
     """True on Linux with several cores, for a process whose threads hold nothing that the work needs.
 
     Other threads do not outlive a fork, and their locks are never released.

@@ -6,16 +6,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.sparse import csr_array
+from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates
 from stopgo.mission.stages.network import CONFIDENCE, FLOOR_M, NOISE_M, noise_factor
 from stopgo.planner.geometry.compiling import compiled
-from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.overlap.boundary import shown
+from stopgo.planner.geometry.instance_cache import instance_cached, store
+from stopgo.planner.overlap.boundary import mesh_around, shown, solids_of
 from stopgo.planner.overlap.pair_kernel import firm_pairs
 from stopgo.planner.overlap.pairs import DIGITS, Overlaps, Pairs
+from stopgo.planner.visibility.sight.mesh import Mesh
 
 ACCURACY_M = 0.01
 """Error that a registered pair may have, also at LEVER_M from the scanner."""
@@ -37,11 +39,6 @@ def least_hold_m(settings: Settings) -> float:
 @instance_cached
 def overlaps_of(candidates: Candidates) -> Overlaps:
     """The boundary that kept candidates see in common."""
-    return _overlaps_of(candidates)
-
-
-def _overlaps_of(candidates: Candidates) -> Overlaps:
-    """The same, not kept: of a large floor it is a tenth of all memory."""
     return Overlaps(shown(candidates, np.arange(len(candidates.kept))))
 
 
@@ -54,12 +51,31 @@ def registers(pairs: Pairs, settings: Settings) -> IntArray:
 @instance_cached
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
-    overlaps, settings = _overlaps_of(candidates), candidates.settings
+    settings, rows = candidates.settings, np.arange(len(candidates.kept))
+    overlaps = Overlaps(shown(candidates, rows, only_wide=settings.least_overlap == 0))  # large, so not kept
     kernel = compiled(firm_pairs, large=False)
     pairs = _links(overlaps, settings) if kernel is None else links_by_kernel(kernel, overlaps, settings)
-    ends = tuple(np.concatenate([np.empty(0, np.int64), *ends]) for ends in zip(*pairs, strict=True))
+    pairs = (tuple(ends.astype(np.int32) for ends in some) for some in pairs)  # there are millions
+    ends = tuple(np.concatenate([np.empty(0, np.int32), *ends]) for ends in zip(*pairs, strict=True))
     later = csr_array((np.ones(len(ends[0]), np.int8), ends), shape=(overlaps.rows,) * 2)
     return (later + later.T).tocsr()
+
+
+PairsFound = tuple[csr_array, BaseGeometry, Mesh]
+"""Links, and from what they were found: the solids, and the open space around them."""
+
+
+def pairs_found(candidates: Candidates) -> PairsFound:
+    """The links of candidates with all that later questions about pairs need."""
+    return links_of(candidates), solids_of(candidates.space), mesh_around(candidates)
+
+
+def keep_pairs(candidates: Candidates, found: PairsFound) -> None:
+    """Keep what another process found, so that it is not found again."""
+    links, solids, mesh = found
+    store(links_of, candidates, links)
+    store(solids_of, candidates.space, solids)
+    store(mesh_around, candidates, mesh)
 
 
 def _links(overlaps: Overlaps, settings: Settings) -> Iterator[tuple[IntArray, IntArray]]:
@@ -84,8 +100,10 @@ __all__ = [
     "LEAST_COMMON_M",
     "Overlaps",
     "Pairs",
+    "keep_pairs",
     "least_hold_m",
     "links_of",
     "overlaps_of",
+    "pairs_found",
     "registers",
 ]

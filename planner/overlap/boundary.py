@@ -15,14 +15,16 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps, whole_steps_of
+from stopgo.planner.overlap.surfaces import smooth_surfaces
 from stopgo.planner.space.targets import face_segments, units_on, without_needless_vertices
 from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
+from stopgo.planner.visibility.sight.mesh import Mesh
 from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
 from stopgo.planner.visibility.unit_ranges import ranges, runs_of
 
@@ -41,19 +43,28 @@ LEAST_STRETCH_M = 2 * EDGE_M
 """Least width of a common stretch. Narrower ones, such as door jambs, have no direction of their own."""
 WIDER_M = LEAST_STRETCH_M - 1e-9
 """The same less rounding: a stretch that counts is wider."""
+JOINED_M = 1e-6
+"""Widest gap between stretches of one surface that are one."""
 BLOCK = 4096
 """Candidates whose boundary is found at a time, which takes several times the memory of the result."""
 
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Straight faces that scans show, local metres; each is seen from its left side only."""
+    """Straight faces that scans show, local metres; each is seen from its left side only.
+
+    Faces that continue each other smoothly are one surface, such as those of a round column.
+    """
 
     a: FloatArray
     """Start of each face (m, 2)."""
     b: FloatArray
     pieces: IntArray
     """Equal pieces of each face (m,)."""
+    first: IntArray
+    """First face of each surface (surfaces,); those of a surface follow each other."""
+    closed: BoolArray
+    """True for surfaces that go around a solid or a room (surfaces,)."""
 
     @cached_property
     def normals(self) -> tuple[FloatArray, FloatArray]:
@@ -65,18 +76,46 @@ class Boundary:
         normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
         return normal, self.a[:, 0] * normal[:, 1] - self.a[:, 1] * normal[:, 0]
 
+    @cached_property
+    def surface(self) -> IntArray:
+        """Surface of each face (m,)."""
+        return np.repeat(np.arange(len(self.first)), np.diff(np.append(self.first, len(self.a))))
+
+    @cached_property
+    def along(self) -> FloatArray:
+        """Metres from the start of its surface to each face (m,)."""
+        sums = np.concatenate([[0.0], np.cumsum(self.length)])[:-1]
+        return sums - sums[self.first][self.surface]
+
+    @cached_property
+    def length(self) -> FloatArray:
+        """Metres of each face (m,)."""
+        return np.hypot(*(self.b - self.a).T)
+
+    @cached_property
+    def around(self) -> FloatArray:
+        """Metres around each closed surface, such as a round column; 0 for the others (surfaces,)."""
+        return np.where(self.closed, self.reach, 0.0)
+
+    @cached_property
+    def reach(self) -> FloatArray:
+        """Metres of each surface (surfaces,)."""
+        last = np.append(self.first[1:], len(self.a))[: len(self.first)] - 1
+        return self.along[last] + self.length[last]
+
 
 @dataclass(frozen=True, eq=False)
 class ShownBoundary:
-    """The boundary that each candidate sees, as stretches of faces that are wide enough to have a direction.
+    """The boundary that each candidate sees, as stretches of surfaces, wide enough to have a direction.
 
-    Stretch k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, is of face `face[k]` and reaches from
-    `begin[k]` to `end[k]` metres from the face's start. A row's stretches ascend and do not overlap.
+    Stretch k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, is of surface `surface[k]` and reaches
+    from `begin[k]` to `end[k]` metres from the surface's start. A row's stretches ascend and do not overlap.
+    On a closed surface a stretch may go on beyond the surface's start, to less than twice the way around.
     """
 
     boundary: Boundary
     pointer: IntArray
-    face: IntArray
+    surface: IntArray
     begin: FloatArray
     end: FloatArray
     xy: FloatArray
@@ -87,13 +126,16 @@ class ShownBoundary:
 
 def boundary_of(space: NavigableSpace) -> Boundary:
     """All faces of what stops the laser."""
-    ends = np.rint(face_segments(_solids(space))) * GRID
+    ends = np.rint(face_segments(solids_of(space))) * GRID
     pieces = units_on(np.hypot(*(ends[:, 1] - ends[:, 0]).T), d_dis=PIECE_M)
-    return Boundary(frozen(ends[:, 0]), frozen(ends[:, 1]), frozen(pieces, np.int64))
+    order, first, closed = smooth_surfaces(ends)
+    a, b = frozen(ends[order, 0]), frozen(ends[order, 1])
+    whole = (frozen(pieces[order], np.int64), frozen(first, np.int64))
+    return Boundary(a, b, *whole, frozen(closed, np.bool_))
 
 
 @instance_cached
-def _solids(space: NavigableSpace) -> BaseGeometry:
+def solids_of(space: NavigableSpace) -> BaseGeometry:
     """Solids that stop the laser, in whole grid steps, with one face for each straight side.
 
     Targets have a face for each element, and vertices where other elements touch them. Which element owns
@@ -104,17 +146,25 @@ def _solids(space: NavigableSpace) -> BaseGeometry:
     return whole_steps(without_needless_vertices(local))
 
 
-def shown(candidates: Candidates, rows: IntArray) -> ShownBoundary:
+@instance_cached
+def mesh_around(candidates: Candidates) -> Mesh:
+    """A mesh of the open space around the solids."""
+    return open_space_around(candidates, solids_of(candidates.space))
+
+
+def shown(candidates: Candidates, rows: IntArray, *, only_wide: bool = False) -> ShownBoundary:
     """The boundary that some rows see within `overlap_range` and the scanner's field of view.
 
-    `rows` (n,) are indices into `kept`; the result is in their order.
+    `rows` (n,) are indices into `kept`; the result is in their order. With `only_wide` the metres that a row
+    sees are those of surfaces on which a stretch can count: thin columns have others.
     """
     boundary = boundary_of(candidates.space)
-    faces = np.ones(len(boundary.a), dtype=bool)
-    mesh = open_space_around(candidates, _solids(candidates.space))
-    scene = scene_of(mesh, boundary.a, boundary.b, boundary.pieces, faces)
+    wide = boundary.reach[boundary.surface] > WIDER_M
+    faces = np.flatnonzero(wide) if only_wide else np.arange(len(wide))
+    ends, on_boundary = (boundary.a[faces], boundary.b[faces]), np.ones(len(faces), dtype=bool)
+    scene = scene_of(mesh_around(candidates), *ends, boundary.pieces[faces], on_boundary)
     blocks = np.split(rows, range(BLOCK, len(rows), BLOCK))
-    return _together([_shown_from(candidates, block, boundary, scene) for block in blocks])
+    return _together([_shown_from(candidates, block, boundary, scene, faces) for block in blocks])
 
 
 def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
@@ -123,7 +173,7 @@ def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
     return ShownBoundary(
         boundary=parts[0].boundary,
         pointer=frozen(np.concatenate([[0], np.cumsum(counts)]), np.int64),
-        face=frozen(np.concatenate([part.face for part in parts]), np.int64),
+        surface=frozen(np.concatenate([part.surface for part in parts]), np.int64),
         begin=frozen(np.concatenate([part.begin for part in parts])),
         end=frozen(np.concatenate([part.end for part in parts])),
         xy=frozen(np.concatenate([part.xy for part in parts])),
@@ -131,13 +181,15 @@ def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:
     )
 
 
-def _shown_from(candidates: Candidates, rows: IntArray, boundary: Boundary, scene: Scene) -> ShownBoundary:
-    """`shown` in a prepared scene."""
+def _shown_from(
+    candidates: Candidates, rows: IntArray, boundary: Boundary, scene: Scene, faces: IntArray
+) -> ShownBoundary:
+    """`shown` in a prepared scene of some faces."""
     space = candidates.space
     origin = local_origin(space.floor)
     places, row = _viewpoints(candidates, rows)
     runs = sight(scene, to_grid(places - origin), reach=space.settings.farthest_overlap)
-    start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
+    start = (np.cumsum(boundary.pieces) - boundary.pieces)[faces[runs.segment]]
     stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)
     taken = candidates.kept[rows]
     xy, settings = candidates.xy[taken] - origin, space.settings
@@ -222,16 +274,49 @@ def _shown(boundary: Boundary, xy: FloatArray, seen: _Stretches, step: float) ->
     low, high = _measured(boundary, face, xy[row], step=step)
     begin = np.maximum((seen.first - start) * piece, low)
     end = np.minimum((seen.last + 1 - start) * piece, high)
+    metres = np.bincount(row, np.maximum(end - begin, 0.0), len(xy))
+    row, surface, begin, end = _on_surfaces(boundary, row, face, begin, end)
     wide = end - begin > WIDER_M
     return ShownBoundary(
         boundary=boundary,
         pointer=frozen(np.searchsorted(row[wide], np.arange(len(xy) + 1)), np.int64),
-        face=frozen(face[wide], np.int64),
+        surface=frozen(surface[wide], np.int64),
         begin=frozen(begin[wide]),
         end=frozen(end[wide]),
         xy=frozen(xy),
-        metres=frozen(np.bincount(row, np.maximum(end - begin, 0.0), len(xy))),
+        metres=frozen(metres),
     )
+
+
+def _on_surfaces(
+    boundary: Boundary, row: IntArray, face: IntArray, begin: FloatArray, end: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Row, surface, begin and end of stretches of faces (n,), joined where they meet on one surface."""
+    some = np.flatnonzero(end > begin)
+    row, face, begin, end = row[some], face[some], begin[some], end[some]
+    surface, ahead = boundary.surface[face], boundary.along[face]
+    begin, end = begin + ahead, end + ahead
+    new = np.ones(len(row), dtype=bool)
+    new[1:] = (np.diff(row) != 0) | (np.diff(surface) != 0) | (begin[1:] > end[:-1] + JOINED_M)
+    starts = np.flatnonzero(new)
+    ends = np.append(starts[1:], len(row))[: len(starts)] - 1
+    return _around(boundary, row[starts], surface[starts], begin[starts], end[ends])
+
+
+def _around(
+    boundary: Boundary, row: IntArray, surface: IntArray, begin: FloatArray, end: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """The same stretches, those that meet at the start of a closed surface joined to one."""
+    around = boundary.around[surface]
+    new = np.ones(len(row) + 1, dtype=bool)
+    new[1:-1] = (np.diff(row) != 0) | (np.diff(surface) != 0)
+    first, last = np.flatnonzero(new[:-1]), np.flatnonzero(new[1:])
+    meets = (last > first) & (begin[first] <= JOINED_M) & (around[last] > 0)
+    meets &= end[last] >= around[last] - JOINED_M
+    first, last = first[meets], last[meets]
+    end = end.copy()
+    end[last] = around[last] + end[first]
+    return tuple(np.delete(values, first) for values in (row, surface, begin, end))  # type: ignore[return-value]
 
 
 def ray_step(settings: Settings) -> float:

@@ -17,11 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.overlap.boundary import EDGE_M, WIDER_M, ShownBoundary
+from stopgo.planner.overlap.boundary import EDGE_M, WIDER_M, Boundary, ShownBoundary
 from stopgo.planner.visibility.unit_ranges import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A rotation counts as its displacement at this distance: 0.1° as much as 1 cm, the tolerance of each."""
+ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Entries of a normal matrix, in the order of their sums; the others are equal to these."""
 BLOCK = 64
 """Rows whose pairs are computed at a time."""
 DIGITS = 6
@@ -51,9 +53,9 @@ class Overlaps:
         self._seen = seen
         self._by_row: dict[int, Pairs] = {}
         self._row = np.repeat(np.arange(len(seen.xy)), np.diff(seen.pointer))
-        self._order = np.lexsort((seen.begin, self._row, seen.face))
-        self._place = seen.face[self._order] * self.rows + self._row[self._order]
-        """Ascending: faces, and on each the rows that see some of it."""
+        self._order = np.lexsort((seen.begin, self._row, seen.surface))
+        self._place = seen.surface[self._order] * self.rows + self._row[self._order]
+        """Ascending: surfaces, and on each the rows that see some of it."""
 
     @property
     def rows(self) -> int:
@@ -85,10 +87,14 @@ class Overlaps:
         """Pairs with so much boundary in common and more strength: rows, later rows, and metres in common."""
         seen, rows = self._seen, self.rows
         normal, arm = seen.boundary.normals
-        first = np.searchsorted(seen.face[self._order], np.arange(len(arm) + 1))
-        shown = (seen.pointer, seen.face, seen.begin, seen.end, first, self._order, self._row)
+        edges = np.arange(len(seen.boundary.first) + 1)
+        first = np.searchsorted(seen.surface[self._order], edges)
+        faces = np.append(seen.boundary.first, len(arm))
+        on = (values[self._order] for values in (self._row, seen.begin, seen.end))
+        shown = (seen.pointer, seen.surface, seen.begin, seen.end, first, *on, faces)
         scratch = np.zeros(rows), np.zeros(6 * rows), np.zeros(rows, np.int64)
-        data = (*shown, *normal.T.copy(), arm, np.ascontiguousarray(seen.xy).ravel(), *scratch)
+        along, xy = np.ascontiguousarray(seen.boundary.along), np.ascontiguousarray(seen.xy).ravel()
+        data = (*shown, seen.boundary.around, along, *normal.T.copy(), arm, xy, *scratch)
         limits = (EDGE_M, WIDER_M, least_m, hold_m, LEVER_M)
         for low in range(0, rows, BLOCK):
             high = min(low + BLOCK, rows)
@@ -103,9 +109,13 @@ class Overlaps:
         _, there, begin, end = self._common(np.array([row]), np.array([0]))
         own = np.flatnonzero(self._row[there] == other)
         longest = own[int(np.argmax((end - begin)[own]))]
-        face = seen.face[there[longest]]
-        a, b = seen.boundary.a[face], seen.boundary.b[face]
-        middle: FloatArray = a + (b - a) / np.hypot(*(b - a)) * (begin[longest] + end[longest]) / 2
+        boundary, surface = seen.boundary, seen.surface[there[longest]]
+        metres = (begin[longest] + end[longest]) / 2
+        metres -= boundary.around[surface] * (metres >= boundary.around[surface])
+        own_faces = np.flatnonzero(boundary.surface == surface)
+        face = own_faces[np.searchsorted(boundary.along[own_faces], metres, side="right") - 1]
+        a, b = boundary.a[face], boundary.b[face]
+        middle: FloatArray = a + (b - a) / np.hypot(*(b - a)) * (metres - boundary.along[face])
         return middle
 
     def normal_matrix(self, row: int, other: int) -> FloatArray:
@@ -114,7 +124,7 @@ class Overlaps:
         own = self._row[there] == other
         index = np.zeros(int(own.sum()), dtype=np.int64)
         found: FloatArray = self._moments(
-            self._seen.face[there[own]], begin[own] + EDGE_M, end[own] - EDGE_M, index, 1
+            self._seen.surface[there[own]], begin[own] + EDGE_M, end[own] - EDGE_M, index, 1
         )[0]
         return found
 
@@ -133,11 +143,12 @@ class Overlaps:
         seen = self._seen
         many = seen.pointer[rows + 1] - seen.pointer[rows]
         own = ranges(seen.pointer[rows], many)
-        begin = np.searchsorted(self._place, seen.face[own] * self.rows + np.repeat(first, many))
-        counts = np.searchsorted(self._place, (seen.face[own] + 1) * self.rows) - begin
+        begin = np.searchsorted(self._place, seen.surface[own] * self.rows + np.repeat(first, many))
+        counts = np.searchsorted(self._place, (seen.surface[own] + 1) * self.rows) - begin
         there, mine = self._order[ranges(begin, counts)], np.repeat(own, counts)
-        low = np.maximum(seen.begin[mine], seen.begin[there])
-        high = np.minimum(seen.end[mine], seen.end[there])
+        mine, there, ahead = _with_laps(seen, mine, there)
+        low = np.maximum(seen.begin[mine], seen.begin[there] + ahead)
+        high = np.minimum(seen.end[mine], seen.end[there] + ahead)
         both = (high - low > WIDER_M) & (self._row[there] != self._row[mine])
         return mine[both], there[both], low[both], high[both]
 
@@ -150,32 +161,78 @@ class Overlaps:
         kept, common = enough[index], common[enough]
         there, begin, end, index = there[kept], begin[kept], end[kept], (np.cumsum(enough) - 1)[index[kept]]
         row, other = np.divmod(both[enough], max(1, self.rows))
-        moments = self._moments(seen.face[there], begin + EDGE_M, end - EDGE_M, index, len(common))
+        moments = self._moments(seen.surface[there], begin + EDGE_M, end - EDGE_M, index, len(common))
         least = np.minimum(self.shown_m[row], self.shown_m[other])
         hold = np.minimum(_least_hold(moments, seen.xy[row]), _least_hold(moments, seen.xy[other]))
         share = common / np.maximum(least, 1e-12)
         return Pairs(row, other, *(np.round(figure, DIGITS) for figure in (common, share, hold)))
 
     def _moments(
-        self, face: IntArray, begin: FloatArray, end: FloatArray, index: IntArray, many: int
+        self, surface: IntArray, begin: FloatArray, end: FloatArray, index: IntArray, many: int
     ) -> FloatArray:
         """N about the local origin (many, 3, 3), the sum over each pair's stretches, without the lever."""
-        normals, arms = self._seen.boundary.normals
-        normal, arm = normals[face], arms[face]
-        s1, s2, s3 = ((end**k - begin**k) / k for k in (1, 2, 3))
-        turn = (arm * s1 + s2, arm * arm * s1 + 2 * arm * s2 + s3)
-        entries = {
-            (0, 0): normal[:, 0] ** 2 * s1,
-            (0, 1): normal[:, 0] * normal[:, 1] * s1,
-            (1, 1): normal[:, 1] ** 2 * s1,
-            (0, 2): normal[:, 0] * turn[0],
-            (1, 2): normal[:, 1] * turn[0],
-            (2, 2): turn[1],
-        }
+        entries = moments_of(self._seen.boundary, surface, begin, end)
         found = np.zeros((many, 3, 3))
-        for (i, j), entry in entries.items():
+        for (i, j), entry in zip(ENTRIES, entries, strict=True):
             found[:, i, j] = found[:, j, i] = np.bincount(index, entry, many)
         return found
+
+
+def _with_laps(seen: ShownBoundary, mine: IntArray, there: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Pairs of stretches of one surface, and by how far the other's are to be moved ahead.
+
+    On a closed surface a stretch has the same place one way around before and after.
+    """
+    around = seen.boundary.around[seen.surface[mine]]
+    closed = np.flatnonzero(around)
+    ahead = np.concatenate([np.zeros(len(mine)), around[closed], -around[closed]])
+    return np.append(mine, np.tile(mine[closed], 2)), np.append(there, np.tile(there[closed], 2)), ahead
+
+
+def moments_of(boundary: Boundary, surface: IntArray, begin: FloatArray, end: FloatArray) -> FloatArray:
+    """The ENTRIES of N of stretches of surfaces (6, n), about the local origin and without the lever."""
+    around = boundary.around[surface]
+    beyond = np.flatnonzero((around > 0) & (end > around))  # what lies beyond a closed surface's start
+    of = np.append(np.arange(len(surface)), beyond)
+    low = np.append(begin, np.maximum(begin - around, 0.0)[beyond])
+    high = np.append(np.where(around > 0, np.minimum(end, around), end), (end - around)[beyond])
+    part, face, low, high = _on_faces(boundary, surface[of], low, high)
+    entries = _face_moments(boundary, face, low, high)
+    found: FloatArray = np.stack(
+        [np.bincount(of[part], entry, len(surface)).astype(float) for entry in entries]
+    )
+    return found
+
+
+def _on_faces(
+    boundary: Boundary, surface: IntArray, begin: FloatArray, end: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Number of the stretch (n,), face, begin and end of what lies on each face, from the face's start."""
+    counts = np.diff(np.append(boundary.first, len(boundary.a)))[surface]
+    face = ranges(boundary.first[surface], counts)
+    of = np.repeat(np.arange(len(surface)), counts)
+    low, high = begin[of] - boundary.along[face], end[of] - boundary.along[face]
+    inner = np.diff(of) == 0  # a surface ends where its stretches say
+    low[1:][inner] = np.maximum(low[1:][inner], 0.0)
+    high[:-1][inner] = np.minimum(high[:-1][inner], boundary.length[face[:-1][inner]])
+    some = np.flatnonzero(high > low)
+    return of[some], face[some], low[some], high[some]
+
+
+def _face_moments(boundary: Boundary, face: IntArray, begin: FloatArray, end: FloatArray) -> list[FloatArray]:
+    """The ENTRIES of stretches of faces, each (n,)."""
+    normals, arms = boundary.normals
+    normal, arm = normals[face], arms[face]
+    s1, s2, s3 = ((end**k - begin**k) / k for k in (1, 2, 3))
+    turn = arm * s1 + s2
+    return [
+        normal[:, 0] ** 2 * s1,
+        normal[:, 0] * normal[:, 1] * s1,
+        normal[:, 1] ** 2 * s1,
+        normal[:, 0] * turn,
+        normal[:, 1] * turn,
+        arm * arm * s1 + 2 * arm * s2 + s3,
+    ]
 
 
 def _least_hold(moments: FloatArray, at: FloatArray) -> FloatArray:

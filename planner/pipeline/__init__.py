@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
     from stopgo.mission.stages.division import DividedRoute
     from stopgo.planner.appraisal.figures_of_route import FiguresBefore
+    from stopgo.planner.selection.later_bound import LaterBound
+    from stopgo.planner.visibility.sight.mesh import Mesh
 
 Observe = Callable[[Any], None]
 
@@ -26,7 +28,8 @@ def plan(
 ) -> Plan:
     """Plan the part of the floor that holds the start, else the largest; with `all_parts` the others too.
 
-    Every stage result goes to `observe` as soon as it exists.
+    Every stage result goes to `observe` as soon as it exists; the selection of a large floor goes there again
+    after the figures, with its bound.
 
     Raises
     ------
@@ -57,14 +60,15 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     from stopgo.planner.routing import route
 
     seen = _seen(found, observe)
-    with _figures_before(seen, planned) as before:
-        selection = _selected(seen)
-        settings = found.space.settings
+    settings = found.space.settings
+    with _Prepared(seen, planned) as prepared, _later_bound(seen) as later:
+        selection = _selected(seen, later)
+        prepared.keep_mesh()
         driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
         observe(selection if driven is None else driven.selection)
         driven = driven or route(selection)
         observe(driven)
-        return _part(driven, number, before(driven), observe)
+        return _part(driven, number, prepared.figures(driven), observe, later)
 
 
 MANY = 5000
@@ -73,45 +77,88 @@ MANY = 5000
 
 def _seen(found: Candidates, observe: Observe) -> Visibility:
     """Return the visibility of the candidates; the pairs of many that register are found meanwhile."""
-    from stopgo.planner.geometry.instance_cache import store
     from stopgo.planner.geometry.side_work import SideWork
-    from stopgo.planner.overlap import links_of
+    from stopgo.planner.overlap import keep_pairs, pairs_found
+    from stopgo.planner.selection import cover_problem
     from stopgo.planner.visibility import visibility
 
     observe(found)
     settings = found.settings
     many = len(found.kept) >= MANY and settings.registers and settings.fov >= 360  # else with headings
-    with SideWork(lambda: links_of(found), forked=many) as links:
+    with SideWork(lambda: pairs_found(found), forked=many) as pairs:
         seen = visibility(found)
         observe(seen)
         if many:
-            store(links_of, seen.candidates, links.result())
+            cover_problem(seen)  # kept for the selection, and made while the pairs are found
+            keep_pairs(seen.candidates, pairs.result())
     return seen
 
 
+class _Prepared:
+    """Results that need no stops, found while these are selected."""
+
+    def __init__(self, seen: Visibility, planned: frozenset[int]) -> None:
+        from stopgo.planner.geometry.side_work import SideWork
+
+        self._seen, self._planned = seen, planned
+        self._work = SideWork(self._found, forked=seen.rows >= MANY)
+
+    def __enter__(self) -> _Prepared:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._work.__exit__(*error)
+
+    def _found(self) -> tuple[FiguresBefore, Mesh | None]:
+        from stopgo.planner.appraisal.figures_of_route import FiguresBefore
+        from stopgo.planner.routing.roadmap import drive_mesh
+
+        space = self._seen.space
+        needed = self._seen.rows >= MANY and space.settings.graph == "exact"
+        return FiguresBefore.of(self._seen, self._planned), drive_mesh(space) if needed else None
+
+    def keep_mesh(self) -> None:
+        """Keep the mesh for the route, if another process has made it."""
+        from stopgo.planner.geometry.instance_cache import store
+        from stopgo.planner.routing.roadmap import drive_mesh
+
+        mesh = self._work.result()[1] if self._work.is_apart else None
+        if mesh is not None:
+            store(drive_mesh, self._seen.space, mesh)
+
+    def figures(self, route: Route) -> FiguresBefore:
+        """The figures that need no route, of the visibility that it has."""
+        from stopgo.planner.appraisal.figures_of_route import FiguresBefore
+
+        if route.visibility is self._seen:
+            return self._work.result()[0]
+        known = self._work.result()[0].estimates if self._work.is_beside else None
+        return FiguresBefore.of(route.visibility, self._planned, before=self._seen, known=known)
+
+
 @contextmanager
-def _figures_before(seen: Visibility, planned: frozenset[int]) -> Iterator[Callable[[Route], FiguresBefore]]:
-    """Begin with the figures that need no route, and yield a function that waits for those of one."""
-    from stopgo.planner.appraisal.figures_of_route import FiguresBefore
-    from stopgo.planner.geometry.side_work import SideWork
+def _later_bound(seen: Visibility) -> Iterator[LaterBound | None]:
+    """Yield what finds the bound of a selection during its route; None where that is no gain."""
+    from stopgo.planner.geometry.side_work import can_fork
+    from stopgo.planner.selection.later_bound import LaterBound
 
-    with SideWork(lambda: FiguresBefore.of(seen, planned), forked=seen.rows >= MANY) as work:
-
-        def before(route: Route) -> FiguresBefore:
-            if route.visibility is seen:
-                return work.result()
-            return FiguresBefore.of(route.visibility, planned, before=seen)
-
-        yield before
+    if seen.rows < MANY or seen.settings.minimise == "time" or not can_fork():
+        yield None  # the least time goes by the bound
+        return
+    with LaterBound(lambda: _selected(seen)) as later:
+        yield later
 
 
-def _selected(seen: Visibility) -> Selection:
+def _selected(seen: Visibility, later: LaterBound | None = None) -> Selection:
     """Select the fewest stops, and more where the accuracy required needs them."""
     from stopgo.planner.selection.accurate import accurate
+    from stopgo.planner.selection.bound import lower_bound
     from stopgo.planner.selection.continuous_selection import SELECTOR, select_anywhere
     from stopgo.planner.selection.refine import select_refined
 
-    return accurate((select_anywhere if seen.settings.selector == SELECTOR else select_refined)(seen))
+    if seen.settings.selector == SELECTOR:
+        return accurate(select_anywhere(seen))
+    return accurate(select_refined(seen, bound_of=later or lower_bound))
 
 
 def _in_least_time(route: Route) -> Route:
@@ -120,8 +167,10 @@ def _in_least_time(route: Route) -> Route:
     return least_time_route(route)
 
 
-def _part(driven: Route, number: int, before: FiguresBefore, observe: Observe) -> PartPlan:
-    """Return the plan of a route."""
+def _part(
+    driven: Route, number: int, before: FiguresBefore, observe: Observe, later: LaterBound | None = None
+) -> PartPlan:
+    """Return the plan of a route; a bound that is known later is waited for, and observed."""
     from stopgo.mission.plan import PartPlan
     from stopgo.planner.appraisal.figures_of_route import figures_of
     from stopgo.planner.routing.assemble import assemble
@@ -129,8 +178,11 @@ def _part(driven: Route, number: int, before: FiguresBefore, observe: Observe) -
     figures = figures_of(driven, before)
     observe(figures)
     mission = assemble(driven, part=number)
+    proved = driven if later is None else later.proved(driven)
+    if proved is not driven:
+        observe(proved.selection)
     observe(mission)
-    return PartPlan(driven, figures, mission)
+    return PartPlan(proved, figures, mission)
 
 
 UNDIVIDED = -1
@@ -145,11 +197,13 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     from stopgo.planner.routing.assemble import assemble
 
     seen = _seen(found, observe)
-    with _figures_before(seen, planned) as figures_before:
-        driven, division = _divided(_selected(seen))
+    with _Prepared(seen, planned) as prepared:
+        selection = _selected(seen)
+        prepared.keep_mesh()
+        driven, division = _divided(selection)
         observe(driven.selection)
         observe(driven)
-        before = figures_before(driven)
+        before = prepared.figures(driven)
     whole = _part(driven, UNDIVIDED, before, observe)
     shares = []
     for k, route in enumerate(division.routes):

@@ -16,11 +16,14 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.routing.dijkstra_kernel import reach
 from stopgo.planner.routing.paths import edge_lengths, straightened
 
 NEAREST = 100
 """Points to which paths are found from each point; a count, so that a plan depends on no speed."""
+MANY = 500
+"""Points from which on two processes search."""
 LANDMARKS = 32
 ROUNDING = 1e-9
 """Fraction and metres by which bounds are widened, so that they hold in spite of rounding."""
@@ -64,7 +67,14 @@ class NearbyPaths:
         return np.array(found)
 
     def _find_near(self, nearest: int) -> None:
-        found = [self._search.nearest(point, nearest) for point in range(self.points)]
+        """Search from each point; half of many points are searched from in a process of its own."""
+
+        def found_from(points: range) -> list[tuple[IntArray, FloatArray]]:
+            return [self._search.nearest(point, nearest) for point in points]
+
+        half = self.points // 2
+        with SideWork(lambda: found_from(range(half, self.points)), forked=self.points >= MANY) as others:
+            found = found_from(range(half)) + others.result()
         self._others: IntArray = np.array([ends for ends, _ in found])
         self._nearest: FloatArray = np.array([away for _, away in found])
         """Nearest other points of each, and their distances (points, nearest)."""

@@ -5,11 +5,12 @@ cimport cython
 ctypedef long long whole
 
 @cython.locals(
-    _=whole, apart=whole, inside=whole, last=whole, least=whole, n=whole, nearest=whole, point=whole,
-    row=whole, total=whole
+    apart=whole, at=whole, before=whole, inside=whole, k=whole, last=whole, least=whole, link=whole,
+    many=whole, n=whole, own=whole, point=whole, row=whole, total=whole
 )
 cpdef whole grow(
-    const whole[::1] cost, const whole[::1] weight, whole[::1] away, whole[::1] parent, whole[::1] degree
+    const whole[::1] cost, const whole[::1] weight, whole[::1] away, whole[::1] parent, whole[::1] free,
+    whole[::1] degree
 ) noexcept nogil
 
 @cython.locals(

@@ -21,20 +21,15 @@ from stopgo.planner.geometry.shapes import (
     local_origin,
     polygon_parts,
     snapped,
-    to_grid,
     whole_steps,
 )
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths, shortest_paths
+from stopgo.planner.routing.tangents import straight_pieces
 from stopgo.planner.space.local_shapes import drive_area_of
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.sight.mesh import Mesh, mesh_of
-from stopgo.planner.visibility.sight.sight import scene_of, sight
 
-PAIRS = 1_000_000
-"""Pairs of nodes in memory at a time, about 200 bytes each."""
-SPARE = 8
-"""Times as many pairs from each node as from those before have room: the next may be in a wider place."""
 TOUCH = 1e-9
 """Products of areas (m⁴) below this are floating-point noise."""
 
@@ -115,7 +110,8 @@ def _drive_area(space: NavigableSpace) -> BaseGeometry:
 
 
 @instance_cached
-def _mesh(space: NavigableSpace) -> Mesh:
+def drive_mesh(space: NavigableSpace) -> Mesh:
+    """A mesh of the drive area."""
     return mesh_of(whole_steps(_drive_area(space)))
 
 
@@ -133,37 +129,12 @@ def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntA
 def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first: int) -> IntArray:
     """Pairs (m, 2) of mutually visible nodes that may be a straight piece of a shortest path.
 
-    Nodes from `first` on are the corners. Round columns give some hundred times as many visible pairs. So
-    from a corner only directions that pass by it are searched, and PAIRS are in memory at a time.
+    Nodes from `first` on are the corners.
     """
     sides = np.zeros((len(nodes), 2, 2))
-    sides[first : first + len(corners.xy)] = corners.sides
-    ones = np.ones(len(nodes), dtype=np.int64)
-    scene = scene_of(_mesh(space), nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
-    node, between = views_of(to_grid(nodes), to_grid(sides))
-    fewest, done, found = 1 + PAIRS // len(nodes), 0, []
-    rows = fewest
-    while done < len(node):
-        chosen = node[done : done + rows]
-        runs = sight(scene, to_grid(nodes[chosen]), reach=None, between=between[done : done + rows])
-        pairs = np.stack([np.repeat(chosen, np.diff(runs.pointer)), runs.segment], axis=1)
-        found.append(_tangent(pairs, nodes, sides))
-        done += len(chosen)
-        rows = max(fewest, PAIRS * len(chosen) // (SPARE * max(1, len(pairs))))
-    return np.concatenate(found)
-
-
-def views_of(nodes: IntArray, sides: IntArray) -> tuple[IntArray, IntArray]:
-    """Nodes that look (n,), and the two points (n, 2, 2) between which each looks.
-
-    A point looks all round, a corner past both of its sides. A path that passes by a corner leaves it
-    between one of its sides and the extension of the other.
-    """
-    back, on = nodes + sides[:, 0], nodes + sides[:, 1]
-    left, right = np.stack([on, nodes - sides[:, 0]], axis=1), np.stack([nodes - sides[:, 1], back], axis=1)
-    corner = np.flatnonzero(sides.any(axis=(1, 2)))
-    node = np.concatenate([np.arange(len(nodes)), corner])
-    return node, np.concatenate([left, right[corner]])
+    of_corners = np.arange(first, first + len(corners.xy))
+    sides[of_corners] = corners.sides
+    return _tangent(straight_pieces(drive_mesh(space), nodes, of_corners, corners.sides), nodes, sides)
 
 
 def _tangent(edges: IntArray, nodes: FloatArray, sides: FloatArray) -> IntArray:

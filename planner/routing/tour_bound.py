@@ -98,11 +98,11 @@ def growing(cost: IntArray) -> Callable[[IntArray], tuple[int, IntArray]]:
     kernel = compiled(grow, large=n > FEW)
     if kernel is None:
         return lambda weight: _told(one_tree(cost, weight))
-    flat, scratch = np.ascontiguousarray(cost).ravel(), np.zeros((2, n), dtype=np.int64)
+    flat, scratch = np.ascontiguousarray(cost).ravel(), np.zeros((3, n), dtype=np.int64)
 
     def grown(weight: IntArray) -> tuple[int, IntArray]:
         degree = np.empty(n, dtype=np.int64)
-        return kernel(flat, weight, scratch[0], scratch[1], degree), degree
+        return kernel(flat, weight, *scratch, degree), degree
 
     return grown
 

@@ -312,18 +312,22 @@ class _CloudPair:
 def _registered(
     names: tuple[str, str], two: _CloudPair, starts: Sequence[FloatArray], simulation: Simulation
 ) -> Registered:
-    """The pair registered from its starts up to the first that misses; the worst result counts."""
+    """The pair registered from its starts up to the first that misses; the worst result counts.
+
+    Starts to either side of the weakest direction that all end in tolerance show that it is constrained.
+    """
     ends: list[FloatArray] = []
     for start in starts:
         ends.append(two.aligned(start, simulation))
         if not within_tolerance(*two.error(ends[-1])):
             break
     errors = [two.error(end) for end in ends]
+    held = len(starts) > 1 and all(within_tolerance(*error) for error in errors)
     worst = int(np.argmax([error[0] for error in errors]))
     pair = ScanPair(
         *names,
         shared=two.share,
-        free_deg=two.free_deg,
+        free_deg=None if held else two.free_deg,
         error_m=errors[worst][0],
         error_deg=max(error[1] for error in errors),
         least_error_m=min(error[0] for error in errors),

@@ -16,7 +16,7 @@ from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
-from stopgo.planner.geometry.instance_cache import instance_cached, taken
+from stopgo.planner.geometry.instance_cache import forget, instance_cached, taken
 from stopgo.planner.overlap import links_of
 from stopgo.planner.selection.bound import counting_bound, early_bound, first_bound, lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
@@ -28,6 +28,8 @@ from stopgo.planner.selection.improve import EntriesLeft, improved, improved_oth
 from stopgo.planner.selection.separators import Conditions
 
 Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
+BoundOf = Callable[..., int]
+"""`(problem, found=rows)`: a lower bound on the rows of any selection."""
 
 
 def _greedy(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
@@ -74,18 +76,18 @@ NAMES = {
 }
 
 
-def select(visibility: Visibility, *, joined: bool = True) -> Selection:
+def select(visibility: Visibility, *, joined: bool = True, bound_of: BoundOf = lower_bound) -> Selection:
     """Choose stops by the method of the settings, with a lower bound on their number.
 
     Required stops, and doorways added for registration, are chosen first and count. Where scans must
     register with one another, doorways are offered too. Not `joined`, the scans need not register, and the
-    default method's bound is by counting.
+    default method's bound is by counting. The bound of scans that register is that of `bound_of`.
     """
     settings = visibility.settings
     method = variant("selector", settings.selector, METHODS)
     whole, fixed, problem = cover_problem(visibility)
     if settings.registers and joined:
-        rows, bound = _connected(visibility, whole, fixed, np.arange(whole.rows), method)
+        rows, bound = _connected(visibility, whole, fixed, np.arange(whole.rows), method, bound_of)
         return _selection(visibility, whole, rows, bound, method)
     if method.name == "default" and not joined:
         rows, bound = _draft(problem, settings)
@@ -110,15 +112,27 @@ def quick_count(visibility: Visibility) -> int:
     return len(fixed) + len(improved(problem, greedy(problem), at_least=0, swaps=QUICK_SWAPS))
 
 
-def greedy_count(visibility: Visibility) -> int:
-    """Number of stops of a greedy selection whose scans need not register."""
+def greedy_takes_at_most(most: int, visibility: Visibility) -> bool:
+    """True if a greedy selection whose scans need not register has so many stops or fewer."""
     _, fixed, problem = cover_problem(visibility)
-    return len(fixed) + len(greedy(problem))
+    if len(fixed) + counting_bound(problem) > most:
+        return False
+    return len(fixed) + len(greedy(problem)) <= most
 
 
 @instance_cached
 def _whole(visibility: Visibility) -> Cover:
     return cover_of(visibility, demands_of(visibility))
+
+
+LARGE = 4_000_000
+"""Entries of a covering matrix, from which on it is not kept: 40 MB."""
+
+
+def forget_large_cover(visibility: Visibility) -> None:
+    """Forget the problem of a visibility from which nothing is selected soon, if it takes much memory."""
+    if _whole(visibility).sees.nnz > LARGE:
+        forget(_whole, visibility)
 
 
 def cover_problem(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
@@ -135,7 +149,12 @@ def cover_problem(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
 
 
 def _connected(
-    visibility: Visibility, whole: Cover, fixed: IntArray, offered: IntArray, method: Variant[Selector]
+    visibility: Visibility,
+    whole: Cover,
+    fixed: IntArray,
+    offered: IntArray,
+    method: Variant[Selector],
+    bound_of: BoundOf = lower_bound,
 ) -> tuple[IntArray, int]:
     """Rows whose scans form one network by registration, or as few networks as possible; and a bound.
 
@@ -151,7 +170,7 @@ def _connected(
     else:
         rows, bound = connected(task, lambda cover, *_: _solved(method, cover, settings), rounds=1)
     if method.ours and bound < len(rows):
-        bound = max(bound, lower_bound(task.problem, found=len(rows)))
+        bound = max(bound, bound_of(task.problem, found=len(rows)))
     problem = whole.after(fixed)
     others = in_greedy_order(problem, np.setdiff1d(rows, fixed))
     return np.concatenate([fixed, others]).astype(np.int64), bound
@@ -274,18 +293,23 @@ def _selection(
 def coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     """Fraction of the whole that is covered after each row."""
     counted, steps = np.zeros(cover.columns, dtype=np.int64), []
+    seen = cover.seen_weight(counted)
     for row in rows:
-        counted[cover.columns_of(int(row))] += 1
-        steps.append(cover.seen_weight(counted) / cover.total)
+        columns = cover.columns_of(int(row))
+        counted[columns] += 1
+        seen += int(cover.weight[columns[counted[columns] == cover.asks[columns]]].sum())
+        steps.append(seen / cover.total)
     return np.array(steps)
 
 
 __all__ = [
     "METHODS",
+    "BoundOf",
     "Selector",
     "cover_problem",
     "coverage_steps",
-    "greedy_count",
+    "forget_large_cover",
+    "greedy_takes_at_most",
     "offered_for_follow_up",
     "quick_count",
     "quick_estimate",

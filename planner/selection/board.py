@@ -20,7 +20,7 @@ class Board:
         self.weight: IntArray = np.ones(len(cover.needed), dtype=np.int64)
         """Penalty per missing unit of each demand (demands,)."""
         bare = cover.worth * (self._left == 1)[None, :]
-        self._adds = np.ascontiguousarray((cover.sees @ bare.T).toarray().T)
+        self._adds = np.ascontiguousarray(cover.sums_of(bare.T.tocsr()).toarray().T)
         """Immediate gain of each row for each demand (demands, rows)."""
         self._losses: dict[int, tuple[bytes, IntArray]] = {}
         """Cache per leaving row: the columns that only it covers, and their worth to each demand."""

@@ -23,10 +23,13 @@ FIRST_STEPS = 100
 FIRST_WORK = 40_000_000
 """Entries evaluated in all of them together."""
 
+LONG_WORK = 600_000_000
+"""Entries evaluated in all steps of the multiplier bound where the range is long: some 2 s."""
+
 
 def counting_bound(cover: Cover) -> int:
     """Fewest rows whose views could meet the hardest demand, if no views overlapped without need."""
-    gains = (cover.sees @ cover.worth.T).tocsc()
+    gains = cover.adds.tocsc()
     each = np.split(gains.data, gains.indptr[1:-1])
     simple = max(map(_fewest, each, cover.views_needed.tolist()), default=0)
     return max(simple, int(cover.asks.min(initial=simple)) if cover.needed.any() else 0)
@@ -46,7 +49,9 @@ def lower_bound(cover: Cover, *, found: int) -> int:
     if simple >= found or not cover.needed.any():
         return simple
     if entries > LARGEST:
-        return max(simple, (bound_by_parts if has_parts(cover) else multiplier_bound)(cover, found=found))
+        if has_parts(cover):
+            return max(simple, bound_by_parts(cover, found=found))
+        return max(simple, multiplier_bound(cover, found=found, work=LONG_WORK))
     coarse = coarse_bound(cover) if found <= FEW and entries > COARSE else 0
     return max(simple, coarse if coarse >= found else relaxation_bound(cover))
 

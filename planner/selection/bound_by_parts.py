@@ -39,10 +39,11 @@ FIRST_STEPS = 60
 def has_parts(cover: Cover) -> bool:
     """True if rows see so few columns that parts are much smaller than the whole.
 
-    On open floors of long range each part is nearly all that a row sees, several times over.
+    On open floors of long range each part is nearly all that a row sees, several times over. Rows and columns
+    without an entry do not count, such as rows that are not offered.
     """
-    entries = cover.sees.nnz
-    return entries**3 <= MOST_AROUND * cover.columns**2 * cover.rows
+    rows, columns = (int(np.count_nonzero(np.diff(matrix.indptr))) for matrix in (cover.sees, cover.seen_by))
+    return cover.sees.nnz**3 <= MOST_AROUND * columns**2 * rows
 
 
 def bound_by_parts(cover: Cover, *, found: int) -> int:
@@ -152,7 +153,7 @@ def _parts(cover: Cover) -> Iterator[IntArray]:
     """
     entries = np.diff(cover.seen_by.indptr)
     counts = cover.weight > 0
-    is_left = counts.copy()
+    is_left = counts & (entries > 0)
     for first in range(cover.columns):
         if not is_left[first]:
             continue

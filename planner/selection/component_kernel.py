@@ -40,11 +40,21 @@ def label_components(first: Any, to: Any, inside: Any, label: Any, stack: Any) -
         components += 1
 
 
-def mark_neighbours(first: Any, to: Any, rows: Any, is_end: Any) -> None:
-    """Set `is_end` to 1 for each row that has a link to one of the `rows`; links are as above."""
+def find_neighbours(first: Any, to: Any, rows: Any, is_end: Any, found: Any) -> int:
+    """Find the rows that have a link to one of the `rows`, and return their number; links are as above.
+
+    `found` receives them, once each (rows,). `is_end` is 0 for all rows, and again afterwards.
+    """
+    count = 0
     for k in range(len(rows)):
         for link in range(first[rows[k]], first[rows[k] + 1]):
-            is_end[to[link]] = 1
+            if is_end[to[link]] == 0:
+                is_end[to[link]] = 1
+                found[count] = to[link]
+                count += 1
+    for k in range(count):
+        is_end[found[k]] = 0
+    return count
 
 
 def grow_parts(

@@ -3,15 +3,17 @@
 cimport cython
 
 ctypedef long long whole
+ctypedef int index
 
 @cython.locals(components=whole, here=whole, link=whole, row=whole, size=whole, there=whole)
 cpdef void label_components(
-    const whole[::1] first, const whole[::1] to, const whole[::1] inside, whole[::1] label, whole[::1] stack
+    const whole[::1] first, const index[::1] to, const whole[::1] inside, whole[::1] label, whole[::1] stack
 ) noexcept nogil
 
-@cython.locals(k=whole, link=whole)
-cpdef void mark_neighbours(
-    const whole[::1] first, const whole[::1] to, const whole[::1] rows, unsigned char[::1] is_end
+@cython.locals(count=whole, k=whole, link=whole)
+cpdef whole find_neighbours(
+    const whole[::1] first, const index[::1] to, const whole[::1] rows, unsigned char[::1] is_end,
+    whole[::1] found
 ) noexcept nogil
 
 @cython.locals(
@@ -19,7 +21,7 @@ cpdef void mark_neighbours(
     there=whole, turns=whole,
 )
 cpdef whole grow_parts(
-    const whole[::1] first, const whole[::1] to, const whole[::1] inside, const whole[::1] seeds,
+    const whole[::1] first, const index[::1] to, const whole[::1] inside, const whole[::1] seeds,
     whole[::1] label, whole[::1] parent, whole[::1] head, whole[::1] tail, whole[::1] turn,
     whole[::1] following, whole[::1] met
 ) noexcept nogil

@@ -163,15 +163,29 @@ def _by_greedy(task: ConnectedCover) -> IntArray:
 
 def connected_rows(task: ConnectedCover, rows: IntArray) -> IntArray:
     """The rows, with others that connect their components and without superfluous ones."""
-    coverage = RunningCoverage(task.cover, rows)
+    coverage, near_of = RunningCoverage(task.cover, rows), _Neighbours(task.graph)
     for number, region in enumerate(task.regions):
         inside = task.in_region(rows, number)
         while len(found := components_of(task.links, inside)) > 1:
-            more = np.setdiff1d(connecting_rows(task.graph, region, found, coverage.added_by), inside)
+            near = [near_of[one] for one in found]
+            more = np.setdiff1d(connecting_rows(task.links, region, found, near, coverage.added_by), inside)
             coverage.add(more)
             inside = np.concatenate([inside, more])
         rows = np.union1d(rows, inside)
     return _without_idle(task, np.unique(rows))
+
+
+class _Neighbours:
+    """Neighbours of components; most components are the same from one look to the next."""
+
+    def __init__(self, graph: LinkGraph) -> None:
+        self._graph, self._known = graph, dict[bytes, IntArray]()
+
+    def __getitem__(self, component: IntArray) -> IntArray:
+        key = component.tobytes()
+        if key not in self._known:
+            self._known[key] = self._graph.neighbours(component)
+        return self._known[key]
 
 
 def _without_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
@@ -184,13 +198,18 @@ def _without_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
 
 
 def _without_some_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
-    """One look at each row, in each region of which the rows are connected."""
+    """One look at each row, in each region of which the rows are connected.
+
+    Rows without which too little of the whole is covered are needed, and all other rows look less idle then.
+    """
     cover, coverage, inside = task.cover, RunningCoverage(task.cover, rows), task.inside(rows)
-    alone = [
+    alone = np.array([
         int(cover.weight[seen][coverage.covered[seen] <= cover.asks[seen]].sum())
         for seen in map(cover.columns_of, rows.tolist())
-    ]
-    for row in rows[np.argsort(alone, kind="stable")].tolist():
+    ])  # fmt: skip
+    spare = coverage.reached[0] - cover.needed[0]
+    order = np.argsort(alone, kind="stable")
+    for row in rows[order[alone[order] <= spare]].tolist():
         one = np.array([row])
         if coverage.enough_without(one) and not task.splits(row, inside):
             coverage.remove(one)

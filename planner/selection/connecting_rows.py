@@ -9,24 +9,24 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import IntArray
-from stopgo.planner.selection.link_graph import LinkGraph
 
 
 def connecting_rows(
-    graph: LinkGraph,
+    links: csr_array,
     region: IntArray,
     components: list[IntArray],
+    near: list[IntArray],
     gain_of: Callable[[IntArray], IntArray],
 ) -> IntArray:
     """The row of a region that connects most of its components; if none connects two, the shortest path.
 
-    Of rows that connect as many, it is the first with the largest gain in coverage.
+    Of rows that connect as many, it is the first with the largest gain in coverage. Rows `near` each of the
+    components are linked with it.
     """
-    reached = np.concatenate([graph.neighbours(one) for one in components])
-    joins = np.bincount(reached, minlength=graph.links.shape[0])[region]
+    joins = np.bincount(np.concatenate(near), minlength=links.shape[0])[region]
     most = int(joins.max())
     if most < 2:
-        return _shortest_path(graph.links, region, components)
+        return _shortest_path(links, region, components)
     alike = region[joins == most]
     return alike[[int(np.argmax(gain_of(alike)))]]
 

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack, vstack
 
-from stopgo.mission.geometry import IntArray
+from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import Visibility
+from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.selection.demands import Demands
+from stopgo.planner.selection.worth_kernel import add_views, sum_by_row
 from stopgo.planner.selection.worths import Worths
 from stopgo.planner.visibility.unit_ranges import ranges
+
+BLOCK = 1_000_000
+"""Runs of units, and entries, that are widened at a time: long ranges have many millions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +89,24 @@ class Cover:
     @cached_property
     def adds(self) -> csr_array:
         """Worth that each row adds to each demand before any is chosen (rows, demands)."""
-        return csr_array(self.sees @ self.adds_to)
+        return self.sums_of(self.adds_to)
+
+    def sums_of(self, values: csr_array) -> csr_array:
+        """Sums of values of the columns (columns, n) that each row sees (rows, n)."""
+        return csr_array(vstack([part @ values for part in self._parts()], format="csr"))
+
+    def _parts(self) -> Iterator[csr_array]:
+        """The matrix by some rows at a time (n, columns): products are computed in 64 bits for each entry."""
+        begins = np.searchsorted(self.sees.indptr, np.arange(0, self.sees.nnz, BLOCK)).tolist()
+        rows = np.unique([0, *begins, self.rows]).tolist()
+        yield from (self.sees[low:high] for low, high in pairwise(rows) if len(rows) > 2)
+        if len(rows) <= 2:
+            yield self.sees
 
     @cached_property
     def worths(self) -> Worths:
         """Sums of what columns add to the demands."""
-        return Worths(self.adds_to, self.seen_by)
+        return Worths(self.adds_to, lambda: self.seen_by)
 
     @cached_property
     def seen_columns(self) -> tuple[IntArray, NDArray[np.int32]]:
@@ -99,18 +117,37 @@ class Cover:
     @cached_property
     def most_demands(self) -> int:
         """Most demands to which the columns of one row add."""
-        seen, adds = (_pattern(matrix) for matrix in (self.sees, self.adds_to))
-        return int(np.diff(csr_array(seen @ adds).indptr).max(initial=0))
+        adds = _pattern(self.adds_to)
+        most = [np.diff(csr_array(_pattern(part) @ adds).indptr).max(initial=0) for part in self._parts()]
+        return int(max(most))
 
     def columns_of(self, row: int) -> IntArray:
         """Columns that a row sees."""
         return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]].astype(np.int64)
 
-    def covered_by(self, rows: IntArray) -> IntArray:
-        """Number of `rows` that see each column (columns,)."""
+    def columns_of_each(self, rows: IntArray) -> IntArray:
+        """Columns that each of the rows sees, one row after the other (n,)."""
         begin = self.sees.indptr[rows]
         entries = ranges(begin, self.sees.indptr[np.asarray(rows) + 1] - begin)
-        return np.bincount(self.sees.indices[entries], minlength=self.columns)
+        return self.sees.indices[entries].astype(np.int64)
+
+    def covered_by(self, rows: IntArray) -> IntArray:
+        """Number of `rows` that see each column (columns,)."""
+        kernel = compiled(add_views, large=False)
+        if kernel is None:
+            return np.bincount(self.columns_of_each(rows), minlength=self.columns)
+        views = np.zeros(self.columns, dtype=np.int64)
+        kernel(np.ascontiguousarray(rows, np.int64), *self.seen_columns, views)
+        return views
+
+    def paid_to(self, price: FloatArray) -> FloatArray:
+        """Sum of the prices (columns,) of all columns that each row sees (rows,)."""
+        kernel = compiled(sum_by_row, large=False)
+        if kernel is None:
+            return np.asarray(self.sees @ price)
+        sums = np.zeros(self.rows)
+        kernel(*self.seen_columns, np.ascontiguousarray(price, np.float64), sums)
+        return sums
 
     def seen_weight(self, covered: IntArray) -> int:
         """Weight of the columns that have all views they need."""
@@ -157,17 +194,22 @@ class Cover:
         views: IntArray = np.diff(np.concatenate([[0], np.cumsum(taken)])[begin])
         return views
 
+    @cached_property
+    def usual_worth(self) -> int:
+        """About what a row sees, to guide greedy among other demands."""
+        return max(1, int(self.paid_to(self.weight.astype(float)).mean()))
+
     def with_one_of_each(self, sets: Sequence[IntArray]) -> Cover:
         """The problem with one more demand for each set of rows (n,): one of the set must be chosen."""
         if not sets:
             return self
-        worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, to guide greedy
+        worth = self.usual_worth
         sizes = [len(rows) for rows in sets]
         entries = (
             np.ones(sum(sizes), np.int8),
             (np.concatenate(sets).astype(np.int32), np.repeat(np.arange(len(sets), dtype=np.int32), sizes)),
         )
-        chosen = coo_array(entries, shape=(self.rows, len(sets)))
+        chosen = csr_array(entries, shape=(self.rows, len(sets)))  # as `sees` is: else both are made anew
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
         made = Cover(
@@ -188,20 +230,24 @@ def cover_of(visibility: Visibility, demands: Demands) -> Cover:
     seen = group >= 0
     _, first = np.unique(group[seen], return_index=True)
     merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
+    del sees
     worth = _worth(demands, np.repeat(group, np.diff(np.append(stretch_first, len(demands.weight)))))
     needed = demands.needed(np.asarray(worth.sum(axis=1)).ravel())
     return Cover(merged, worth, needed, visibility.asked[stretch_first[seen][first]])
 
 
 def _alike(sees: csr_array, weight: IntArray, stretch_first: IntArray) -> IntArray:
-    """Group of each stretch by the rows that see it; -1 where no row does, or where it has no weight."""
+    """Group of each stretch by the rows that see it; -1 where no row does, or where it has no weight.
+
+    Long lists of rows are compared by digests, which take no memory to speak of.
+    """
     by_column = _sorted(sees.T)
     counts = np.add.reduceat(weight, stretch_first) > 0
     groups: dict[bytes, int] = {}
     group = np.full(by_column.shape[0], -1, dtype=np.int64)
     for column in np.flatnonzero(counts & (np.diff(by_column.indptr) > 0)):
         rows = by_column.indices[by_column.indptr[column] : by_column.indptr[column + 1]]
-        group[column] = groups.setdefault(rows.tobytes(), len(groups))
+        group[column] = groups.setdefault(blake2b(rows, digest_size=32).digest(), len(groups))
     return group
 
 
@@ -244,10 +290,6 @@ def _first_of_stretches(visibility: Visibility) -> IntArray:
     begins[visibility.first] = True
     begins[visibility.last + 1] = True
     return np.flatnonzero(begins[:-1])
-
-
-BLOCK = 1_000_000
-"""Runs of units whose stretches are found at a time: of long ranges there are many millions."""
 
 
 def _stretch_matrix(visibility: Visibility, stretch_first: IntArray) -> csr_array:

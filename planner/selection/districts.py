@@ -53,7 +53,7 @@ def _around_first(cover: Cover, is_chosen: BoolArray, is_settled: BoolArray) -> 
     """The first row that is not settled, with those that see the same columns, directly or over others."""
     found = newest = np.flatnonzero(is_chosen & ~is_settled)[:1]
     while len(newest) and len(found) < SIZE:
-        seers = np.unique(cover.worths.seers(_to_cover(cover, newest)))
+        seers = cover.worths.seers(_to_cover(cover, newest))
         newest = np.setdiff1d(seers[is_chosen[seers]], found)
         found = np.concatenate([found, newest])
     return np.sort(found[:SIZE])
@@ -64,8 +64,8 @@ def _to_cover(cover: Cover, rows: IntArray) -> IntArray:
 
     A separator of a network is seen by rows of many rooms, which have nothing else in common.
     """
-    columns = np.unique(cover.sees[rows].indices)
-    return columns[cover.weight[columns] > 0].astype(np.int64)
+    columns = cover.columns_of_each(rows)
+    return np.unique(columns[cover.weight[columns] > 0])
 
 
 def _searched(
@@ -80,9 +80,9 @@ def _searched(
 def _problem_of(others: RunningCoverage, is_other: BoolArray, district: IntArray) -> tuple[Cover, IntArray]:
     """The problem that the other rows leave in a district, and the rows offered there (ascending)."""
     cover, missing = others.cover, others.missing
-    seen = np.unique(cover.sees[district].indices)
-    offered = np.union1d(cover.worths.seers(seen[others.left(seen) > 0].astype(np.int64)), district)
-    offered = offered[~is_other[offered]].astype(np.int64)
+    seen = np.unique(cover.columns_of_each(district))
+    seers = cover.worths.seers(seen[others.left(seen) > 0])
+    offered = np.union1d(seers[~is_other[seers]], district)
     sees = cover.sees[offered]
     columns = np.unique(sees.indices)
     left = others.left(columns)

@@ -60,10 +60,10 @@ def _by_kernel(kernel: Callable[..., int], cover: Cover, gains: IntArray, *, unt
     """`_by_gain` by the kernel, compiled or as written."""
     keys = np.zeros((cover.rows, 3), dtype=np.int64)
     keys[gains[:, 3]] = gains[:, :3]
-    covered, sums = (np.zeros(size, dtype=np.int64) for size in (cover.columns, len(cover.needed)))
+    sums, touched = (np.zeros(len(cover.needed), dtype=np.int64) for _ in range(2))
     wanted, needed = cover.views_needed.astype(np.int64), cover.needed.astype(np.int64)
     heap, chosen = gains[:, 3].copy(), np.zeros(len(gains), dtype=np.int64)
-    state = (cover.asks, covered, wanted, needed, keys.ravel(), heap, sums, chosen)
+    state = (cover.asks.astype(np.int32), wanted, needed, keys.ravel(), heap, sums, touched, chosen)
     return chosen[: kernel(int(until_met), *cover.seen_columns, *cover.worths.added, *state)]
 
 

@@ -7,11 +7,11 @@ Data, for the rows, columns and demands of one covering problem
 ---------------------------------------------------------------
 - `row_first`, `seen`: row i sees the columns `seen[row_first[i]]` to `seen[row_first[i + 1] - 1]`.
 - `adds_first`, `demand`, `worth`: the demands that a column adds to, and what it adds.
-- `covered`, `asks`: views that each column has and needs.
+- `left`: views that each column still needs; 0 or less if none.
 - `wanted`: views that each demand still needs, by weight. `needed`: its weight still missing, below 1 if met.
 - `keys`: gain of each row in three ways as it was computed last, negative, so that the least is the best.
 - `heap`: rows, the least by key and then by number first; row k is not after rows 2 k + 1 and 2 k + 2.
-- `sums`: zeros (demands,), and zeros again afterwards.
+- `sums`: zeros (demands,), and zeros again afterwards. `touched`: scratch, the demands that are not 0 there.
 
 Gains are weights of units, and their sum over a floor is below 2**62.
 """
@@ -22,17 +22,20 @@ from typing import Any
 
 
 def choose(
-    until_met: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, asks: Any,
-    covered: Any, wanted: Any, needed: Any, keys: Any, heap: Any, sums: Any, chosen: Any,
+    until_met: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, left: Any,
+    wanted: Any, needed: Any, keys: Any, heap: Any, sums: Any, touched: Any, chosen: Any,
 ) -> int:  # fmt: skip
     """Choose rows until every demand is met or no row adds anything, else all; return their number."""
-    size, count = len(heap), 0
+    size, count, unmet = len(heap), 0, 0
     for at in range(size // 2 - 1, -1, -1):
         sink(at, size, keys, heap)
-    while size > 0 and (until_met == 0 or any_unmet(needed)):
+    while size > 0:
+        unmet = next_unmet(unmet, needed)
+        if until_met == 1 and unmet == len(needed):
+            break
         row = heap[0]
         evaluate(
-            row, row_first, seen, adds_first, demand, worth, asks, covered, wanted, needed, keys, sums
+            row, row_first, seen, adds_first, demand, worth, left, wanted, needed, keys, sums, touched
         )  # fmt: skip
         sink(0, size, keys, heap)
         if heap[0] != row:
@@ -44,16 +47,15 @@ def choose(
         sink(0, size, keys, heap)
         chosen[count] = row
         count += 1
-        take(row, row_first, seen, adds_first, demand, worth, asks, covered, wanted, needed, sums)
+        take(row, row_first, seen, adds_first, demand, worth, left, wanted, needed, sums, touched)
     return count
 
 
-def any_unmet(needed: Any) -> int:
-    """Return 1 if any demand is unmet, else 0."""
-    for k in range(len(needed)):
-        if needed[k] > 0:
-            return 1
-    return 0
+def next_unmet(begin: int, needed: Any) -> int:
+    """The first unmet demand from one on, else the number of demands; a demand that is met stays so."""
+    while begin < len(needed) and needed[begin] <= 0:
+        begin += 1
+    return begin
 
 
 def is_before(a: int, b: int, keys: Any) -> int:
@@ -79,46 +81,50 @@ def sink(at: int, size: int, keys: Any, heap: Any) -> None:
 
 
 def evaluate(
-    row: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, asks: Any, covered: Any,
-    wanted: Any, needed: Any, keys: Any, sums: Any,
+    row: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, left: Any, wanted: Any,
+    needed: Any, keys: Any, sums: Any, touched: Any,
 ) -> None:  # fmt: skip
     """Compute the gain of a row: what is wanted, then, if nothing is, of unmet demands; last of the whole."""
-    add(row, row_first, seen, adds_first, demand, worth, asks, covered, sums)
+    many = add(row, row_first, seen, adds_first, demand, worth, left, sums, touched)
     first, second, whole_gain = 0, 0, sums[0]
-    for at in range(row_first[row], row_first[row + 1]):
-        for entry in range(adds_first[seen[at]], adds_first[seen[at] + 1]):
-            total = sums[demand[entry]]
-            if total != 0:
-                first += min(total, wanted[demand[entry]])
-                if needed[demand[entry]] > 0:
-                    second += total
-                sums[demand[entry]] = 0
+    for k in range(many):
+        total = sums[touched[k]]
+        first += min(total, wanted[touched[k]])
+        if needed[touched[k]] > 0:
+            second += total
+        sums[touched[k]] = 0
     keys[3 * row], keys[3 * row + 1] = -first, -second if first == 0 else 0
     keys[3 * row + 2] = -whole_gain
 
 
 def add(
-    row: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, asks: Any, covered: Any,
-    sums: Any,
-) -> None:  # fmt: skip
-    """Add the worth of a row's columns that still need views to each demand."""
+    row: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, left: Any, sums: Any,
+    touched: Any,
+) -> int:  # fmt: skip
+    """Add the worth of a row's columns that still need views to each demand; return how many are touched."""
+    many = 0
     for at in range(row_first[row], row_first[row + 1]):
-        if covered[seen[at]] < asks[seen[at]]:
+        if left[seen[at]] > 0:
             for entry in range(adds_first[seen[at]], adds_first[seen[at] + 1]):
+                if sums[demand[entry]] == 0 and worth[entry] != 0:
+                    touched[many] = demand[entry]
+                    many += 1
                 sums[demand[entry]] += worth[entry]
+    return many
 
 
 def take(
-    row: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, asks: Any, covered: Any,
-    wanted: Any, needed: Any, sums: Any,
+    row: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, left: Any, wanted: Any,
+    needed: Any, sums: Any, touched: Any,
 ) -> None:  # fmt: skip
     """Count a row as chosen."""
-    add(row, row_first, seen, adds_first, demand, worth, asks, covered, sums)
+    many = add(row, row_first, seen, adds_first, demand, worth, left, sums, touched)
+    for k in range(many):
+        wanted[touched[k]] -= min(wanted[touched[k]], sums[touched[k]])
+        sums[touched[k]] = 0
     for at in range(row_first[row], row_first[row + 1]):
         column = seen[at]
-        covered[column] += 1
-        for entry in range(adds_first[column], adds_first[column + 1]):
-            wanted[demand[entry]] -= min(wanted[demand[entry]], sums[demand[entry]])
-            sums[demand[entry]] = 0
-            if covered[column] == asks[column]:
+        left[column] -= 1
+        if left[column] == 0:
+            for entry in range(adds_first[column], adds_first[column + 1]):
                 needed[demand[entry]] -= worth[entry]

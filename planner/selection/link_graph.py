@@ -5,21 +5,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.selection.component_kernel import grow_parts, mark_neighbours
+from stopgo.planner.selection.component_kernel import find_neighbours, grow_parts
 from stopgo.planner.visibility.unit_ranges import ranges
 
 
 @instance_cached
-def adjacency_of(links: csr_array) -> tuple[IntArray, IntArray]:
-    """First link of each row and the rows of all links, in 64-bit integers."""
-    first, to = (np.ascontiguousarray(part, np.int64) for part in (links.indptr, links.indices))
-    return first, to
+def adjacency_of(links: csr_array) -> tuple[IntArray, NDArray[np.int32]]:
+    """First link of each row, and the rows of all links in 32 bits: there are millions."""
+    return np.ascontiguousarray(links.indptr, np.int64), np.ascontiguousarray(links.indices, np.int32)
 
 
 class LinkedParts(NamedTuple):
@@ -39,23 +39,22 @@ class LinkGraph:
         rows = links.shape[0]
         self._first, self._to = adjacency_of(links)
         self._label = np.full(rows, -1, dtype=np.int64)
-        self._is_end = np.zeros(rows, dtype=bool)
-        self._following, self._met = (np.zeros(rows, dtype=np.int64) for _ in range(2))
+        self._is_end = np.zeros(rows, dtype=np.uint8)
+        self._following, self._met, self._found = (np.zeros(rows, dtype=np.int64) for _ in range(3))
 
     def ends(self, rows: IntArray) -> IntArray:
         """Rows to which the links of some rows lead (links,)."""
-        return self._to[ranges(self._first[rows], self._first[rows + 1] - self._first[rows])]
+        ends = self._to[ranges(self._first[rows], self._first[rows + 1] - self._first[rows])]
+        return ends.astype(np.int64)
 
     def neighbours(self, rows: IntArray) -> IntArray:
         """Rows that have a link to one of these, once each, ascending (n,)."""
-        kernel = compiled(mark_neighbours, large=False)
+        kernel = compiled(find_neighbours, large=False)
         if kernel is None:
-            self._is_end[self.ends(rows)] = True
-        else:
-            kernel(self._first, self._to, np.ascontiguousarray(rows, np.int64), self._is_end.view(np.uint8))
-        found = np.flatnonzero(self._is_end).astype(np.int64)
-        self._is_end[found] = False
-        return found
+            return np.unique(self.ends(rows))
+        rows = np.ascontiguousarray(rows, np.int64)
+        many = kernel(self._first, self._to, rows, self._is_end, self._found)
+        return np.sort(self._found[:many])
 
     def parts_around(self, seeds: IntArray, inside: IntArray) -> LinkedParts:
         """The connected parts around rows, of those with `inside` 1 (rows,)."""
@@ -69,7 +68,7 @@ class LinkGraph:
         met = self._met[: kernel(self._first, self._to, inside, seeds, *tables)].copy()
         label = self._label[met]
         self._label[met] = -1
-        numbers = np.unique(label)
+        numbers = np.flatnonzero(np.bincount(label))
         parts = {number: met[label == number] for number in numbers.tolist()}
         growing = [part for number, part in parts.items() if head[number] >= 0]
         last = growing[0] if growing else met[:0]

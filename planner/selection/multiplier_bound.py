@@ -29,14 +29,14 @@ With a weight of 0.7 and steps that are only halved, the bound of 29 000 m² was
 """
 
 
-def multiplier_bound(cover: Cover, *, found: int, steps: int = STEPS) -> int:
+def multiplier_bound(cover: Cover, *, found: int, steps: int = STEPS, work: int = WORK) -> int:
     """Lagrangian bound: prices u_j on v_j y_j <= Σ x_i, raised where a column is used and not seen.
 
     For any prices u >= 0 of columns and p >= 0 of all demands but the whole, Σ_i min(0, 1 - Σ_j in i u_j)
     + Σ_k p_k needed_k + the cheapest way to meet the whole at v_j u_j - Σ_k p_k worth_kj per column is a
     bound (Geoffrion, 1974).
     """
-    return rounded_up(multiplier_prices(PricedCover(cover), found=found, steps=steps)[0])
+    return rounded_up(multiplier_prices(PricedCover(cover), found=found, steps=steps, work=work)[0])
 
 
 def rounded_up(bound: float) -> int:
@@ -44,14 +44,16 @@ def rounded_up(bound: float) -> int:
     return int(np.ceil(bound - 1e-6))
 
 
-def multiplier_prices(problem: PricedCover, *, found: int, steps: int) -> tuple[float, FloatArray]:
+def multiplier_prices(
+    problem: PricedCover, *, found: int, steps: int, work: int = WORK
+) -> tuple[float, FloatArray]:
     """The best bound of so many steps, and its prices; `found` rows are known to suffice.
 
     Prices follow Polyak's subgradient rule, smoothed, by shrinking steps.
     """
     prices = best_prices = problem.first_prices
     best, step, waited, direction = 0.0, FIRST_STEP, 0, np.zeros(len(prices))
-    steps = min(steps, max(50, WORK // max(1, problem.cover.sees.nnz)))
+    steps = min(steps, max(50, work // max(1, problem.cover.sees.nnz)))
     for k in range(steps):
         value, slope = problem.value(prices)
         waited = 0 if value > best + 1e-4 else waited + 1
@@ -76,8 +78,7 @@ class PricedCover:
 
     def __init__(self, cover: Cover) -> None:
         self.cover = cover
-        scale = max(1.0, float((cover.sees @ cover.weight).max(initial=1)))
-        self._sees = cover.sees.astype(float)
+        scale = float(cover.paid_to(cover.weight.astype(float)).max(initial=1.0))
         self.weight = cover.weight / scale
         self.needed = cover.needed / scale
         self.worth = csr_array(cover.worth.astype(float) / scale)
@@ -93,13 +94,13 @@ class PricedCover:
         """The lower bound at these prices, and its subgradient."""
         cover = self.cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
-        paid_to, paid, gained = self._sees @ column, cover.asks * column, self._rest_of_column @ demand
+        paid_to, paid, gained = cover.paid_to(column), cover.asks * column, self._rest_of_column @ demand
         spare, cost = 1.0 - paid_to, paid - gained
         bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self.needed[1:])
         amounts = paid_to.sum() + paid.sum() + gained.sum() + demand @ self.needed[1:]
         value = whole + float((cost * bought).sum()) - ROUNDING * float(amounts)
-        seen = self._sees.T @ (spare < 0).astype(float)
+        seen = cover.covered_by(np.flatnonzero(spare < 0))
         return value, np.concatenate([cover.asks * bought - seen, self.needed[1:] - self._rest @ bought])
 
     def bought(self, column: FloatArray, demand: FloatArray) -> tuple[float, FloatArray]:

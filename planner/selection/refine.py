@@ -19,7 +19,8 @@ from stopgo.mission.stages import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, to_shape
-from stopgo.planner.selection import greedy_count, select
+from stopgo.planner.selection import BoundOf, forget_large_cover, greedy_takes_at_most, select
+from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -29,13 +30,16 @@ MOST = 25
 """Most stops for which refinement is the default: beyond, it takes more than a second."""
 
 
-def select_refined(seen: Visibility) -> Selection:
-    """The selection, with fewer stops where positions off the pattern save some."""
+def select_refined(seen: Visibility, *, bound_of: BoundOf = lower_bound) -> Selection:
+    """The selection, with fewer stops where positions off the pattern save some.
+
+    The bound of scans that register is that of `bound_of`.
+    """
     settings = seen.settings
     if settings.coverage_rule == "paper" or settings.fov < 360:
         return select(seen)
     if settings.registers:
-        return _select_joined(seen)
+        return _select_joined(seen, bound_of)
     first = select(seen)
     nearby = _nearby_candidates(first) if _refines(settings, len(first.chosen)) else None
     if nearby is None:
@@ -44,13 +48,17 @@ def select_refined(seen: Visibility) -> Selection:
     return again if len(again.chosen) < len(first.chosen) else first
 
 
-def _select_joined(seen: Visibility) -> Selection:
+def _select_joined(seen: Visibility, bound_of: BoundOf) -> Selection:
     """The selection whose scans register, also from positions near the stops of one that need not."""
-    if not _refines(seen.settings, greedy_count(seen)):
-        return select(seen)
+    asked = seen.settings.refine
+    if not (greedy_takes_at_most(MOST, seen) if asked is None else asked):
+        return select(seen, bound_of=bound_of)
     first = select(seen, joined=False)
     nearby = _nearby_candidates(first) if _refines(seen.settings, len(first.chosen)) else None
-    return select(seen if nearby is None else merged(seen, visibility(nearby)))
+    if nearby is None:
+        return select(seen, bound_of=bound_of)
+    forget_large_cover(seen)
+    return select(merged(seen, visibility(nearby)), bound_of=bound_of)
 
 
 def _refines(settings: Settings, stops: int) -> bool:

@@ -13,8 +13,13 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.greedy import greedy
+from stopgo.planner.selection.improve import improved
 from stopgo.planner.selection.link_graph import LinkedParts, LinkGraph, adjacency_of
 from stopgo.planner.selection.running_coverage import RunningCoverage
+
+FEW = 2
+"""Components of which one is needed at least; more are searched for fewer."""
 
 
 def components_of(links: csr_array, rows: IntArray) -> list[IntArray]:
@@ -39,7 +44,17 @@ def _labels(links: csr_array, rows: IntArray) -> IntArray:
 
 
 def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
-    """The components needed to meet every demand: the smallest superfluous ones are dropped first."""
+    """The components needed to meet every demand, as few as are found.
+
+    The smallest superfluous ones are dropped first. Where many remain, a search for the fewest often leaves
+    half of them.
+    """
+    dropped = _without_superfluous(cover, components)
+    fewest = _fewest(cover, components) if len(dropped) > FEW else dropped
+    return fewest if len(fewest) < len(dropped) else dropped
+
+
+def _without_superfluous(cover: Cover, components: list[IntArray]) -> list[IntArray]:
     needed: list[IntArray] = []
     coverage = RunningCoverage(cover, np.concatenate([np.empty(0, np.int64), *components]))
     for before, component in reversed(list(enumerate(components))):
@@ -48,6 +63,19 @@ def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
             coverage.add(component)
             needed.append(component)
     return needed[::-1]
+
+
+def _fewest(cover: Cover, components: list[IntArray]) -> list[IntArray]:
+    """Few components that meet every demand, by the search for few stops; all of them if it finds none."""
+    sizes = [len(component) for component in components]
+    ends = (np.repeat(np.arange(len(components)), sizes), np.concatenate(components))
+    members = csr_array((np.ones(len(ends[0]), np.int64), ends), shape=(len(components), cover.rows))
+    sees = csr_array(members @ cover.sees)
+    sees.data = np.ones(len(sees.data), np.int8)
+    together = Cover(sees, cover.worth, cover.needed)
+    chosen = [components[k] for k in np.sort(improved(together, greedy(together), at_least=1))]
+    enough = RunningCoverage(cover, np.concatenate([np.empty(0, np.int64), *chosen])).is_enough
+    return chosen if enough else components
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +102,7 @@ class SeparatorSearch:
         self._region_of[every] = np.repeat(np.arange(len(regions)), [len(region) for region in regions])
         self._every, self._elsewhere = RunningCoverage(cover, every), RunningCoverage(cover, every)
         self._left_out = np.empty(0, np.int64)
-        self._is_near = np.zeros(cover.rows, dtype=bool)
+        self._is_near, self._is_chosen = (np.zeros(cover.rows, dtype=bool) for _ in range(2))
 
     def separators(self, rows: IntArray) -> Iterator[IntArray]:
         """Sets of rows (n,) of which every selection that is connected in each region has at least one.
@@ -90,11 +118,12 @@ class SeparatorSearch:
 
         Each is a set of rows and its ends: one row of the set is chosen if all the ends are.
         """
-        for separator, component, others in self._found(rows):
+        for separator, k, inner in self._found(rows):
             here, beyond = self._enough(separator)
+            others = np.concatenate([*inner[:k], *inner[k + 1 :]])
             is_near = np.isin(others, separator.near)
             far = int(others[~is_near if separator.is_here else is_near].min())
-            ends = ((int(component[0]),) if beyond else ()) + ((far,) if here else ())
+            ends = ((int(inner[k][0]),) if beyond else ()) + ((far,) if here else ())
             yield separator.between, ends
 
     def _enough(self, separator: NodeSeparator) -> tuple[bool, bool]:
@@ -103,22 +132,23 @@ class SeparatorSearch:
         far = self._every.enough_without(np.concatenate([separator.near, separator.between]))
         return (near, far) if separator.is_here else (far, near)
 
-    def _found(self, rows: IntArray) -> Iterator[tuple[NodeSeparator, IntArray, IntArray]]:
-        """Node separators between each component of the rows and its others, with both."""
-        inside = np.zeros(self._cover.rows, dtype=np.int64)
-        components: dict[int, list[IntArray]] = {}
+    def _found(self, rows: IntArray) -> Iterator[tuple[NodeSeparator, int, list[IntArray]]]:
+        """Node separators between a component of the rows and the others of its region.
+
+        With each come the number of the component, and all of them.
+        """
+        inside, components = np.zeros(self._cover.rows, dtype=np.int64), dict[int, list[IntArray]]()
         for one in components_of(self._graph.links, rows[self._region_of[rows] >= 0]):
             components.setdefault(int(self._region_of[one[0]]), []).append(one)
         for number, inner in sorted(components.items()):
             if len(inner) > 1:
-                region = self._regions[number]
-                inside[region] = 1
+                region, chosen = self._regions[number], np.concatenate(inner)
+                inside[region], self._is_chosen[chosen] = 1, True
                 self._leave_out(region)
                 for k, component in enumerate(inner):
-                    others = np.concatenate([*inner[:k], *inner[k + 1 :]])
-                    for separator in self._around(component, others, inside, len(region)):
-                        yield separator, component, others
-                inside[region] = 0
+                    for separator in self._around(component, len(chosen), inside, len(region)):
+                        yield separator, k, inner
+                inside[region], self._is_chosen[chosen] = 0, False
 
     def _leave_out(self, region: IntArray) -> None:
         """Let the coverage elsewhere be that of all regions but this one; it is often the same again."""
@@ -128,25 +158,26 @@ class SeparatorSearch:
             self._left_out = region
 
     def _around(
-        self, component: IntArray, others: IntArray, inside: IntArray, size: int
+        self, component: IntArray, chosen: int, inside: IntArray, size: int
     ) -> Iterator[NodeSeparator]:
         """Separators between a component and others, for each part of its region beyond its neighbours.
 
-        The rows `inside` are those of the region, which has `size`. Large parts come first, then by their
-        lowest row.
+        The rows `inside` are those of the region, which has `size`, and `chosen` of them are in components.
+        Large parts come first, then by their lowest row.
         """
+        inside[component] = 0
         near = self._graph.neighbours(component)
-        near = near[(inside[near] == 1) & ~np.isin(near, component)]
-        inside[component], inside[near] = 0, 0
+        near = near[inside[near] == 1]
+        inside[near] = 0
         parts = self._graph.parts_around(self._graph.neighbours(near), inside)
         inside[component], inside[near] = 1, 1
         between = self._between(near, parts)
         known = np.concatenate([component, near, *parts.whole])
         found = [
             (-len(part), int(part[0]), NodeSeparator(between[k], part, is_here=False))
-            for k, part in enumerate(parts.whole) if np.isin(others, part).any()
+            for k, part in enumerate(parts.whole) if self._is_chosen[part].any()
         ]  # fmt: skip
-        if len(parts.last) and not np.isin(others, known).all():
+        if len(parts.last) and np.count_nonzero(self._is_chosen[known]) < chosen:
             rest = inside.copy()
             rest[known] = 0
             here = np.setdiff1d(known, between[-1])

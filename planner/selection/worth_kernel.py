@@ -120,3 +120,27 @@ def take_gain(
                 if demand[entry] == 0:
                     gains[2] = total
                 sums[demand[entry]] = 0
+
+
+def sum_by_row(row_first: Any, seen: Any, value: Any, sums: Any) -> None:
+    """Sum up the values of the columns that each row sees, in their order.
+
+    Parameters
+    ----------
+    row_first, seen
+        As for `count_views`.
+    value, sums
+        Floating-point numbers of the columns (columns,), and their sums (rows,).
+    """
+    for row in range(len(sums)):
+        total = 0.0
+        for at in range(row_first[row], row_first[row + 1]):
+            total += value[seen[at]]
+        sums[row] = total
+
+
+def add_views(rows: Any, row_first: Any, seen: Any, views: Any) -> None:
+    """Count how many of these rows see each column (columns,); the others are as for `count_views`."""
+    for k in range(len(rows)):
+        for at in range(row_first[rows[k]], row_first[rows[k] + 1]):
+            views[seen[at]] += 1

@@ -30,3 +30,13 @@ cpdef void take_gain(
     const whole[::1] demand, const whole[::1] worth, const whole[::1] short, const whole[::1] missing,
     whole[::1] sums, whole[::1] gains
 ) noexcept nogil
+
+@cython.locals(at=whole, row=whole, total=double)
+cpdef void sum_by_row(
+    const whole[::1] row_first, const index[::1] seen, const double[::1] value, double[::1] sums
+) noexcept nogil
+
+@cython.locals(at=whole, k=whole)
+cpdef void add_views(
+    const whole[::1] rows, const whole[::1] row_first, const index[::1] seen, whole[::1] views
+) noexcept nogil

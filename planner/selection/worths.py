@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -25,13 +27,21 @@ class _Entries(NamedTuple):
 class Worths:
     """Sums of what the columns of one covering problem add to its demands."""
 
-    def __init__(self, adds_to: csr_array, seen_by: csr_array) -> None:
+    def __init__(self, adds_to: csr_array, seen_by: Callable[[], csr_array]) -> None:
         """`adds_to` has the worth of columns (columns, demands), `seen_by` who sees them (columns, rows)."""
-        self._demands, self._rows = int(adds_to.shape[1]), int(seen_by.shape[1])
-        self._adds, self._seen = _entries(adds_to, np.int64), _entries(seen_by, np.int32)
+        self._demands, self._seen_by = int(adds_to.shape[1]), seen_by
+        self._adds = _entries(adds_to, np.int64)
         self._worth = np.ascontiguousarray(adds_to.data, np.int64)
         self._sums = np.zeros(self._demands, dtype=np.int64)
         self._gains = np.zeros(3, dtype=np.int64)
+
+    @cached_property
+    def _seen(self) -> _Entries:
+        return _entries(self._seen_by(), np.int32)
+
+    @cached_property
+    def _rows(self) -> int:
+        return int(self._seen_by().shape[1])
 
     @property
     def rows_of(self) -> tuple[IntArray, IntArray]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -10,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.frames.geodesy import out_of_reach
-from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.geometry import FloatArray, Polygon, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Targets
 from stopgo.planner.geometry.instance_cache import store
@@ -19,14 +22,16 @@ from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.space.connected_parts import parts_of
 from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
-from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
-from stopgo.planner.space.opening_joins import Crossing, barrier
+from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of, obstacles_of
+from stopgo.planner.space.opening_joins import barrier
 from stopgo.planner.space.opening_states import opening_states
-from stopgo.planner.space.room_spaces import room_spaces
+from stopgo.planner.space.room_spaces import room_spaces, stop_area_of
 from stopgo.planner.space.targets import occluders_of, targets_of
 
 MANY = 1000
-"""Elements from which targets are found in a process of their own."""
+"""Elements from which targets, and what concerns rooms, are found in processes of their own."""
+NOTHING = np.empty((0, 2, 2))
+T = TypeVar("T")
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
@@ -34,29 +39,26 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
-    ground = Ground.of(floor, settings)
-    closed = np.array(
-        [line for c in ground.crossings if (line := _closed_door(c, settings, ground)) is not None]
-    )
-    scanned = partial(_occluders_and_targets, floor, closed, settings)
-    with SideWork(scanned, forked=len(floor.elements) >= MANY) as work:
+    with _SideWorks(forked=len(floor.elements) >= MANY) as works:
+        scanned = partial(_occluders_and_targets, floor, settings)
+        scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
+        ground = Ground.of(floor, settings)
+        scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
+        clearing = works.begun(partial(_stop_area_and_obstacles, ground, settings), after=scanning)
         drive_area, gaps = drivable(ground, settings)
-        drive_polygons, gaps = to_polygons(drive_area, origin), frozen(gaps + origin)
-        drive_shape = to_shape(drive_polygons, origin)
+        (drive_polygons, drive_shape), gaps = _kept(drive_area, origin), frozen(gaps + origin)
         parts = parts_of(drive_shape, gaps - origin)
+        stop_area, obstacles, obstacle_shape = clearing.result()
+        dividing = works.begun(partial(room_spaces, floor, ground, drive_area, stop_area))
         states, findings = opening_states(ground, parts, settings)
-        rooms = room_spaces(floor, ground, drive_area, settings)
-        occluders, targets = work.result()
-    if targets.total == 0:
-        raise NegativeResult(
-            f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
-        )
+        rooms, (occluders, targets) = dividing.result(), scanning.result()
+    _check_targets(floor, targets)
     space = NavigableSpace(
         floor=floor,
         settings=settings,
         rooms=rooms,
         openings=states,
-        obstacles=to_polygons(ground.obstacles, origin),
+        obstacles=obstacles,
         occluders=to_polygons(occluders, origin),
         barriers=frozen(ground.barriers + origin),
         drive_area=drive_polygons,
@@ -67,15 +69,40 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         findings=(*floor.findings, *findings),
     )
     store(drive_area_of, space, drive_shape)
+    store(obstacles_of, space, obstacle_shape)
     store(drive_parts_of, space, parts)
     return space
 
 
+class _SideWorks(ExitStack):
+    """Work that goes on next to other work; the end of the block ends all of it."""
+
+    def __init__(self, *, forked: bool) -> None:
+        super().__init__()
+        self._forked = forked
+
+    def begun(self, work: Callable[[], T], *, after: SideWork[Any] | None = None) -> SideWork[T]:
+        """The work, begun now or once that `after` is done."""
+        return self.enter_context(SideWork(work, forked=self._forked, after=after))
+
+
 def _occluders_and_targets(
-    floor: FloorPlan, closed: FloatArray, settings: Settings
+    floor: FloorPlan, settings: Settings, closed: FloatArray
 ) -> tuple[BaseGeometry, Targets]:
     occluders = occluders_of(floor, closed)
     return occluders, targets_of(floor, occluders, d_dis=settings.d_dis)
+
+
+def _stop_area_and_obstacles(
+    ground: Ground, settings: Settings
+) -> tuple[BaseGeometry, tuple[Polygon, ...], BaseGeometry]:
+    return stop_area_of(ground, settings), *_kept(ground.obstacles, ground.origin)
+
+
+def _kept(shape: BaseGeometry, origin: FloatArray) -> tuple[tuple[Polygon, ...], BaseGeometry]:
+    """A shape as polygons in the drawing's coordinates, and the shape that these are in the local frame."""
+    polygons = to_polygons(shape, origin)
+    return polygons, to_shape(polygons, origin)
 
 
 def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings) -> None:
@@ -85,12 +112,14 @@ def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings
         raise InputError(f"{floor.name}: its corner {far}, or plan without --origin")
 
 
-def _kinds(floor: FloorPlan) -> str:
-    return ", ".join(sorted({item.kind for item in floor.elements})) or "none"
+def _check_targets(floor: FloorPlan, targets: Targets) -> None:
+    """Refuse a floor without targets."""
+    if targets.total == 0:
+        kinds = ", ".join(sorted({item.kind for item in floor.elements})) or "none"
+        raise NegativeResult(f"{floor.name}: no target on the floor; elements: {kinds} (see --targets)")
 
 
-def _closed_door(crossing: Crossing, settings: Settings, ground: Ground) -> FloatArray | None:
-    """The line of a door that blocks the laser, with `doors = closed`; else None."""
-    if settings.doors == "open" or crossing.opening.kind != "door":
-        return None
-    return barrier(crossing, ground.origin, ground.obstacle_rings)
+def _closed_doors(ground: Ground, settings: Settings) -> FloatArray:
+    """Lines (k, 2, 2) of doors that block the laser: with `doors = closed` all of them."""
+    doors = [item for item in ground.crossings if settings.doors != "open" and item.opening.kind == "door"]
+    return np.array([barrier(item, ground.origin, ground.obstacle_rings) for item in doors])

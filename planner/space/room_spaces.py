@@ -19,7 +19,7 @@ LEAST_UNNAMED = 0.5
 
 
 def room_spaces(
-    floor: FloorPlan, ground: Ground, drive_area: BaseGeometry, settings: Settings
+    floor: FloorPlan, ground: Ground, drive_area: BaseGeometry, stop_area: BaseGeometry
 ) -> tuple[RoomSpace, ...]:
     """The rooms as planned: inner rooms subtracted from outer ones, and floor outside every room."""
     shapes = [to_shape(room.polygons, ground.origin) for room in floor.rooms]
@@ -28,7 +28,7 @@ def room_spaces(
         (k, floor.rooms[k].label, _without_inner(shape, shapes, k, inside)) for k, shape in enumerate(shapes)
     ]
     planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, shapes))
-    allowed = RingIndex(_stop_area(ground, settings))
+    allowed = RingIndex(stop_area)
     return tuple(
         RoomSpace(
             room=index,
@@ -49,7 +49,7 @@ def _without_inner(
     return shape.difference(shapely.union_all(inner)) if inner else shape
 
 
-def _stop_area(ground: Ground, settings: Settings) -> BaseGeometry:
+def stop_area_of(ground: Ground, settings: Settings) -> BaseGeometry:
     """The area where stops may be, for pictures only: it is approximate."""
     keep = max(settings.d_sec, settings.radius)
     edges = shapely.boundary(to_shape(ground.floor.outline, ground.origin))

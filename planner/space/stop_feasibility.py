@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -9,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
-from stopgo.planner.geometry.nested_clips import NestedClips
+from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape
 from stopgo.planner.space.local_shapes import obstacles_of, room_shapes
 
@@ -26,7 +28,7 @@ class StopFeasibility:
         self._walls = boundary_lines(self.obstacles)
         self._edges = boundary_lines(self.outline)
         self._wall_tree, self._edge_tree = shapely.STRtree(self._walls), shapely.STRtree(self._edges)
-        self._obstacle_clips, self._outline_clips = NestedClips(self.obstacles), NestedClips(self.outline)
+        self._obstacle_rings, self._outline_rings = RingIndex(self.obstacles), RingIndex(self.outline)
         for shape in (self.outline, self.obstacles, *self.rooms):
             shapely.prepare(shape)
 
@@ -36,28 +38,29 @@ class StopFeasibility:
         return max(self.space.settings.d_sec, self.space.settings.radius)
 
     def reasons(self, xy: FloatArray, room: IntArray) -> IntArray:
-        """Index into DROP_REASONS for each position (n, 2) in the drawing's coordinates."""
+        """Index into DROP_REASONS of each position (n, 2) in the drawing's coordinates: the first."""
         local = np.asarray(xy, dtype=np.float64).reshape(-1, 2) - self.origin
-        points = shapely.points(local)
-        in_room = np.array(
-            [shapely.dwithin(self.rooms[k], p, SLACK) for k, p in zip(room, points, strict=True)], dtype=bool
-        )
-        on_floor = shapely.dwithin(self.outline, points, SLACK)
-        clear = (self.to_element(local) >= self.element_clearance - SLACK) & ~shapely.contains(
-            self.obstacles, points
-        )
-        off_edge = self.to_edge(local) >= self.space.settings.edge - SLACK
-        return np.select(
-            [~in_room, ~on_floor, ~clear, ~off_edge, self.avoided(local + self.origin)],
-            [OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, AVOIDED],
-            KEPT,
-        ).astype(np.int64)
+        rooms, found = np.array(self.rooms, dtype=object), np.full(len(local), KEPT, dtype=np.int64)
+        tests: list[tuple[int, Callable[[FloatArray, IntArray], BoolArray]]] = [
+            (OUTSIDE, lambda at, room: ~shapely.dwithin(rooms[room], shapely.points(at), SLACK)),
+            (IN_HOLE, lambda at, _: ~shapely.dwithin(self.outline, shapely.points(at), SLACK)),
+            (TOO_CLOSE, lambda at, _: self.to_element(at) < self.element_clearance - SLACK),
+            (TOO_CLOSE, lambda at, _: shapely.contains(self.obstacles, shapely.points(at))),
+            (AT_EDGE, lambda at, _: self.to_edge(at) < self.space.settings.edge - SLACK),
+            (AVOIDED, lambda at, _: self.avoided(at + self.origin)),
+        ]
+        left = np.arange(len(local))
+        for reason, holds in tests:
+            dropped = holds(local[left], np.asarray(room)[left])
+            found[left[dropped]] = reason
+            left = left[~dropped]
+        return found
 
     def around(self, shape: BaseGeometry, margin: float) -> tuple[BaseGeometry, BaseGeometry]:
         """Obstacles and outline in the box that reaches `margin` metres beyond a shape."""
         low_x, low_y, high_x, high_y = shape.bounds
-        box = np.array([low_x - margin, low_y - margin, high_x + margin, high_y + margin])
-        return self._obstacle_clips.within(box), self._outline_clips.within(box)
+        box = (low_x - margin, low_y - margin, high_x + margin, high_y + margin)
+        return self._obstacle_rings.within(box), self._outline_rings.within(box)
 
     def avoided(self, xy: FloatArray) -> BoolArray:
         """True for each point (n, 2) in a circle where the user allows no stop."""

@@ -58,6 +58,8 @@ def _checked(method: Variant[VisibilityMethod], given: object, candidates: Candi
     found: Visibility = method.of_kind(given, Visibility)
     if found.candidates is not candidates:
         raise method.wrong("is of other candidates than those it was given")
+    if method.ours:
+        return found
     targets = candidates.targets
     runs = len(found.first)
     pointer = method.indices(found.pointer, "pointer", length=len(candidates.kept) + 1, below=runs + 1)
@@ -69,8 +71,6 @@ def _checked(method: Variant[VisibilityMethod], given: object, candidates: Candi
     of = targets.unit_segment
     if (last < first).any() or (of[first] != segment).any() or (of[last] != segment).any():
         raise method.wrong("a run's units do not lie on its segment")
-    if method.ours:
-        return found
     method.of_kind(found.method, str)
     pointer, segment, first, last = (frozen(values, np.int64) for values in (pointer, segment, first, last))
     return Visibility(candidates, pointer, segment, first, last, found.method)

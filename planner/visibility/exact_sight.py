@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.geometry import FloatArray, IntArray, bounds, frozen
+from stopgo.mission.geometry import FloatArray, IntArray, bounds, frozen, read_only
 from stopgo.mission.stages import Candidates, NavigableSpace, Visibility
 from stopgo.planner.geometry.shapes import local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.targets import LINE_WALL
@@ -28,13 +28,13 @@ def exact(candidates: Candidates) -> Visibility:
         open_space(candidates), targets.a - origin, targets.b - origin, targets.units, targets.occluding
     )
     runs = sight(scene, to_grid(places - origin), reach=space.settings.range)
-    start = targets.first_unit[:-1][runs.segment]
+    start = targets.first_unit[:-1].astype(runs.low.dtype)[runs.segment]
     return Visibility(
         candidates=candidates,
         pointer=frozen(runs.pointer[np.searchsorted(row, np.arange(len(candidates.kept) + 1))], np.int64),
-        segment=frozen(runs.segment, np.int64),
-        first=frozen(start + runs.low, np.int64),
-        last=frozen(start + runs.high, np.int64),
+        segment=read_only(runs.segment),
+        first=read_only(np.add(runs.low, start, out=runs.low)),
+        last=read_only(np.add(runs.high, start, out=runs.high)),
         method="exact",
     )
 

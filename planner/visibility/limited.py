@@ -7,11 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stopgo.mission.document.limits import ViewLimits, limits_in_words, limits_of
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import NegativeResult
-from stopgo.mission.geometry import IntArray, frozen
+from stopgo.mission.geometry import IntArray, frozen, read_only
 from stopgo.mission.settings import Settings
 from stopgo.mission.settings.coverage_parameters import ANY_INCIDENCE
 from stopgo.mission.stages import Visibility
@@ -46,27 +47,29 @@ def within_limits(in_sight: Visibility) -> Visibility:
 def _clipped(in_sight: Visibility, limits: ViewLimits) -> Visibility:
     candidates, targets = in_sight.candidates, in_sight.targets
     origin = local_origin(candidates.floor)
-    row = np.repeat(np.arange(in_sight.rows), np.diff(in_sight.pointer))
-    begin = targets.first_unit[:-1][in_sight.segment]
     a, b, at = (to_grid(xy - origin) for xy in (targets.a, targets.b, candidates.xy[candidates.kept]))
+    counts = np.zeros(in_sight.rows, dtype=np.int64)
 
-    def within(own: slice) -> tuple[IntArray, ...]:
-        segment, place = in_sight.segment[own], at[row[own]]
-        stretches = SeenSegments(a[segment] - place, b[segment] - place, targets.units[segment])
-        low, high = (unit[own] - begin[own] for unit in (in_sight.first, in_sight.last))
+    def within(begin: int) -> tuple[NDArray[Any], ...]:
+        own = slice(begin, min(begin + BLOCK, len(in_sight.first)))
+        segment, row = in_sight.segment[own], _row_of(in_sight.pointer, np.arange(own.start, own.stop))
+        start = targets.first_unit[:-1][segment]
+        stretches = SeenSegments(a[segment] - at[row], b[segment] - at[row], targets.units[segment])
+        low, high = (unit[own] - start for unit in (in_sight.first, in_sight.last))
         run, first, last = clipped(stretches, low, high, limits)
-        return run + own.start, first, last
+        np.add.at(counts, row[run], 1)
+        kind = in_sight.first.dtype
+        return segment[run], (start[run] + first).astype(kind), (start[run] + last).astype(kind)
 
-    blocks = [slice(k, k + BLOCK) for k in range(0, max(1, len(row)), BLOCK)]
-    run, first, last = (np.concatenate(part) for part in zip(*map(within, blocks), strict=True))
-    return replace(
-        in_sight,
-        pointer=frozen(np.searchsorted(row[run], np.arange(in_sight.rows + 1)), np.int64),
-        segment=frozen(in_sight.segment[run], np.int64),
-        first=frozen(begin[run] + first, np.int64),
-        last=frozen(begin[run] + last, np.int64),
-        in_sight=in_sight,
-    )
+    found = map(within, range(0, max(1, len(in_sight.first)), BLOCK))
+    segment, first, last = (read_only(np.concatenate(part)) for part in zip(*found, strict=True))
+    pointer = frozen(np.concatenate([[0], np.cumsum(counts)]), np.int64)
+    return replace(in_sight, pointer=pointer, segment=segment, first=first, last=last, in_sight=in_sight)
+
+
+def _row_of(pointer: IntArray, run: IntArray) -> IntArray:
+    """Row of each run (n,)."""
+    return np.searchsorted(pointer, run, side="right") - 1
 
 
 LIMITS = ("max_incidence", "near", "density", "wall_height", "views")

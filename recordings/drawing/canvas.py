@@ -41,6 +41,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 from rerun.chunk import Chunk
@@ -163,6 +164,14 @@ class Canvas:
         indexes = [index] if isinstance(index, rr.TimeColumn) else list(index)
         self.counts[entity] += len(indexes[0].times)
         self.stream.send_columns(entity, indexes=indexes, columns=[c for group in groups for c in group])
+
+
+def arrow_of_lines(lines: NDArray[Any]) -> pa.Array:
+    """Return lines (k, 2, 2) as Rerun stores strips; it would look at each line by itself."""
+    kind = rr.components.LineStrip2DBatch(np.zeros((1, 2, 2), dtype=np.float32)).as_arrow_array().type
+    points = pa.FixedSizeListArray.from_arrays(pa.array(lines.ravel(), pa.float32()), type=kind.value_type)
+    ends = pa.array(np.arange(0, 2 * len(lines) + 1, 2), pa.int32())
+    return pa.ListArray.from_arrays(ends, points, type=kind)
 
 
 @dataclass(frozen=True, kw_only=True)

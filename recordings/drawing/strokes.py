@@ -97,10 +97,13 @@ def lines_by_value(targets: Targets, value: IntArray) -> tuple[FloatArray, IntAr
 
 def range_lines(targets: Targets, segment: IntArray, first: IntArray, last: IntArray) -> FloatArray:
     """Return ranges of units, `first` to `last` inclusive on `segment`, as lines (k, 2, 2)."""
+    lines = np.stack([targets.a[segment], targets.b[segment]], axis=1)
     offset, count = targets.first_unit[:-1][segment], targets.units[segment]
-    t = np.stack([(first - offset) / count, (last + 1 - offset) / count], axis=1)
-    a, b = targets.a[segment], targets.b[segment]
-    return a[:, None] + t[:, :, None] * (b - a)[:, None]
+    part = np.flatnonzero((first > offset) | (last + 1 < offset + count))
+    t = np.stack([first - offset, last + 1 - offset], axis=1)[part] / count[part, None]
+    a, b = lines[part, 0], lines[part, 1]
+    lines[part] = a[:, None] + t[:, :, None] * (b - a)[:, None]
+    return lines
 
 
 def dashes(ends: FloatArray, length: float) -> FloatArray:

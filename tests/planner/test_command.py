@@ -602,6 +602,35 @@ def test_a_plan_is_made_where_recordings_are_not_installed(
     assert {path.name for path in tmp_path.iterdir()} == {"mission.json", "plan.svg", "coverage.json"}
 
 
+def test_sheets_drawn_in_another_process_are_the_same(
+    two_rooms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for many in (0, 10**9):
+        monkeypatch.setattr(stopgo.plan_files, "MANY", many)
+        assert main(["plan", str(two_rooms), "-o", str(tmp_path / f"{many}"), "--sheets"]) == 0
+    printed = [(tmp_path / f"{many}" / "plan.pdf").read_bytes() for many in (0, 10**9)]
+    assert printed[0] == printed[1]
+
+
+@pytest.mark.parametrize("many", [0, 10**9])
+def test_sheets_that_cannot_be_drawn_are_reported_once(
+    two_rooms: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    many: int,
+) -> None:
+    def fail(*_: object, **__: object) -> bytes:
+        raise ModuleNotFoundError("No module named 'reportlab'", name="reportlab")
+
+    monkeypatch.setattr(stopgo.plan_files, "MANY", many)
+    monkeypatch.setattr("stopgo.mission.files.plan_sheets.plan_pdf", fail)
+    monkeypatch.setattr("stopgo.mission.files.plan_sheets.needs_sheets", lambda *_: True)
+    assert main(["plan", str(two_rooms), "-o", str(tmp_path)]) == 0
+    assert capsys.readouterr().err.count("plan.pdf: not written, reportlab is not installed") == 1
+    assert "plan.pdf" not in {path.name for path in tmp_path.iterdir()}
+
+
 @pytest.mark.parametrize("speed_up", ["1001", "0", "nan"])
 def test_a_demo_no_robot_can_run_plans_nothing(
     speed_up: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -58,6 +58,8 @@ class Failure:
     why: str
     touched: bool = True
     """True if the vehicle's content may have changed."""
+    too_few: bool = False
+    """True if the vehicle holds fewer items than were sent."""
 
 
 def upload(
@@ -185,6 +187,8 @@ def _attempted(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
             if seen is None or seen == failure:  # twice the same is no accident of the line
                 return seen
             failure = seen
+            if seen.too_few:  # it may have accepted the list before the last items had arrived
+                window = 1
         elif ended.how == "refused" and (window == 1 or ended.result == MissionResult.NO_SPACE):
             return Failure(_refusal(sent, ended))
         elif ended.how in ("busy", "silent", "rebooted"):
@@ -206,7 +210,8 @@ def _read_back(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
     if not lines:
         return None
     more = f"; and {len(lines) - SHOWN} more" if len(lines) > SHOWN else ""
-    return Failure(f"all was sent, and read back otherwise: {'; '.join(lines[:SHOWN])}{more}")
+    why = f"all was sent, and read back otherwise: {'; '.join(lines[:SHOWN])}{more}"
+    return Failure(why, too_few=len(read) < count)
 
 
 def _refusal(sent: ItemList, ended: TransferEnd) -> str:

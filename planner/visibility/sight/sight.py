@@ -17,6 +17,8 @@ from stopgo.planner.geometry.shapes import GRID, to_grid
 from stopgo.planner.visibility.sight.kernel import FARTHEST, MOST_UNITS, look_all, not_negative
 from stopgo.planner.visibility.sight.mesh import Mesh, containing, ends_of, rim_of
 
+ROOM = 2_000_000
+"""Most runs for which the kernel has room at first."""
 LARGE = 10_000_000
 """Viewpoints × mesh triangles from which on the interpreted kernel takes seconds."""
 
@@ -44,9 +46,10 @@ class Runs:
     """Visible runs of units on segments, viewpoint by viewpoint."""
 
     pointer: IntArray
-    segment: IntArray
-    low: IntArray
-    high: IntArray
+    segment: NDArray[Any]
+    """Of 32 bits, as the units are (runs,)."""
+    low: NDArray[Any]
+    high: NDArray[Any]
 
 
 def scene_of(mesh: Mesh, a: FloatArray, b: FloatArray, units: IntArray, on_boundary: BoolArray) -> Scene:
@@ -178,24 +181,35 @@ def _limits(mesh: Mesh, viewpoints: IntArray, limits: IntArray, side: int) -> In
 def _run(
     kernel: Callable[..., int], arrays: list[Any], reach: int, triangles: int, *, interpreted: bool
 ) -> Runs:
-    """Call the kernel, again with more room for its output whenever it runs out."""
+    """Call the kernel for as many viewpoints as its output has room for, until all are done.
+
+    What it found is kept in half of the bits, since long ranges have many runs: segments, and units on one
+    segment, fit.
+    """
     rows = len(arrays[0])
     stack = _zeros(4 * (2 * triangles + 16), interpreted=interpreted)
     pointer = _zeros(rows + 1, interpreted=interpreted)
-    out = [_zeros(max(4096, 32 * rows), interpreted=interpreted) for _ in range(3)]
-    done = kernel(0, pointer, *arrays, reach, stack, *out)
+    out = [_zeros(min(max(4096, 32 * rows), ROOM), interpreted=interpreted) for _ in range(3)]
+    found: tuple[list[NDArray[Any]], ...] = ([], [], [])
+    counts, done = np.zeros(rows, dtype=np.int64), 0
     while done < rows:
-        out = [_doubled(column) for column in out]
-        done = kernel(done, pointer, *arrays, reach, stack, *out)
-    segment, low, high = (np.array(column[: pointer[-1]], dtype=np.int64) for column in out)
-    return Runs(pointer=np.array(pointer, dtype=np.int64), segment=segment, low=low, high=high)
+        pointer[done], begin = 0, done
+        done = kernel(begin, pointer, *arrays, reach, stack, *out)
+        counts[begin:done] = np.diff(pointer[begin : done + 1])
+        for parts, column in zip(found, out, strict=True):
+            parts.append(np.array(column[: pointer[done]], dtype=np.int32))
+        if done == begin:
+            out = [_zeros(2 * len(column), interpreted=interpreted) for column in out]
+    return Runs(np.concatenate([[0], np.cumsum(counts)]), *map(_joined, found))
+
+
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """The parts in one array; they are forgotten."""
+    whole = np.concatenate([np.empty(0, dtype=np.int32), *parts])
+    parts.clear()
+    return whole
 
 
 def _zeros(size: int, *, interpreted: bool) -> Any:
     """A list where the kernel is interpreted, since lists index faster there; else an array."""
     return [0] * size if interpreted else np.zeros(size, dtype=np.int64)
-
-
-def _doubled(column: Any) -> Any:
-    more = _zeros(len(column), interpreted=isinstance(column, list))
-    return column + more if isinstance(column, list) else np.concatenate([column, more])

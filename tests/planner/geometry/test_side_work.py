@@ -45,6 +45,7 @@ def _workers(place: Path) -> list[int]:
 def test_work_is_done_once_in_the_process_asked_for(tmp_path: Path, *, forked: bool) -> None:
     place = tmp_path / "workers"
     with SideWork(partial(_noted, place), forked=forked) as work:
+        assert work.is_beside == forked
         assert [work.result(), work.result()] == ["done", "done"]
     (worker,) = _workers(place)
     assert (worker != os.getpid()) == forked
@@ -81,6 +82,28 @@ def test_the_end_of_the_block_ends_the_work(tmp_path: Path) -> None:
         os.kill(_workers(tmp_path / "workers")[0], 0)
 
 
+def test_work_begins_once_that_before_it_has_answered(tmp_path: Path) -> None:
+    def work_when_allowed() -> str:
+        wait_until((tmp_path / "allowed").exists)
+        return _noted(tmp_path / "workers")
+
+    with (
+        SideWork(work_when_allowed, forked=True) as one,
+        SideWork(lambda: len(_workers(tmp_path / "workers")), forked=True, after=one) as other,
+    ):
+        (tmp_path / "allowed").touch()
+        assert [other.result(), one.result()] == [1, "done"]
+
+
+def test_work_is_done_again_in_another_way_if_its_process_dies() -> None:
+    def die() -> str:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return "never"
+
+    with SideWork(die, forked=True, again=lambda: "again") as work:
+        assert work.result() == "again"
+
+
 def test_a_process_with_other_threads_is_not_forked(tmp_path: Path) -> None:
     ended = threading.Event()
     other = threading.Thread(target=ended.wait)
@@ -92,13 +115,15 @@ def test_a_process_with_other_threads_is_not_forked(tmp_path: Path) -> None:
     assert _workers(tmp_path / "workers") == [os.getpid()]
 
 
-@pytest.mark.parametrize("fov", [360.0, 270.0])
-def test_a_plan_is_the_same_with_a_second_process(monkeypatch: pytest.MonkeyPatch, fov: float) -> None:
+@pytest.mark.parametrize(("fov", "refine"), [(360.0, False), (360.0, True), (270.0, False)])
+def test_a_plan_is_the_same_with_a_second_process(
+    monkeypatch: pytest.MonkeyPatch, fov: float, *, refine: bool
+) -> None:
     plans = []
     for many in (0, 10**9):
         monkeypatch.setattr(pipeline, "MANY", many)
         monkeypatch.setattr(navigable, "MANY", many)
-        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=False, fov=fov)))
+        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=refine, fov=fov)))
     forked, alone = plans
     assert forked.figures == alone.figures
     assert forked.mission == alone.mission

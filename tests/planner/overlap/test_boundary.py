@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
 from stopgo.planner.candidates import candidates
 from stopgo.planner.overlap import boundary
 from stopgo.planner.overlap.boundary import _Stretches, shown
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.unit_ranges import runs_of
-from tests.planner.worlds import two_rooms
+from tests.planner.worlds import element, hall, two_rooms
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -45,7 +46,27 @@ def test_what_is_found_block_by_block_is_what_is_found_at_once(
     whole = shown(found, rows)
     monkeypatch.setattr(boundary, "BLOCK", 7)
     parts = shown(found, rows)
-    assert len(rows) > 3 * 7 and len(whole.face)
-    for name in ("pointer", "face", "begin", "end", "xy"):
+    assert len(rows) > 3 * 7 and len(whole.surface)
+    for name in ("pointer", "surface", "begin", "end", "xy"):
         assert np.array_equal(getattr(parts, name), getattr(whole, name)), name
-    assert len(shown(found, rows[:0]).face) == 0
+    assert len(shown(found, rows[:0]).surface) == 0
+
+
+@pytest.mark.parametrize("fov", [360, 200])
+def test_without_narrow_surfaces_the_same_stretches_count(fov: float) -> None:
+    """A column with eight sides of 23 cm, and a round one: only the former's surfaces are too narrow."""
+    rings = (
+        radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        for radius, turn in ((0.3, np.arange(8) * np.pi / 4), (0.3, np.arange(40) * np.pi / 20))
+    )
+    columns = [
+        element(f"c{k}", "columns", Polygon.of(ring + np.array((2.0 + 2 * k, 2.0))))
+        for k, ring in enumerate(rings)
+    ]
+    found = candidates(navigable(hall(6, 4, *columns), Settings(fov=fov, grid=0.5)))
+    rows = np.arange(len(found.kept))
+    whole, wide = shown(found, rows), shown(found, rows, only_wide=True)
+    assert len(wide.surface)
+    for name in ("pointer", "surface", "begin", "end", "xy"):
+        assert np.array_equal(getattr(wide, name), getattr(whole, name)), name
+    assert (wide.metres <= whole.metres).all() and (wide.metres < whole.metres).any()

@@ -14,8 +14,8 @@ from stopgo.mission.geometry import polyline_length
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner import routing
+from stopgo.planner.routing import nearby_paths, roadmap, route
 from stopgo.planner.routing import paths as paths_module
-from stopgo.planner.routing import roadmap, route
 from stopgo.planner.routing.dijkstra_kernel import reach
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths, shortest_paths
@@ -94,6 +94,16 @@ def test_the_nearest_points_are_found_by_both_forms_of_the_search(monkeypatch: p
     found, away = slow._search.nearest(3, 7)
     assert found.tolist() == np.argsort(paths.lengths[3], kind="stable")[1:8].tolist()
     assert np.array_equal(away, np.sort(paths.lengths[3])[1:8])
+
+
+def test_two_processes_find_the_nearest_points_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    xy = np.random.default_rng(3).uniform(0, 10, (40, 2))
+    edges = np.stack(np.triu_indices(40, 1), axis=1)
+    alone = NearbyPaths(xy, edges, 30, nearest=8, landmarks=4)
+    monkeypatch.setattr(nearby_paths, "MANY", 0)
+    both = NearbyPaths(xy, edges, 30, nearest=8, landmarks=4)
+    for one, other in zip(alone.near_pairs(8), both.near_pairs(8), strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_points_apart_are_not_connected() -> None:

@@ -14,9 +14,9 @@ from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.shapes import local_origin, snapped, to_shape
-from stopgo.planner.routing import roadmap
+from stopgo.planner.routing import roadmap, tangents
 from stopgo.planner.routing.paths import Paths
-from stopgo.planner.routing.roadmap import outward_corners, paths_between
+from stopgo.planner.routing.roadmap import Corners, outward_corners, paths_between
 from stopgo.planner.space.navigable import navigable
 from tests.faults.sizes import some
 from tests.planner.worlds import PAPER, box, column, element, hall, shared, two_rooms, wall
@@ -74,11 +74,13 @@ def test_paths_are_as_short_as_over_every_corner(seed: int) -> None:
 
 
 def look_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let all nodes look all round, and keep whatever they see."""
-    monkeypatch.setattr(roadmap, "_tangent", lambda edges, *_: edges)
-    monkeypatch.setattr(
-        roadmap, "views_of", lambda nodes, _: (np.arange(len(nodes)), np.stack([nodes, nodes], axis=1))
-    )
+    """Let paths pass by corners in any direction: all nodes look all round, and keep whatever they see."""
+
+    def without_sides(space: NavigableSpace) -> Corners:
+        corners = outward_corners(space)
+        return replace(corners, sides=np.zeros_like(corners.sides))
+
+    monkeypatch.setattr(roadmap, "outward_corners", without_sides)
 
 
 @pytest.mark.parametrize("seed", range(8, 14))
@@ -143,14 +145,17 @@ def counted(space: NavigableSpace, points: np.ndarray, monkeypatch: pytest.Monke
         return paths_between(space, points), sum(pairs)
 
 
-def test_pairs_are_looked_at_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pieces_are_the_same_with_little_room_and_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
     space = columned(2)
     points = np.array([(0.5, 0.5), (7.5, 7.5)])
     whole = paths_between(space, points)
-    monkeypatch.setattr(roadmap, "PAIRS", 1000)
-    pieces = paths_between(space, points)
-    assert np.array_equal(whole.lengths, pieces.lengths)
-    assert np.array_equal(whole.graph.indices, pieces.graph.indices)
+    monkeypatch.setattr(tangents, "ROOM", -3)
+    little = paths_between(space, points)
+    monkeypatch.setattr(tangents, "compiled", lambda *_, **__: None)
+    interpreted = paths_between(space, points)
+    for other in (little, interpreted):
+        assert np.array_equal(whole.lengths, other.lengths)
+        assert np.array_equal(whole.graph.indices, other.graph.indices)
 
 
 @pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf", "layered/duplex-l1.dxf", *PAPER])

@@ -72,8 +72,8 @@ def test_one_trees_are_the_same_in_numpy_as_written_and_compiled(n: int, lengths
         weight = np.random.default_rng(seed).integers(-(10**10), 10**10, n)
         tree, found = one_tree(cost, weight), []
         for kernel in (grow, machine_code(grow)):
-            scratch = np.zeros((3, n), dtype=np.int64)
-            found.append((int(kernel(cost.ravel(), weight, *scratch)), scratch[2].tolist()))
+            scratch = np.zeros((4, n), dtype=np.int64)
+            found.append((int(kernel(cost.ravel(), weight, *scratch)), scratch[3].tolist()))
         assert found == [(tree.value, tree.degree.tolist())] * 2
 
 

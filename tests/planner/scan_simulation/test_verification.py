@@ -25,6 +25,7 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.floors import read_floor
+from stopgo.planner.scan_simulation import registration
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
 from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model
@@ -265,6 +266,16 @@ def test_scans_along_a_corridor_are_free_along_it_and_reported_so() -> None:
     assert not pair.registered
     assert pair.free_deg is not None
     assert min(pair.free_deg, 180 - pair.free_deg) < 5
+
+
+def test_a_pair_that_comes_back_along_its_weakest_direction_is_constrained(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whatever fraction of its points face that direction: two of four starts are 5 cm off along it."""
+    monkeypatch.setattr(registration, "WEAKEST", 0.9)
+    places = (1.5, 1.0), (4.5, 3.0)
+    (pair,) = pair_of(hall(6, 4, column("c", 2, 2)), *places, replace(COARSEST, step_deg=0.8))
+    assert pair.registered and pair.starts == 4
 
 
 def test_the_two_sides_of_a_wall_are_no_pair() -> None:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, eye_array
 
+from stopgo.planner.selection import cover
 from stopgo.planner.selection.cover import Cover
+from tests.planner.kernels import machine_code
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -33,3 +35,19 @@ def test_the_fewest_views_of_many_demands_take_little_memory() -> None:
         assert tracemalloc.get_traced_memory()[1] < 2e6
     finally:
         tracemalloc.stop()
+
+
+@pytest.mark.parametrize("block", [1, 7, 1000])
+def test_sums_over_some_rows_at_a_time_are_those_of_all(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(block)
+    sees = csr_array((random.random((9, 12)) < 0.4).astype(np.int8))
+    one = Cover(sees, csr_array(random.integers(1, 9, (3, 12))), np.ones(3, dtype=np.int64))
+    monkeypatch.setattr(cover, "BLOCK", block)
+    wide = sees.toarray().astype(np.int64)
+    assert np.array_equal(one.adds.toarray(), wide @ one.worth.toarray().T)
+    assert one.most_demands == 3
+    price = random.random(12)
+    for kernels in (lambda kernel: None, lambda kernel: kernel, machine_code):
+        monkeypatch.setattr(cover, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
+        assert np.array_equal(one.covered_by(np.array([2, 5])), wide[[2, 5]].sum(axis=0))
+        assert np.array_equal(one.paid_to(price), sees @ price)

@@ -57,6 +57,15 @@ def small_covers(seeds: range) -> Iterator[tuple[int, Cover, int]]:
         yield from ((seed, asking(cover, views), optimum_of(seed, views)) for views in (1, 2, 3))
 
 
+def test_rows_and_columns_without_an_entry_do_not_hide_a_long_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    sees = np.zeros((60, 50), dtype=np.int64)
+    sees[:6, :40] = 1
+    monkeypatch.setattr(bound_by_parts, "MOST_AROUND", 1000)  # a column has 6 rows, which see 40 columns
+    assert not bound_by_parts.has_parts(Cover.of_whole(csr_array(sees), np.ones(50, dtype=np.int64), 20))
+    alone = csr_array(np.eye(60, 50, dtype=np.int64))
+    assert bound_by_parts.has_parts(Cover.of_whole(alone, np.ones(50, dtype=np.int64), 20))
+
+
 def is_enough(cover: Cover, rows: np.ndarray) -> bool:
     return any_is_enough(cover, rows[None])
 

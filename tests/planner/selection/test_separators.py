@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.component_kernel import grow_parts
 from stopgo.planner.selection.connected_selection import ConnectedCover
+from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.greedy import greedy
 from stopgo.planner.selection.link_graph import LinkGraph
 from stopgo.planner.selection.running_coverage import RunningCoverage
@@ -138,4 +139,22 @@ def test_only_regions_that_are_needed_stay(seed: int) -> None:
         rest = [other for other in needed if other is not component]
         if rest and meets(task.cover, np.concatenate(rest)):
             needed = rest
-    assert [one.tolist() for one in regions_of(task.cover, components)] == [one.tolist() for one in needed]
+    regions = regions_of(task.cover, components)
+    assert meets(task.cover, np.concatenate(regions))
+    assert len(regions) <= len(needed)
+    same = [one.tolist() for one in regions] == [one.tolist() for one in needed]
+    assert same or len(regions) < len(needed)
+    least = [one[0] for one in regions]
+    assert sorted(least, key=lambda row: [row in one for one in components].index(True)) == least
+
+
+def test_of_components_that_all_stand_alone_the_fewest_stay() -> None:
+    """Ten rows see two of twenty columns each, and four see a quarter: without the smallest, ten stayed."""
+    sees = np.zeros((14, 20), np.int8)
+    for k in range(10):
+        sees[k, [2 * k, 2 * k + 1]] = 1
+    for k in range(4):
+        sees[10 + k, k::4] = 1
+    cover = Cover.of_whole(csr_array(sees), np.ones(20, np.int64), 20)
+    alone = [np.array([row]) for row in range(14)]
+    assert [one.tolist() for one in regions_of(cover, alone)] == [[10], [11], [12], [13]]

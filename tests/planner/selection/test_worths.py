@@ -22,7 +22,7 @@ def by_each_kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def _sums(adds_to: csr_array, seen_by: csr_array, columns: IntArray, demands: IntArray) -> list[list]:
-    sums = Worths(adds_to, seen_by)
+    sums = Worths(adds_to, lambda: seen_by)
     return [sums.of(columns).tolist(), sums.by_row(columns, demands).tolist()]
 
 
@@ -39,7 +39,7 @@ def test_gains_are_the_same_in_numpy_as_written_and_compiled(
         adds = worth[columns[covered[columns] < asks[columns]]].sum(axis=0)
         counted = (int(np.minimum(adds, short).sum()), int(adds[missing > 0].sum()), int(adds[0]))
         for _ in by_each_kernel(monkeypatch):
-            sums = Worths(csr_array(worth), csr_array(np.ones((30, 1), np.int64)))
+            sums = Worths(csr_array(worth), lambda: csr_array(np.ones((30, 1), np.int64)))
             for _ in range(2):
                 assert sums.gain(columns, covered, asks, short, missing) == counted
 

@@ -200,6 +200,30 @@ def test_foreign_early_and_doubled_answers_do_not_end_a_transfer(seed: int) -> N
         assert items_on(vehicle) == items_on_list(held(NEW))
 
 
+class AcceptsTooEarly(Scripted):
+    """Misses an item of every transfer, and accepts the list when an item arrives ahead of another."""
+
+    missed = False
+
+    def on_mission_item_int(self, message: Message, to: Who) -> None:
+        if self.receiving is not None and message.seq > self.awaited:
+            self.ack(dialect.MAV_MISSION_ACCEPTED, to)
+        elif message.seq == 36 and not self.missed:
+            self.missed = True
+        else:
+            super().on_mission_item_int(message, to)
+
+    def on_mission_count(self, message: Message, to: Who) -> None:
+        self.missed = False
+        super().on_mission_count(message, to)
+
+
+def test_a_list_that_was_accepted_before_it_had_arrived_is_sent_item_by_item() -> None:
+    with AcceptsTooEarly(held(OLD)) as vehicle:
+        assert pushed(vehicle) == HELD_NEW
+        assert items_on(vehicle) == items_on_list(held(NEW))
+
+
 # Vehicles that go away.
 
 
