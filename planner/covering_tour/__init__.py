@@ -36,8 +36,9 @@ def least_time_route(route: Route, *, done: IntArray | None = None) -> Route:
     found = _driven(route, problem, shorter_line(problem.times, problem.task, problem.line))
     two_step_s, seconds = _seconds(route), _seconds(found)
     best = found if seconds < two_step_s else route
-    bound = max(0.0, min(seconds, two_step_s, least_time(problem.bound_problem)))
-    return replace(best, time=LeastTime(min(seconds, two_step_s), two_step_s, len(route.order), bound))
+    least_s = min(seconds, two_step_s)
+    bound = least_time(problem.bound_problem(best.selection.chosen[best.order], least_s))
+    return replace(best, time=LeastTime(least_s, two_step_s, len(route.order), min(least_s, bound)))
 
 
 def with_known_time(two_step: Route, quicker: Route) -> Route:

@@ -47,8 +47,9 @@ from stopgo.mission.stages import Candidates, Route, Visibility
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
 from stopgo.planner.covering_tour.search import LineTask
+from stopgo.planner.covering_tour.time_graph import complete_graph, time_graph
 from stopgo.planner.covering_tour.timed_line import LineTimes, PointLine
-from stopgo.planner.covering_tour.zones import Zone, zones_of
+from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.legs import Legs
@@ -59,8 +60,6 @@ from stopgo.planner.selection.cover import Cover
 
 MOST_POSITIONS = 1500
 """Most candidates that may become stops: those nearest to the chosen ones."""
-MOST_BOUNDED = 5000
-"""Candidates up to which the bound includes driving."""
 
 
 ConnectionTest = Callable[[IntArray], BoolArray]
@@ -176,29 +175,38 @@ class TourProblem:
             joins=lambda positions: self.joins(self.rows[positions])[self.rows],
         )
 
-    @cached_property
-    def bound_problem(self) -> RouteRequirements:
-        """The problem of the time bound, over all candidates; if these are too many, only the stops' time."""
-        settings = self.settings
-        rows = np.union1d(self.offered, self.stays).astype(np.int64)
-        if len(rows) > MOST_BOUNDED:
-            return self._stops_alone
-        start = len(rows) if settings.start is not None else None
-        end = len(rows) + (start is not None) if settings.end is not None else None
-        lengths, seconds = self._paths_over(rows)
-        among = np.arange(len(rows))
-        own = [Zone(np.flatnonzero(rows == row), 0.0) for row in self.stays]
+    def bound_problem(self, rows: IntArray, known_s: float) -> RouteRequirements:
+        """The problem of the time bound over all candidates; `rows` are a plan's stops in its order."""
+        settings, robot = self.settings, robot_of(self.settings)
+        all_rows = np.union1d(self.offered, self.stays).astype(np.int64)
+        cover, points = _of_rows(self.cover, all_rows), len(all_rows)
+        given = self._ends[: len(self._ends) - (self.begin is not None)]
+        xy = np.concatenate([self.candidates.xy[self.candidates.kept[all_rows]], given])
+        required = np.searchsorted(all_rows, self.stays)
+        zones = Zones.of(cover, xy[:points], required)
+        if settings.graph == "exact":
+            graph = time_graph(self.route.space, xy, robot)
+        elif points == len(self.rows):
+            graph = complete_graph(self.times.table.spent[: len(xy), : len(xy)] / MICROSECONDS)
+        else:
+            graph, zones = complete_graph(np.zeros((1, 1))), Zones([], np.empty(0), required[:0], points)
+        start = points if settings.start is not None else None
+        end = points + (start is not None) if settings.end is not None else None
+        stops = np.searchsorted(all_rows, rows).tolist()
+        back = stops[:1] if start is None else [start]
+        line = [*([] if start is None else [start]), *stops, *(back if self.closed else [])]
         return RouteRequirements(
-            lengths=lengths,
-            seconds=seconds,
-            offered=among,
-            zones=[*own, *zones_of(_of_rows(self.cover, rows), lengths[: len(rows), : len(rows)])],
+            graph=graph,
+            cover=cover,
+            zones=zones,
             start=start,
             end=end,
             closed=self.closed,
             stops=self._fewest,
+            found=len(rows),
+            known_s=known_s,
             pause_s=settings.settle + settings.scan_time,
-            robot=robot_of(settings),
+            directions=graph.directions_along([*line, *([] if end is None else [end])], points),
         )
 
     @cached_property
@@ -208,36 +216,6 @@ class TourProblem:
         if self.settings.selector in METHODS:
             return selection.bound
         return len(self.stays) + lower_bound(self.cover, found=len(selection.chosen) - len(self.stays))
-
-    @property
-    def _stops_alone(self) -> RouteRequirements:
-        """The problem with all positions merged into one."""
-        settings, none = self.settings, np.zeros((1, 1))
-        return RouteRequirements(
-            lengths=none,
-            seconds=none,
-            offered=np.arange(1),
-            zones=[],
-            start=None,
-            end=None,
-            closed=False,
-            stops=self._fewest,
-            pause_s=settings.settle + settings.scan_time,
-            robot=robot_of(settings),
-        )
-
-    def _paths_over(self, rows: IntArray) -> tuple[FloatArray, FloatArray | None]:
-        """Metres and seconds between rows, start and end; for very many rows straight, without seconds."""
-        given = len(self._ends) - (self.begin is not None)
-        if len(rows) == len(self.rows):
-            points = len(rows) + given
-            seconds = self.times.table.spent[:points, :points] / MICROSECONDS
-            return self.legs.lengths[:points, :points], seconds
-        xy = np.concatenate([self.candidates.xy[self.candidates.kept[rows]], self._ends[:given]])
-        lengths = np.empty((len(xy), len(xy)))
-        for k, point in enumerate(xy):
-            lengths[k] = np.hypot(*(xy - point).T)
-        return lengths, None
 
 
 def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:

@@ -6,70 +6,75 @@ candidate until the candidates outside it see less than some demand requires.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
 
-MOST_SEEDS = 1500
-"""Most candidates around which zones are grown."""
+WIDEST = 400_000
+"""Entries of a demand's columns above which no zones grow for it: they would hold most candidates."""
+WORK = 30_000_000
+"""Entries evaluated for a demand, so that zones grow around fewer candidates where it is wide."""
 
 
 @dataclass(frozen=True, eq=False)
-class Zone:
-    """Rows of which every selection has one, and the distance of the farthest from the centre."""
+class Zones:
+    """Sets of rows of which every selection has one, and the distance of the farthest from the centre."""
 
-    rows: IntArray
-    radius: float
+    rows: list[IntArray]
+    radius: FloatArray
+    """(zones,)."""
+    required: IntArray
+    """Rows that are all in every selection."""
+    candidates: int
+
+    @classmethod
+    def of(cls, cover: Cover, xy: FloatArray, required: IntArray) -> Zones:
+        """A zone for each demand around each row at `xy` (rows, 2) that sees some of it, at most."""
+        demands = np.flatnonzero(cover.needed > 0).tolist()
+        grown = [zone for demand in demands for zone in _grown(cover, xy, demand)]
+        radius = np.array([radius for _, radius in grown])
+        return cls([rows for rows, _ in grown], radius, required, cover.rows)
+
+    @cached_property
+    def packings(self) -> list[list[IntArray]]:
+        """Sets of zones without common rows: those that have few in common with others first, or small ones.
+
+        Each required row is a zone of its own in all of them.
+        """
+        size = np.array([len(rows) for rows in self.rows])
+        times = np.bincount(np.concatenate([*self.rows, np.empty(0, np.int64)]), minlength=self.candidates)
+        most, all_ = (np.array([of(times[rows]) for rows in self.rows]) for of in (np.max, np.sum))
+        return [self._packed(np.argsort(by, kind="stable")) for by in (all_, most, size, self.radius)]
+
+    def _packed(self, order: IntArray) -> list[IntArray]:
+        is_used, packed = np.zeros(self.candidates, dtype=bool), list(self.required[:, None])
+        is_used[self.required] = True
+        for rows in (self.rows[k] for k in order.tolist()):
+            if not is_used[rows].any():
+                is_used[rows] = True
+                packed.append(rows)
+        return packed
 
 
-def zones_of(cover: Cover, lengths: FloatArray) -> list[Zone]:
-    """A zone around each row that sees anything, the smallest first; `lengths` (rows, rows) are of paths."""
-    growth = _Growth(cover)
-    offered = np.flatnonzero(np.diff(cover.sees.indptr))
-    seeds = offered[:: max(1, -(-len(offered) // MOST_SEEDS))]
-    grown = [zone for seed in seeds.tolist() if (zone := growth.round(lengths[seed])) is not None]
-    return sorted(grown, key=lambda zone: zone.radius)
-
-
-class _Growth:
-    """Growth of zones: what rows beyond a distance can still see, by demand."""
-
-    def __init__(self, cover: Cover) -> None:
-        self._cover = cover
-        self._seen = np.flatnonzero(np.diff(cover.seen_by.indptr))
-        self._first = cover.seen_by.indptr[self._seen]
-        worth = cover.worth.tocoo()
-        self._demand, self._column = (np.asarray(at, dtype=np.int64) for at in worth.coords)
-        few = len(cover.needed) <= np.iinfo(np.int16).max
-        self._short_demand = self._demand.astype(np.int16) if few else self._demand  # sorted in one pass
-        self._worth = worth.data.astype(np.int64)
-        self._begin = np.searchsorted(np.sort(self._demand), np.arange(len(cover.needed)))
-        self._sees = [self._seers(demand) for demand in range(len(cover.needed))]
-
-    def _seers(self, demand: int) -> IntArray:
-        """Rows that see any part of a demand."""
-        columns = self._column[self._demand == demand]
-        return np.unique(self._cover.seen_by[columns].indices).astype(np.int64)
-
-    def round(self, away: FloatArray) -> Zone | None:
-        """The smallest zone around a seed, by the distance of each row, `away` (rows,); None if none."""
-        cover = self._cover
-        farthest = np.full(cover.columns, -np.inf)
-        farthest[self._seen] = np.maximum.reduceat(away[cover.seen_by.indices], self._first)
-        reach = farthest[self._column]
-        order = np.argsort(-reach, kind="stable")
-        order = order[np.argsort(self._short_demand[order], kind="stable")]
-        sums = np.cumsum(self._worth[order])
-        before = np.concatenate([[0], sums])[self._begin]
-        radius, which = np.inf, -1
-        for demand in np.flatnonzero(cover.needed > 0).tolist():
-            k = int(np.searchsorted(sums, before[demand] + cover.needed[demand]))
-            if k < len(order) and self._demand[order[k]] == demand and reach[order[k]] < radius:
-                radius, which = float(reach[order[k]]), demand
-        if which < 0:
-            return None
-        rows = self._sees[which]
-        return Zone(rows[away[rows] <= radius], radius)
+def _grown(cover: Cover, xy: FloatArray, demand: int) -> Iterator[tuple[IntArray, float]]:
+    """Zones of a demand, with their radii."""
+    own = slice(cover.worth.indptr[demand], cover.worth.indptr[demand + 1])
+    columns, worth = cover.worth.indices[own], cover.worth.data[own].astype(np.int64)
+    is_seen = np.diff(cover.seen_by.indptr)[columns] > 0
+    seen_by, worth = cover.seen_by[columns[is_seen]], worth[is_seen]
+    if not len(worth) or seen_by.nnz > WIDEST:
+        return
+    rows, place = np.unique(seen_by.indices, return_inverse=True)
+    for seed in range(0, len(rows), max(1, -(-len(rows) * seen_by.nnz // WORK))):
+        away = np.round(np.hypot(*(xy[rows] - xy[rows[seed]]).T), 6)
+        farthest = np.maximum.reduceat(away[place], seen_by.indptr[:-1])
+        order = np.argsort(-farthest, kind="stable")
+        k = int(np.searchsorted(np.cumsum(worth[order]), cover.needed[demand]))
+        if k < len(order):
+            radius = float(farthest[order[k]])
+            yield rows[away <= radius].astype(np.int64), radius

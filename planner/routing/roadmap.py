@@ -36,15 +36,15 @@ TOUCH = 1e-9
 
 def paths_between(space: NavigableSpace, points: FloatArray, *, trees: bool = False) -> Paths:
     """Shortest paths between all pairs of points (n, 2) of the drive area; `trees` as in `shortest_paths`."""
-    return shortest_paths(*_graph_of(space, points), len(points), trees=trees)
+    return shortest_paths(*graph_of(space, points), len(points), trees=trees)
 
 
 def nearby_paths_between(space: NavigableSpace, points: FloatArray) -> NearbyPaths:
     """Shortest paths from each point (n, 2) of the drive area to the points near it."""
-    return NearbyPaths(*_graph_of(space, points), len(points))
+    return NearbyPaths(*graph_of(space, points), len(points))
 
 
-def _graph_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, IntArray]:
+def graph_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, IntArray]:
     """The nodes (n, 2), points first, and the straight pieces (m, 2) of shortest paths between points."""
     origin = local_origin(space.floor)
     corners = outward_corners(space)

@@ -56,7 +56,7 @@ def one_tree_bound(cost: IntArray, *, best: int) -> OneTree:
     """The one-tree of the highest value found; a tour of the length `best` ends the search."""
     n = len(cost)
     steps = STEPS if n <= FEW else min(MOST_STEPS, WORK // n**2)
-    _, weight = highest(_growing(cost), n, best=best, steps=steps)
+    _, weight = highest(growing(cost), n, best=best, steps=steps)
     return one_tree(cost, weight)
 
 
@@ -92,7 +92,7 @@ def highest(
     return most, top
 
 
-def _growing(cost: IntArray) -> Callable[[IntArray], tuple[int, IntArray]]:
+def growing(cost: IntArray) -> Callable[[IntArray], tuple[int, IntArray]]:
     """The value of the smallest one-tree at given weights, and the degrees of its points (n,)."""
     n = len(cost)
     kernel = compiled(grow, large=n > FEW)

@@ -103,6 +103,16 @@ class PricedCover:
         seen = cover.covered_by(np.flatnonzero(spare < 0))
         return value, np.concatenate([cover.asks * bought - seen, self.needed[1:] - self._rest @ bought])
 
+    def bought(self, column: FloatArray, demand: FloatArray) -> tuple[float, FloatArray]:
+        """Least cost of columns that meet the demands at these prices, as if rows cost nothing; its slope.
+
+        The slope is by the prices of the columns, then of the demands.
+        """
+        cost = self.cover.asks * column - self._rest_of_column @ demand
+        bought = self._cheapest(cost)
+        value = float(demand @ self.needed[1:]) + float((cost * bought).sum())
+        return value, np.concatenate([self.cover.asks * bought, self.needed[1:] - self._rest @ bought])
+
     def price_of_whole(self, prices: FloatArray) -> float:
         """Highest cost, per weight, of what is bought to meet the whole's demand at these prices."""
         columns = self.cover.columns

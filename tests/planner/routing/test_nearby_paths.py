@@ -117,7 +117,7 @@ def test_points_apart_are_not_connected() -> None:
 
 def few_pairs(space: NavigableSpace, points: np.ndarray) -> NearbyPaths:
     """Only the paths to twelve points from each, and from six landmarks."""
-    return NearbyPaths(*roadmap._graph_of(space, points), len(points), nearest=12, landmarks=6)
+    return NearbyPaths(*roadmap.graph_of(space, points), len(points), nearest=12, landmarks=6)
 
 
 @pytest.mark.parametrize("tour", ["open", "closed"])
