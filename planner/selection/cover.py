@@ -17,7 +17,7 @@ from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.selection.demands import Demands
 from stopgo.planner.selection.worth_kernel import add_views, sum_by_row
-from stopgo.planner.selection.worths import Worths
+from stopgo.planner.selection.worths import Transposed, Worths
 from stopgo.planner.visibility.unit_ranges import ranges
 
 BLOCK = 1_000_000
@@ -76,10 +76,14 @@ class Cover:
         """Weight of everything that any candidate sees."""
         return int(self.weight.sum())
 
-    @cached_property
+    @property
     def seen_by(self) -> csr_array:
         """The transpose of `sees` (columns, rows)."""
-        return _sorted(self.sees.T)
+        return self._transposed.matrix
+
+    @cached_property
+    def _transposed(self) -> Transposed:
+        return Transposed(self.sees)
 
     @cached_property
     def adds_to(self) -> csr_array:
@@ -106,7 +110,7 @@ class Cover:
     @cached_property
     def worths(self) -> Worths:
         """Sums of what columns add to the demands."""
-        return Worths(self.adds_to, lambda: self.seen_by)
+        return Worths(self.adds_to, self._transposed)
 
     @cached_property
     def seen_columns(self) -> tuple[IntArray, NDArray[np.int32]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -24,10 +23,26 @@ class _Entries(NamedTuple):
     """Demand or row of each entry (entries,)."""
 
 
+class Transposed:
+    """The transpose of a sparse matrix, made when it is used.
+
+    What holds this does not hold the covering problem, which would then keep itself until garbage is sought.
+    """
+
+    def __init__(self, matrix: csr_array) -> None:
+        self._of = matrix
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        made = self._of.T.tocsr()
+        made.sort_indices()
+        return made
+
+
 class Worths:
     """Sums of what the columns of one covering problem add to its demands."""
 
-    def __init__(self, adds_to: csr_array, seen_by: Callable[[], csr_array]) -> None:
+    def __init__(self, adds_to: csr_array, seen_by: Transposed) -> None:
         """`adds_to` has the worth of columns (columns, demands), `seen_by` who sees them (columns, rows)."""
         self._demands, self._seen_by = int(adds_to.shape[1]), seen_by
         self._adds = _entries(adds_to, np.int64)
@@ -37,11 +52,11 @@ class Worths:
 
     @cached_property
     def _seen(self) -> _Entries:
-        return _entries(self._seen_by(), np.int32)
+        return _entries(self._seen_by.matrix, np.int32)
 
     @cached_property
     def _rows(self) -> int:
-        return int(self._seen_by().shape[1])
+        return int(self._seen_by.matrix.shape[1])
 
     @property
     def rows_of(self) -> tuple[IntArray, IntArray]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,8 +12,13 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection import worths
-from stopgo.planner.selection.worths import Worths
+from stopgo.planner.selection.bound import lower_bound
+from stopgo.planner.selection.greedy import greedy
+from stopgo.planner.selection.improve import improved
+from stopgo.planner.selection.running_coverage import RunningCoverage
+from stopgo.planner.selection.worths import Transposed, Worths
 from tests.planner.kernels import machine_code
+from tests.planner.selection.test_swaps import cover_of_rooms
 
 
 def by_each_kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -22,7 +29,7 @@ def by_each_kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def _sums(adds_to: csr_array, seen_by: csr_array, columns: IntArray, demands: IntArray) -> list[list]:
-    sums = Worths(adds_to, lambda: seen_by)
+    sums = Worths(adds_to, Transposed(csr_array(seen_by.T)))
     return [sums.of(columns).tolist(), sums.by_row(columns, demands).tolist()]
 
 
@@ -39,7 +46,7 @@ def test_gains_are_the_same_in_numpy_as_written_and_compiled(
         adds = worth[columns[covered[columns] < asks[columns]]].sum(axis=0)
         counted = (int(np.minimum(adds, short).sum()), int(adds[missing > 0].sum()), int(adds[0]))
         for _ in by_each_kernel(monkeypatch):
-            sums = Worths(csr_array(worth), lambda: csr_array(np.ones((30, 1), np.int64)))
+            sums = Worths(csr_array(worth), Transposed(csr_array(np.ones((1, 30), np.int64))))
             for _ in range(2):
                 assert sums.gain(columns, covered, asks, short, missing) == counted
 
@@ -57,3 +64,19 @@ def test_sums_are_the_same_in_numpy_as_written_and_compiled(
         counted = [worth[columns].sum(axis=0).tolist(), (worth[columns].T @ sees[columns])[demands].tolist()]
         for _ in by_each_kernel(monkeypatch):
             assert _sums(csr_array(worth), csr_array(sees), columns, demands) == counted
+
+
+def test_a_covering_problem_that_is_done_with_is_freed_at_once() -> None:
+    """A reference to itself would keep each problem of a search, some hundred megabytes in all."""
+    cover = cover_of_rooms(4)
+    gone = weakref.ref(cover)
+    rows = greedy(cover)
+    improved(cover, rows, at_least=1)
+    RunningCoverage(cover, rows).add(rows[:1])
+    lower_bound(cover, found=len(rows))
+    gc.disable()
+    try:
+        del cover
+        assert gone() is None
+    finally:
+        gc.enable()
