@@ -22,7 +22,8 @@ journal (`Logbook`)
 Invariants
 ----------
 1. Steps are computed from the stored run, and again inside the transaction that stores them. So two processes
-   that see the same thing store it once, and no run goes back.
+   that see the same thing store it once, and no run goes back. Nor does it by reports that are older than its
+   last change: another station may have had the newer ones first.
 2. A step, the scan that it uses and the command that it requires are stored in one transaction. So a process
    that ends in between leaves no step without its command. A command past a skipped stop follows from the
    run's state at every look.
@@ -59,6 +60,7 @@ from stopgo.mission.mavlink.following.steps import (
     COUNTS_NOT_YET,
     Observation,
     has_left,
+    is_back,
     since_left,
     steps,
     tried_again,
@@ -176,7 +178,7 @@ class AutoFollower:
     def _look_once(self, listed: ListedMission) -> bool:
         """Take in the state at the current stop; true if the run went on to another one."""
         before, observed = self.run, self._observe(listed)
-        if observed is None:
+        if observed is None or (self._book.is_behind and is_back(before, listed, observed)):
             return False
         changes = self._changes(before, listed, observed)
         if self._looks_only:

@@ -77,6 +77,13 @@ class Used(msgspec.Struct, frozen=True, kw_only=True):
     boot_ms: int
 
 
+class Moved(msgspec.Struct, frozen=True, kw_only=True):
+    """The vehicle's time when the run last changed, as the station knew it that stored the change."""
+
+    boot_id: str
+    boot_ms: int
+
+
 class Moment(msgspec.Struct, frozen=True):
     at_ns: int
 
@@ -152,10 +159,19 @@ class Logbook:
     def _put(self, change: Change) -> None:
         now_ns, run, before = self.clock.now_ns(), change.run, self.run
         self.journal.store_change(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns)
+        self.journal.store_fact("moved", Moved(boot_id=self.boot_id, boot_ms=self.boots.boot_ms))
         if run.run_id != before.run_id:
             self.use(-1, self.boots.boot_ms)
         if run.state != before.state:
             self.journal.store_fact("changed", Moment(now_ns))
+
+    @property
+    def is_behind(self) -> bool:
+        """True if the run was changed by reports that have come to another station, and not yet here."""
+        moved = self.journal.fact("moved", Moved)
+        if moved is None or moved.boot_id != self.boot_id:
+            return False
+        return 0 < self.boots.boot_ms <= moved.boot_ms
 
     @property
     def used(self) -> tuple[int, int]:

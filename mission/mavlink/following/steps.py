@@ -77,6 +77,12 @@ def has_left(run: Run, listed: ListedMission, observed: Observation) -> bool:
     return at_work and observed.place >= listed.stops[run.at].after
 
 
+def is_back(run: Run, listed: ListedMission, observed: Observation) -> bool:
+    """Return True for a vehicle on its way to the stop at which the run has it."""
+    at_stop = run.stop_state in AT_STOP and run.at < len(listed.stops)
+    return at_stop and observed.place <= listed.stops[run.at].at
+
+
 def since_left(run: Run, listed: ListedMission, observed: Observation, waited_ns: int) -> Observation:
     """Return the observation after waiting: is a report still expected from the stop that was left?"""
     beyond = run.at + 1 < len(listed.stops) and observed.place > listed.stops[run.at + 1].at
