@@ -212,6 +212,7 @@ class ZenohLink:
         # A token or subscriber without a reference is garbage collected, and undeclared.
         self._declared: list[Any] = []
         self._publishers: list[zenoh.Publisher] = []
+        self._queriers: dict[str, zenoh.Querier] = {}
         self._lock = threading.Lock()
         self._silent = False
         self.may_be_sent = False
@@ -297,6 +298,7 @@ class ZenohLink:
             return
         question = self._signing.sign_question(key, payload, parameters)
         linked = self._others()
+        self.may_be_sent = self.may_be_sent or self._is_served(key)
         replies = self._session.get(
             zenoh.Selector(key, dict(parameters)),
             payload=payload,
@@ -310,6 +312,7 @@ class ZenohLink:
             express=not bulk,
         )
         linked |= self._others()
+        self.may_be_sent = self.may_be_sent or self._is_served(key)  # by one who came just now
         for reply in replies:
             self.may_be_sent = True  # also an error: zenoh's own one of a question without an answer in time
             if reply.ok is not None:
@@ -318,8 +321,19 @@ class ZenohLink:
                 )
                 if opened is not None:
                     yield opened
-        # Without any reply there was nobody to ask, or one who was asked is lost.
-        self.may_be_sent |= not linked <= self._others()
+        # Without any reply there was nobody to ask, or one who was asked did not answer, or is lost.
+        self.may_be_sent = self.may_be_sent or self._is_served(key) or not linked <= self._others()
+
+    def _is_served(self, key: str) -> bool:
+        """Return true if another end is known to serve `key` now.
+
+        A router says who serves a key only after it was asked, so the answer may come too late for the
+        first question on a key. The queriers are kept for the next one.
+        """
+        if key not in self._queriers:
+            self._queriers[key] = self._session.declare_querier(key, target=zenoh.QueryTarget.ALL_COMPLETE)
+        status: Any = self._queriers[key].matching_status  # zenoh declares it as a bool, which it is not
+        return bool(status.matching)
 
     def hear(self, key: str, heard: Hearing) -> None:
         judged = self._signing.verify_publications(heard)
@@ -339,6 +353,7 @@ class ZenohLink:
         with self._lock:
             _undeclare(self._declared)
             _undeclare(self._publishers)
+            _undeclare(list(self._queriers.values()))
 
 
 def _undeclare(declared: list[Any]) -> None:
