@@ -231,7 +231,7 @@ def tour_times(
     rows = candidates.kept[selection.chosen]
     heading = candidates.heading[rows] if len(candidates.heading) else np.empty(0)
     return TourTimes(
-        legs=legs_between(candidates.space, points),
+        legs=legs_between(candidates.space, points, trees=True),
         points=frozen(points),
         stops=len(selection.chosen),
         robot=robot_of(settings),
