@@ -53,6 +53,7 @@ from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.roadmap import graph_of
 from stopgo.planner.selection import METHODS, cover_problem, offered_for_follow_up, remaining_cover
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover
@@ -122,6 +123,16 @@ class TourProblem:
         return found
 
     @cached_property
+    def all_rows(self) -> IntArray:
+        """All rows that are offered or required, ascending: the points of the time bound."""
+        return np.union1d(self.offered, self.stays).astype(np.int64)
+
+    @cached_property
+    def pieces(self) -> tuple[FloatArray, IntArray]:
+        """Nodes and straight pieces of the exact paths between all these rows, which are the first nodes."""
+        return graph_of(self.route.space, self.candidates.xy[self.candidates.kept[self.all_rows]])
+
+    @cached_property
     def legs(self) -> Legs:
         return legs_between(self.route.space, np.concatenate([self._xy, self._ends]), trees=True)
 
@@ -162,15 +173,21 @@ class TourProblem:
         )
 
     @cached_property
+    def staying(self) -> IntArray:
+        """Rows that must stay: those required, and the one where a closed route without a start begins."""
+        return self.stays if self.begin is None else np.append(self.stays, self.rows[self.begin])
+
+    @cached_property
+    def left_to_see(self) -> Cover:
+        """The covering problem that these rows leave, over all rows."""
+        return self.cover if self.begin is None else self.cover.after(self.rows[[self.begin]])
+
+    @cached_property
     def task(self) -> LineTask:
-        stays = np.isin(self.rows, self.stays)
-        if self.begin is not None:
-            stays[self.begin] = True
-        cover = self.cover if self.begin is None else self.cover.after(self.rows[[self.begin]])
         rank = rank_at_door(self.candidates, self.rows)[0] if self.settings.start is None else None
         return LineTask(
-            cover=_of_rows(cover, self.rows),
-            stays=stays,
+            cover=of_rows(self.left_to_see, self.rows),
+            stays=np.isin(self.rows, self.staying),
             rank=None if self.begin is not None else rank,
             joins=lambda positions: self.joins(self.rows[positions])[self.rows],
         )
@@ -178,8 +195,8 @@ class TourProblem:
     def bound_problem(self, rows: IntArray, known_s: float) -> RouteRequirements:
         """The problem of the time bound over all candidates; `rows` are a plan's stops in its order."""
         settings, robot = self.settings, robot_of(self.settings)
-        all_rows = np.union1d(self.offered, self.stays).astype(np.int64)
-        cover, points = _of_rows(self.cover, all_rows), len(all_rows)
+        all_rows = self.all_rows
+        cover, points = of_rows(self.cover, all_rows), len(all_rows)
         given = self._ends[: len(self._ends) - (self.begin is not None)]
         xy = np.concatenate([self.candidates.xy[self.candidates.kept[all_rows]], given])
         required = np.searchsorted(all_rows, self.stays)
@@ -233,7 +250,7 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
         if registers:
             cover, joins = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
     offered = np.flatnonzero(np.diff(cover.sees.indptr)).astype(np.int64)
-    nearest = _nearest(visibility.candidates, offered, chosen)
+    nearest = nearest_rows(visibility.candidates, offered, chosen, most=MOST_POSITIONS)
     return TourProblem(
         route=route,
         whole=whole,
@@ -265,16 +282,16 @@ def _joined(
     return left, lambda rows: task.parts_with_each(np.union1d(rows, fixed)) <= most
 
 
-def _nearest(candidates: Candidates, offered: IntArray, chosen: IntArray) -> IntArray:
-    """The offered rows nearest to the chosen ones, at most MOST_POSITIONS."""
-    if len(offered) <= MOST_POSITIONS:
+def nearest_rows(candidates: Candidates, offered: IntArray, chosen: IntArray, *, most: int) -> IntArray:
+    """The offered rows nearest to the chosen ones, so many at most."""
+    if len(offered) <= most:
         return offered
     xy = candidates.xy[candidates.kept]
     away = np.min([np.hypot(*(xy[offered] - xy[row]).T) for row in chosen], axis=0)
-    return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:MOST_POSITIONS]])
+    return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:most]])
 
 
-def _of_rows(cover: Cover, rows: IntArray) -> Cover:
+def of_rows(cover: Cover, rows: IntArray) -> Cover:
     """The problem over these rows alone, renumbered."""
     return Cover(cover.sees[rows], cover.worth, cover.needed, cover.views)
 
