@@ -182,8 +182,8 @@ def _left_out(clock: TourTimes, tour: Tour, start: int) -> FloatArray:
     """Driving time that a tour saves without each of its stops, about (stops,)."""
     line = np.array([clock.stops + start, *tour, clock.stops + start])
     a, at, b = line[:-2], line[1:-1], line[2:]
-    least = clock.least
-    return np.asarray(least[a, at] + least[at, b] - least[a, b])
+    likely = clock.likely
+    return np.asarray(likely[a, at] + likely[at, b] - likely[a, b])
 
 
 def _added(clock: TourTimes, stops: IntArray, tour: Tour, start: int) -> FloatArray:
@@ -194,8 +194,8 @@ def _added(clock: TourTimes, stops: IntArray, tour: Tour, start: int) -> FloatAr
 
 def _added_at(clock: TourTimes, stops: IntArray, line: IntArray) -> FloatArray:
     """Driving time that each stop adds in each leg of a line (stops, legs), about."""
-    least, a, b = clock.least, line[:-1], line[1:]
-    return np.asarray(least[stops[:, None], a] + least[stops[:, None], b] - least[a, b])
+    likely, a, b = clock.likely, line[:-1], line[1:]
+    return np.asarray(likely[stops[:, None], a] + likely[stops[:, None], b] - likely[a, b])
 
 
 def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
@@ -204,7 +204,7 @@ def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
         yield from _reordered(tour)
         return
     line = np.array([clock.stops + start, *tour, clock.stops + start])
-    n, away = len(tour), clock.least[np.ix_(line, line)]
+    n, away = len(tour), clock.likely[np.ix_(line, line)]
     step = np.diagonal(away, 1)
     # the stretch from stop a to before stop b is reversed
     turned = away[:-1, :-1] + away[1:, 1:] - step[:, None] - step
