@@ -39,6 +39,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
@@ -287,7 +288,7 @@ def nearest_rows(candidates: Candidates, offered: IntArray, chosen: IntArray, *,
     if len(offered) <= most:
         return offered
     xy = candidates.xy[candidates.kept]
-    away = np.min([np.hypot(*(xy[offered] - xy[row]).T) for row in chosen], axis=0)
+    away = cKDTree(xy[chosen]).query(xy[offered])[0]
     return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:most]])
 
 

@@ -219,7 +219,10 @@ class _PointSearch:
         """Search up to a point, unless the last search reached it; its place among the points found."""
         if source != self._source or target not in self._place:
             many = self._kernel(source, target, self.points, self.points, *self._arrays)
-            self._source, self._place = source, dict(zip(map(int, self._found[:many]), range(many), strict=True))
+            self._source, self._place = (
+                source,
+                dict(zip(map(int, self._found[:many]), range(many), strict=True)),
+            )
         if target not in self._place:
             raise ValueError(f"no path from point {source} to point {target}")
         return self._place[target]

@@ -58,7 +58,9 @@ class Paths:
         """The node before each node on its shortest path from each of these points (n, nodes)."""
         kept = [self._trees.get(point) for point in points.tolist()]
         if any(tree is None for tree in kept):
-            found: IntArray = dijkstra(self.graph, False, points, return_predecessors=True, limit=self.limit)[1]
+            found: IntArray = dijkstra(self.graph, False, points, return_predecessors=True, limit=self.limit)[
+                1
+            ]
             return found
         return np.array(kept)
 

@@ -21,7 +21,7 @@ from stopgo.planner.task_allocation.tour_times import DETOURS_UP_TO, TourTimes
 NOISE = 1e-6
 """Seconds by which floating-point noise may raise a bound."""
 MOST_STEPS, WORK = 3_000, 8_000_000_000
-"""One-trees of a bound over many points, and edges examined in them; counts, so that it is no matter of speed."""
+"""One-trees of a bound over many points, and edges examined in them; counts, so that speed is no matter."""
 
 
 def least_makespan(clock: TourTimes, starts: IntArray) -> float:
