@@ -30,9 +30,9 @@ DETOUR_S = 3.0
 """Cost of each stop at first, when only their number has a price."""
 EARNED = (0.0, 0.3)
 """Fractions of a stop's cost that targets and demands may pay at first; the rest is the number's price."""
-WORK = 330_000_000
+WORK = 270_000_000
 """Pieces of paths evaluated in all steps together."""
-FEWEST_STEPS, MOST_STEPS = 25, 240
+FEWEST_STEPS, MOST_STEPS = 15, 240
 FIRST_STEP, AIM, SMOOTHING, PATIENCE = 1.5, 1.2, 0.2, 8
 """The first step as a multiple of Polyak's for AIM times the best bound; as in the multiplier bound."""
 FEW_NODES = 2_000_000

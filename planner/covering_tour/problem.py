@@ -86,6 +86,8 @@ class TourProblem:
     done: IntArray
     """Rows scanned before: they count as seen and are no stops."""
     joins: ConnectionTest
+    joins_among: Callable[[IntArray, IntArray], ConnectionTest]
+    """Returns the test for some rows, by their index in these, together with other rows that all stay."""
 
     @property
     def candidates(self) -> Candidates:
@@ -241,15 +243,18 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
     visibility, chosen = route.visibility, np.unique(route.selection.chosen)
     stays: IntArray = np.empty(0, dtype=np.int64)
     joins: ConnectionTest = partial(_any_rows, visibility.rows)
+    among: Callable[[IntArray, IntArray], ConnectionTest] = _any_among
     registers = visibility.settings.registers
     if done is not None:
         whole, cover = remaining_cover(visibility, done)
         if registers:
-            cover, joins = _joined(visibility, whole, done, chosen, offered_for_follow_up(visibility, done))
+            cover, joins, among = _joined(
+                visibility, whole, done, chosen, offered_for_follow_up(visibility, done)
+            )
     else:
         whole, stays, cover = cover_problem(visibility)
         if registers:
-            cover, joins = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
+            cover, joins, among = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
     offered = np.flatnonzero(np.diff(cover.sees.indptr)).astype(np.int64)
     nearest = nearest_rows(visibility.candidates, offered, chosen, most=MOST_POSITIONS)
     return TourProblem(
@@ -261,6 +266,7 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
         stays=stays,
         done=np.empty(0, np.int64) if done is None else done,
         joins=joins,
+        joins_among=among,
     )
 
 
@@ -268,10 +274,14 @@ def _any_rows(count: int, rows: IntArray) -> BoolArray:
     return np.ones(count, dtype=bool)
 
 
+def _any_among(rows: IntArray, others: IntArray) -> ConnectionTest:
+    return partial(_any_rows, len(rows))
+
+
 def _joined(
     visibility: Visibility, whole: Cover, fixed: IntArray, chosen: IntArray, offered: IntArray
-) -> tuple[Cover, ConnectionTest]:
-    """The remaining covering problem where scans must register, and the test for connection.
+) -> tuple[Cover, ConnectionTest, Callable[[IntArray, IntArray], ConnectionTest]]:
+    """The remaining covering problem where scans must register, and the tests for connection.
 
     Rows `fixed` are required or were scanned before. Rows pass the test if, together with `fixed`, they
     are connected at least as well as the chosen rows.
@@ -280,7 +290,12 @@ def _joined(
     task = ConnectedCover(cover, links_of(visibility.candidates), offered)
     most = task.parts(np.union1d(chosen, fixed))
     left = whole.after(fixed).offering(np.sort(np.concatenate(task.regions)))
-    return left, lambda rows: task.parts_with_each(np.union1d(rows, fixed)) <= most
+
+    def among(rows: IntArray, others: IntArray) -> ConnectionTest:
+        parts = task.among(rows, np.setdiff1d(np.union1d(others, fixed), rows).astype(np.int64))
+        return lambda chosen: parts(chosen) <= most
+
+    return left, lambda rows: task.parts_with_each(np.union1d(rows, fixed)) <= most, among
 
 
 def nearest_rows(candidates: Candidates, offered: IntArray, chosen: IntArray, *, most: int) -> IntArray:

@@ -92,7 +92,7 @@ class _Stretch:
             cover=of_rows(cover, np.searchsorted(every, self.rows)),
             stays=np.isin(self.rows, problem.stays),
             rank=None,
-            joins=lambda stops: problem.joins(np.union1d(self.rows[stops], others))[self.rows],
+            joins=problem.joins_among(self.rows, others),
         )
 
     @cached_property
