@@ -17,8 +17,8 @@ from stopgo.mission.geometry import IntArray, frozen
 from stopgo.mission.stages import LeastTime, Route, Selection
 from stopgo.planner.covering_tour.least_time_bound import least_time
 from stopgo.planner.covering_tour.problem import TourProblem, problem_of
+from stopgo.planner.covering_tour.route_stretches import by_stretches
 from stopgo.planner.covering_tour.search import shorter_line
-from stopgo.planner.covering_tour.stretches import by_stretches
 from stopgo.planner.routing import points_and_ends, route_along
 from stopgo.planner.routing.assemble import assemble
 from stopgo.planner.selection import coverage_steps

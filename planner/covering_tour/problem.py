@@ -54,7 +54,6 @@ from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.legs import Legs
-from stopgo.planner.routing.roadmap import graph_of
 from stopgo.planner.selection import METHODS, cover_problem, offered_for_follow_up, remaining_cover
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover
@@ -129,11 +128,6 @@ class TourProblem:
     def all_rows(self) -> IntArray:
         """All rows that are offered or required, ascending: the points of the time bound."""
         return np.union1d(self.offered, self.stays).astype(np.int64)
-
-    @cached_property
-    def pieces(self) -> tuple[FloatArray, IntArray]:
-        """Nodes and straight pieces of the exact paths between all these rows, which are the first nodes."""
-        return graph_of(self.route.space, self.candidates.xy[self.candidates.kept[self.all_rows]])
 
     @cached_property
     def legs(self) -> Legs:

@@ -91,10 +91,10 @@ def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:
 
 
 def least_tour(times: FloatArray) -> float:
-    """Lower bound in seconds on a closed tour over all points of a matrix (n, n)."""
-    cost = nanometres(times)
-    if len(cost) <= BRANCH_UP_TO:
-        return tour_proof(cost, shortest_tour(times, seed=1)).bound / NANOMETRES
+    """Lower bound in seconds on a closed tour over all points of a matrix (n, n), which is gone then."""
+    if len(times) <= BRANCH_UP_TO:
+        return tour_proof(nanometres(times), shortest_tour(times, seed=1)).bound / NANOMETRES
+    cost = nanometres(times, in_place=True)
     steps = min(MOST_STEPS, WORK // len(cost) ** 2)
     return highest(growing(cost), len(cost), best=NEVER, steps=steps)[0] / NANOMETRES
 
@@ -117,9 +117,9 @@ def driven_and_turned(clock: TourTimes, tours: int) -> float:
 
 def _closed_together(clock: TourTimes, tours: int) -> FloatArray:
     """Seconds between stops and as many copies of the nearest start as tours, no two next to each other."""
-    stops = clock.stops
-    among = clock.turned_s[:stops, :stops]
-    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
+    stops, turned = clock.stops, clock.turned_s
+    among = turned[:stops, :stops]
+    there = np.repeat(turned[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
     apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
     return np.block([[among, there], [there.T, apart]])
 
@@ -130,9 +130,9 @@ def _open_together(clock: TourTimes, tours: int) -> FloatArray:
     Each end is next to a stop and to the start of the next tour. The last stop has no turn, so that its
     one leg's share is taken off.
     """
-    stops = clock.stops
-    among = clock.turned_s[:stops, :stops]
-    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
+    stops, turned = clock.stops, clock.turned_s
+    among = turned[:stops, :stops]
+    there = np.repeat(turned[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
     last = np.repeat(-clock.largest_share_s[:, None], tours, axis=1)
     apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
     following = apart * (1 - np.eye(tours))

@@ -194,7 +194,7 @@ class TourTimes:
         times[a, b] = self._table.spent[a, b] / MICROSECONDS
         return frozen(times)
 
-    @cached_property
+    @property
     def turned_s(self) -> FloatArray:
         """Lower bounds in seconds (n, n) on paths, with their shares of the turns at both ends.
 
@@ -202,7 +202,10 @@ class TourTimes:
         start has no shares. Legs whose corners were not counted may leave in any direction, so that their
         share is the negative of the largest other one.
         """
-        return frozen(self._driven_s + (self._shares + self._shares.T))
+        shares = self._shares
+        turned = shares + shares.T
+        turned += self._driven_s
+        return frozen(turned)
 
     @property
     def largest_share_s(self) -> FloatArray:

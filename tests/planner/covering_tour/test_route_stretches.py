@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from stopgo.planner import covering_tour
-from stopgo.planner.covering_tour import least_time_route, stretches
+from stopgo.planner.covering_tour import least_time_route
+from stopgo.planner.covering_tour import route_stretches as stretches
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import problem_of
 from stopgo.planner.overlap import links_of
@@ -46,7 +47,9 @@ def test_the_first_stop_and_the_last_one_stay() -> None:
 def test_a_stretch_is_timed_as_the_whole_line_is() -> None:
     problem = problem_of(two_step("hall", 1))
     rows = problem.route.selection.chosen[problem.route.order]
-    stretch = stretches._Stretch(problem, rows[:1], rows[1:-1], rows[-1:], np.full(len(rows), 99.0), -1)
+    legs = np.full(len(rows), 99.0)
+    pieces = stretches.pieces_of(problem)
+    stretch = stretches._Stretch(problem, pieces, rows[:1], rows[1:-1], rows[-1:], legs, -1)
     own = [stretch.after - 1, *np.searchsorted(stretch.rows, stretch.own).tolist(), stretch.after]
     line = np.searchsorted(problem.rows, rows).tolist()
     spent = stretch.times.total(own) + 2 * stretch.times.pause

@@ -22,6 +22,7 @@ from stopgo.planner.covering_tour.timed_line import LineTimes
 from stopgo.planner.routing import GRAPHS
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.paths import shortest_paths
+from stopgo.planner.routing.roadmap import graph_of
 
 LONGEST = 140
 """Stops of a stretch."""
@@ -38,14 +39,19 @@ def by_stretches(problem: TourProblem) -> IntArray:
     """
     rows = problem.route.selection.chosen[problem.route.order]
     legs = np.array([polyline_length(leg) for leg in problem.route.approaches])
-    done, come = rows[:1], NO_HEADING
+    done, come, pieces = rows[:1], NO_HEADING, pieces_of(problem)
     for first in range(1, len(rows) - 1, LONGEST + 1):
         last = min(first + LONGEST, len(rows) - 1)
-        stretch = _Stretch(problem, done, rows[first:last], rows[last:], legs[first : last + 1], come)
+        stretch = _Stretch(problem, pieces, done, rows[first:last], rows[last:], legs[first : last + 1], come)
         found = stretch.improved()
         come = int(stretch.table.arriving[[stretch.after - 1, *found][-1], stretch.after])
         done = np.concatenate([done, stretch.rows[found], rows[last : last + 1]])
     return np.concatenate([done, rows[-1:]]) if done[-1] != rows[-1] else done
+
+
+def pieces_of(problem: TourProblem) -> tuple[FloatArray, IntArray]:
+    """Nodes and straight pieces of the paths between all rows of a problem, which are the first nodes."""
+    return graph_of(problem.route.space, problem.candidates.xy[problem.candidates.kept[problem.all_rows]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +59,7 @@ class _Stretch:
     """Stops `own` of a route, after those that are `done` and before those that are `left`, all as rows."""
 
     problem: TourProblem
+    pieces: tuple[FloatArray, IntArray]
     done: IntArray
     own: IntArray
     left: IntArray
@@ -121,7 +128,7 @@ class _Stretch:
 
     def _legs(self) -> Legs:
         """Paths between the points, over those nodes that these paths may use."""
-        (xy, edges), whole = self.problem.pieces, self.problem.all_rows
+        (xy, edges), whole = self.pieces, self.problem.all_rows
         points = np.searchsorted(whole, self._points)
         line = np.concatenate([self.done[-1:], self.own, self.left[:1]])
         at = xy[np.searchsorted(whole, line)]
