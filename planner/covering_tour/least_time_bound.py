@@ -109,8 +109,10 @@ def least_time(route: RouteRequirements) -> float:
     if len(sets[0]) > MANY_ZONES:
         sets = sets[:1]
     found = [_Relaxation(route, route.graph, zones, 0.0) for zones in sets]
-    values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in found]
-    plain = found[int(np.argmax(values))]
+    plain = found[0]
+    if len(found) > 1:
+        values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in found]
+        plain = found[int(np.argmax(values))]
     lost = route.legs_without_turn * turned.half_turn_s / 2
     both = [plain, _Relaxation(route, turned, plain.zones, lost)]
     values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in both]
