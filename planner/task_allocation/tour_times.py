@@ -32,6 +32,8 @@ MICROSECONDS = 1e6
 """Per second."""
 NEAR = 150
 """Nearest points of each point to which corners of paths are counted in advance."""
+ROWS = 256
+"""Points whose paths are timed as straight ones at a time."""
 DETOURS_UP_TO = 500
 """Points up to which lower bounds allow for detours; this takes time with the cube of their number."""
 
@@ -176,10 +178,18 @@ class TourTimes:
         """About the seconds (n, n) of every path, for a search: those of few points, else upper bounds."""
         if isinstance(self.legs, Legs):
             return self.least
-        speed, acceleration = self.robot.speed, self.robot.acceleration
-        times = straight_times(self.legs.at_most(), speed=speed, acceleration=acceleration)
+        times = self._straight_s(self.legs.at_most())
         times[self._counted] = self._driven_s[self._counted]
         return frozen(times)
+
+    def _straight_s(self, lengths: FloatArray) -> FloatArray:
+        """Seconds of straight paths, some rows at a time: of thousands of points each table is large."""
+        speed, acceleration = self.robot.speed, self.robot.acceleration
+        times = np.empty_like(lengths)
+        for k in range(0, len(lengths), ROWS):
+            some = straight_times(lengths[k : k + ROWS], speed=speed, acceleration=acceleration)
+            times[k : k + ROWS] = some
+        return times
 
     @cached_property
     def _driven_s(self) -> FloatArray:
@@ -187,8 +197,7 @@ class TourTimes:
 
         Corners are counted only on paths to the nearest points and to the starts.
         """
-        speed, acceleration = self.robot.speed, self.robot.acceleration
-        times = straight_times(self.lengths, speed=speed, acceleration=acceleration)
+        times = self._straight_s(self.lengths)
         a, b = np.nonzero(self._counted)
         self._time_legs(a, b)
         times[a, b] = self._table.spent[a, b] / MICROSECONDS
