@@ -17,7 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.overlap.boundary import EDGE_M, WIDER_M, Boundary, ShownBoundary
+from stopgo.planner.overlap.pair_kernel import sum_up
 from stopgo.planner.visibility.unit_ranges import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
@@ -86,21 +88,20 @@ class Overlaps:
     ) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
         """Pairs with so much boundary in common and more strength: rows, later rows, and metres in common."""
         seen, rows = self._seen, self.rows
-        normal, arm = seen.boundary.normals
-        edges = np.arange(len(seen.boundary.first) + 1)
-        first = np.searchsorted(seen.surface[self._order], edges)
-        faces = np.append(seen.boundary.first, len(arm))
-        on = (values[self._order] for values in (self._row, seen.begin, seen.end))
-        shown = (seen.pointer, seen.surface, seen.begin, seen.end, first, *on, faces)
+        first = np.searchsorted(seen.surface[self._order], np.arange(len(seen.boundary.first) + 1))
+        row_on, begin, end = self._row[self._order], seen.begin[self._order], seen.end[self._order]
+        sums = _sums_before(seen.boundary, first, begin, end)
+        place = np.empty_like(self._order)
+        place[self._order] = np.arange(len(place))
         scratch = np.zeros(rows), np.zeros(6 * rows), np.zeros(rows, np.int64)
-        along, xy = np.ascontiguousarray(seen.boundary.along), np.ascontiguousarray(seen.xy).ravel()
-        data = (*shown, seen.boundary.around, along, *normal.T.copy(), arm, xy, *scratch)
-        limits = (EDGE_M, WIDER_M, least_m, hold_m, LEVER_M)
+        xy = np.ascontiguousarray(seen.xy).ravel()
+        shown = (seen.pointer, place, seen.surface, first, row_on, begin, end)
+        data = (*shown, seen.boundary.around, *sums, xy, *scratch)
         for low in range(0, rows, BLOCK):
             high = min(low + BLOCK, rows)
             size = (high - low) * (rows - low)
             row, other, common = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
-            many = kernel(low, high, *limits, *data, row, other, common)
+            many = kernel(low, high, WIDER_M, least_m, hold_m, LEVER_M, *data, row, other, common)
             yield row[:many].copy(), other[:many].copy(), common[:many].copy()
 
     def middle_of_common(self, row: int, other: int) -> FloatArray:
@@ -176,6 +177,19 @@ class Overlaps:
         for (i, j), entry in zip(ENTRIES, entries, strict=True):
             found[:, i, j] = found[:, j, i] = np.bincount(index, entry, many)
         return found
+
+
+def _sums_before(
+    boundary: Boundary, first: IntArray, begin: FloatArray, end: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Normal matrices before both ends of stretches by surfaces, and of closed surfaces, for the kernel."""
+    normal, arm = boundary.normals
+    faces, along = np.append(boundary.first, len(arm)), np.ascontiguousarray(boundary.along)
+    before, sums, around = (np.zeros(6 * size) for size in (len(arm), 2 * len(begin), len(boundary.first)))
+    shape = (faces, boundary.around, along, *normal.T.copy(), arm)
+    kernel: Callable[..., None] = compiled(sum_up, large=False) or sum_up
+    kernel(EDGE_M, first, begin, end, *shape, before, sums, around)
+    return sums, around
 
 
 def _with_laps(seen: ShownBoundary, mine: IntArray, there: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
