@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -59,9 +59,8 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
     from stopgo.planner.routing import route
 
-    seen = _seen(found, observe)
     settings = found.space.settings
-    with _Prepared(seen, planned) as prepared, _later_bound(seen) as later:
+    with _seen(found, planned, observe) as (seen, prepared), _later_bound(seen) as later:
         selection = _selected(seen, later)
         prepared.keep_mesh()
         driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
@@ -75,8 +74,14 @@ MANY = 5000
 """Candidates from which work that nothing waits for yet is done in a process of its own."""
 
 
-def _seen(found: Candidates, observe: Observe) -> Visibility:
-    """Return the visibility of the candidates; the pairs of many that register are found meanwhile."""
+@contextmanager
+def _seen(
+    found: Candidates, planned: frozenset[int], observe: Observe
+) -> Iterator[tuple[Visibility, _Prepared]]:
+    """Yield the visibility of the candidates, and results that need no stops.
+
+    The pairs of many that register are found meanwhile.
+    """
     from stopgo.planner.geometry.side_work import SideWork
     from stopgo.planner.overlap import keep_pairs, pairs_found
     from stopgo.planner.selection import cover_problem
@@ -85,13 +90,17 @@ def _seen(found: Candidates, observe: Observe) -> Visibility:
     observe(found)
     settings = found.settings
     many = len(found.kept) >= MANY and settings.registers and settings.fov >= 360  # else with headings
-    with SideWork(lambda: pairs_found(found), forked=many) as pairs:
-        seen = visibility(found)
-        observe(seen)
-        if many:
-            cover_problem(seen)  # kept for the selection, and made while the pairs are found
-            keep_pairs(seen.candidates, pairs.result())
-    return seen
+    with ExitStack() as after:
+        with SideWork(lambda: pairs_found(found), forked=many) as pairs:
+            seen = visibility(found)
+            observe(seen)
+            if many:
+                cover_problem(seen)  # kept for the selection, and made while the pairs are found
+            prepared = after.enter_context(_Prepared(seen, planned))
+            if many:
+                keep_pairs(seen.candidates, pairs.result())
+        del pairs  # and what it holds
+        yield seen, prepared
 
 
 class _Prepared:
@@ -196,8 +205,7 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     from stopgo.planner.appraisal.figures_of_route import figures_of_share
     from stopgo.planner.routing.assemble import assemble
 
-    seen = _seen(found, observe)
-    with _Prepared(seen, planned) as prepared:
+    with _seen(found, planned, observe) as (seen, prepared):
         selection = _selected(seen)
         prepared.keep_mesh()
         driven, division = _divided(selection)
