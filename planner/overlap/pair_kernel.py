@@ -128,11 +128,13 @@ def add_stretch(
     Return the number of rows `touched` so far.
     """
     low, high = begin_on[own], end_on[own]
+    most = 1 if 0.0 < lap < high else 0
     for place in range(own + 1, last):
         other = row_on[place]
         if other == row_on[own]:
             continue
-        for laps in range(-1, 2):  # on a closed surface also one way around before, and after
+        least = -1 if 0.0 < lap < end_on[place] else 0
+        for laps in range(least, most + 1):  # ways around a closed surface by which the other is ahead
             ahead = laps * lap
             a, b = begin_on[place] + ahead, end_on[place] + ahead
             first, end, added = 12 * place, 12 * place + 6, 0
@@ -140,7 +142,7 @@ def add_stretch(
                 a, first, added = low, 12 * own, laps
             if high <= b:
                 b, end, added = high, 12 * own + 6, added - laps
-            if (laps == 0 or lap > 0.0) and b - a > least_stretch:
+            if b - a > least_stretch:
                 if common[other] == 0.0:
                     touched[count] = other
                     count += 1

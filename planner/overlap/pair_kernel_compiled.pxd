@@ -37,7 +37,7 @@ cpdef whole firm_pairs(
 
 @cython.locals(
     a=double, added=whole, ahead=double, b=double, end=whole, entry=whole, first=whole, high=double,
-    laps=whole, low=double, other=whole, place=whole
+    laps=whole, least=whole, low=double, most=whole, other=whole, place=whole
 )
 cdef whole add_stretch(
     whole own, whole last, whole count, double least_stretch, double lap, whole turn,
