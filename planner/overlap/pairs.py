@@ -11,7 +11,7 @@ weakest direction is NOISE_M / √hold_m, by independent errors along the walls,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,13 +121,20 @@ class Overlaps:
 
     def normal_matrix(self, row: int, other: int) -> FloatArray:
         """N of a pair about the local origin (3, 3), without the lever."""
-        _, there, begin, end = self._common(np.array([row]), np.array([0]))
-        own = self._row[there] == other
-        index = np.zeros(int(own.sum()), dtype=np.int64)
-        found: FloatArray = self._moments(
-            self._seen.surface[there[own]], begin[own] + EDGE_M, end[own] - EDGE_M, index, 1
-        )[0]
+        found: FloatArray = self.normal_matrices([(row, other)])[0]
         return found
+
+    def normal_matrices(self, pairs: Sequence[tuple[int, int]]) -> FloatArray:
+        """N of different pairs of rows about the local origin (n, 3, 3), without the lever."""
+        key = np.array([row * self.rows + other for row, other in pairs], dtype=np.int64)
+        order, rows = np.argsort(key), np.unique(key // max(1, self.rows))
+        mine, there, begin, end = self._common(rows, np.zeros(len(rows), np.int64))
+        of = self._row[mine] * self.rows + self._row[there]
+        place = np.searchsorted(key, of, sorter=order)
+        asked = np.flatnonzero(np.isin(of, key))
+        there, index = there[asked], order[place[asked]]
+        begin, end = begin[asked] + EDGE_M, end[asked] - EDGE_M
+        return self._moments(self._seen.surface[there], begin, end, index, len(key))
 
     def weakest_move(self, row: int, other: int) -> FloatArray:
         """Small move (x, y, rotation times LEVER_M) of a row that a pair resists least, unit length (3,)."""

@@ -157,3 +157,13 @@ def test_links_are_the_same_in_numpy_as_written_and_compiled(
     interpret(monkeypatch)
     assert written == built
     assert (fast != links_of(found)).nnz == 0 and 100 < fast.nnz == 2 * len(built)
+
+
+def test_normal_matrices_are_those_of_each_pair() -> None:
+    found = candidates(navigable(read_floor(SAMPLE), Settings(grid=2.0)))
+    overlaps = overlaps_of(found)
+    pairs = [(row, int(other)) for row in (7, 3, 5) for other in overlaps.of(row).other[::-4]]
+    assert len(pairs) > 10
+    several = overlaps.normal_matrices(pairs)
+    assert several.tolist() == [overlaps.normal_matrix(*pair).tolist() for pair in pairs]
+    assert overlaps.normal_matrices([]).shape == (0, 3, 3)
