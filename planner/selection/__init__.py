@@ -192,6 +192,8 @@ class Searches:
             nonlocal bound, last
             bound = bound or early_bound(cover, found=len(start))
             asked = cover.with_one_of_each(conditions.sets)
+            if asked is not cover:
+                cover.forget_seers()
             again = repaired_again(asked, last) if 0 < len(last) < len(start) else None
             first = start if again is None else again
             last = improved(asked, first, at_least=bound, settled=settled)
