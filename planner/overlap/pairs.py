@@ -74,19 +74,23 @@ class Overlaps:
             self._by_row[row] = self._pairs(np.array([row]), np.array([0]))
         return self._by_row[row]
 
-    def later(self, *, least_m: float = 0.0) -> Iterator[Pairs]:
-        """All rows with every later row that has at least so much boundary in common, in blocks.
+    def later(self, some: range | None = None, *, least_m: float = 0.0) -> Iterator[Pairs]:
+        """Some or all rows with every later row that has at least so much boundary in common, in blocks.
 
         They are not cached, since a large floor would take gigabytes.
         """
-        for begin in range(0, self.rows, BLOCK):
-            rows = np.arange(begin, min(begin + BLOCK, self.rows))
+        some = range(self.rows) if some is None else some
+        for begin in some[::BLOCK]:
+            rows = np.arange(begin, min(begin + BLOCK, some.stop))
             yield self._pairs(rows, rows + 1, least_m=least_m)
 
     def firm(
-        self, kernel: Callable[..., int], least_m: float, hold_m: float
+        self, kernel: Callable[..., int], least_m: float, hold_m: float, some: range | None = None
     ) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
-        """Pairs with so much boundary in common and more strength: rows, later rows, and metres in common."""
+        """Pairs with so much boundary in common and more strength: rows, later rows, and metres in common.
+
+        They are those of some of the rows, or of all.
+        """
         seen, rows = self._seen, self.rows
         first = np.searchsorted(seen.surface[self._order], np.arange(len(seen.boundary.first) + 1))
         row_on, begin, end = self._row[self._order], seen.begin[self._order], seen.end[self._order]
@@ -97,8 +101,9 @@ class Overlaps:
         xy = np.ascontiguousarray(seen.xy).ravel()
         shown = (seen.pointer, place, seen.surface, first, row_on, begin, end)
         data = (*shown, seen.boundary.around, *sums, xy, *scratch)
-        for low in range(0, rows, BLOCK):
-            high = min(low + BLOCK, rows)
+        some = range(rows) if some is None else some
+        for low in some[::BLOCK]:
+            high = min(low + BLOCK, some.stop)
             size = (high - low) * (rows - low)
             row, other, common = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
             many = kernel(low, high, WIDER_M, least_m, hold_m, LEVER_M, *data, row, other, common)
