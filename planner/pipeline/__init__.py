@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
+    from stopgo.mission.geometry import IntArray
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
     from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
@@ -62,7 +63,7 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     settings = found.space.settings
     with _seen(found, planned, observe) as (seen, prepared), _later_bound(seen) as later:
         selection = _selected(seen, later)
-        prepared.keep_mesh()
+        prepared.keep_graph()
         driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
         observe(selection if driven is None else driven.selection)
         driven = driven or route(selection)
@@ -118,22 +119,23 @@ class _Prepared:
     def __exit__(self, *error: Any) -> None:
         self._work.__exit__(*error)
 
-    def _found(self) -> tuple[FiguresBefore, Mesh | None]:
+    def _found(self) -> tuple[FiguresBefore, tuple[Mesh, IntArray] | None]:
         from stopgo.planner.appraisal.figures_of_route import FiguresBefore
-        from stopgo.planner.routing.roadmap import drive_mesh
+        from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
 
         space = self._seen.space
         needed = self._seen.rows >= MANY and space.settings.graph == "exact"
-        return FiguresBefore.of(self._seen, self._planned), drive_mesh(space) if needed else None
+        figures = FiguresBefore.of(self._seen, self._planned)
+        return figures, (drive_mesh(space), corner_pieces(space)) if needed else None
 
-    def keep_mesh(self) -> None:
-        """Keep the mesh for the route, if another process has made it."""
+    def keep_graph(self) -> None:
+        """Keep the mesh and the pieces between corners for the route, if another process has found them."""
         from stopgo.planner.geometry.instance_cache import store
-        from stopgo.planner.routing.roadmap import drive_mesh
+        from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
 
-        mesh = self._work.result()[1] if self._work.is_apart else None
-        if mesh is not None:
-            store(drive_mesh, self._seen.space, mesh)
+        if self._work.is_apart and (graph := self._work.result()[1]):
+            store(drive_mesh, self._seen.space, graph[0])
+            store(corner_pieces, self._seen.space, graph[1])
 
     def figures(self, route: Route) -> FiguresBefore:
         """The figures that need no route, of the visibility that it has."""
@@ -207,7 +209,7 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
 
     with _seen(found, planned, observe) as (seen, prepared):
         selection = _selected(seen)
-        prepared.keep_mesh()
+        prepared.keep_graph()
         driven, division = _divided(selection)
         observe(driven.selection)
         observe(driven)
