@@ -150,4 +150,4 @@ def with_rows(seen: Visibility, rows: IntArray) -> Visibility:
 
 def _frozen(*arrays: NDArray[Any]) -> NDArray[Any]:
     """The arrays in one, read-only."""
-    return read_only(np.concatenate(arrays))
+    return read_only(np.concatenate(arrays, dtype=arrays[0].dtype))
