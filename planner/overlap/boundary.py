@@ -20,9 +20,16 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace
 from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps, whole_steps_of
+from stopgo.planner.geometry.shapes import (
+    GRID,
+    face_segments,
+    local_origin,
+    to_grid,
+    whole_steps,
+    whole_steps_of,
+)
 from stopgo.planner.overlap.surfaces import smooth_surfaces
-from stopgo.planner.space.targets import face_segments, units_on, without_needless_vertices
+from stopgo.planner.space.targets import units_on, without_needless_vertices
 from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.sight.mesh import Mesh
