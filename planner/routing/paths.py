@@ -12,10 +12,10 @@ from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.routing.dijkstra_kernel import find_lengths
-from stopgo.planner.visibility.unit_ranges import ranges
 
 CHUNK = 256
 """Points whose distances to all nodes are in memory at a time."""
