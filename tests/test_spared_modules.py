@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stopgo.spared_modules import load_when_used
+from stopgo.spared_modules import STAND_INS, load_when_used
 
 
 @pytest.fixture(autouse=True)
@@ -46,6 +46,43 @@ def test_a_loaded_or_a_missing_module_stays_as_it_is(package: str) -> None:
     assert import_module(f"{package}.heavy") is heavy
     with pytest.raises(ModuleNotFoundError):
         import_module(f"{package}.missing")
+
+
+@pytest.mark.parametrize("use", ["heavy.answer()", "from_heavy()", "heavy.other", "from_heavy.__name__"])
+def test_a_stand_in_loads_its_module_when_it_is_used(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, use: str
+) -> None:
+    text = f"import {package}\n{package}.loaded.append(__name__)\ndef answer(): return 42\nother = 43\n"
+    (tmp_path / package / "heavy.py").write_text(text)
+    monkeypatch.setitem(STAND_INS, f"{package}.heavy", "answer")
+    load_when_used()
+    heavy = import_module(f"{package}.heavy")
+    from_heavy = heavy.answer
+    assert import_module(package).loaded == []
+    found = eval(use, {"heavy": heavy, "from_heavy": from_heavy})
+    assert found == {"heavy.other": 43, "from_heavy.__name__": "answer"}.get(use, 42)
+    assert import_module(package).loaded == [f"{package}.heavy"]
+    assert from_heavy() == heavy.answer() == 42
+    assert import_module(package).loaded == [f"{package}.heavy"]
+
+
+USED = """
+import sys
+from stopgo.spared_modules import load_when_used
+load_when_used()
+import ezdxf, scipy.sparse.csgraph
+assert not {"pyparsing.core", "scipy.linalg"} & set(sys.modules), "spared"
+drawing = ezdxf.new()
+drawing.modelspace().add_line((0, 0), (1, 1))
+assert len(drawing.query("LINE")) == 1
+assert scipy.sparse.csgraph.laplacian([[0, 1], [1, 0]]).tolist() == [[1, -1], [-1, 1]]
+import pyparsing
+assert issubclass(pyparsing.ParseException, Exception)
+"""
+
+
+def test_the_stand_ins_of_libraries_work_once_they_are_used() -> None:
+    subprocess.run([sys.executable, "-c", USED], check=True)
 
 
 def test_the_spared_modules_of_numpy_work_once_they_are_used() -> None:
