@@ -70,12 +70,13 @@ USED = """
 import sys
 from stopgo.spared_modules import load_when_used
 load_when_used()
-import ezdxf, scipy.sparse.csgraph
+import ezdxf, numpy, scipy.sparse.csgraph
 assert not {"pyparsing.core", "scipy.linalg"} & set(sys.modules), "spared"
 drawing = ezdxf.new()
 drawing.modelspace().add_line((0, 0), (1, 1))
 assert len(drawing.query("LINE")) == 1
-assert scipy.sparse.csgraph.laplacian([[0, 1], [1, 0]]).tolist() == [[1, -1], [-1, 1]]
+graph = numpy.array([[0, 1], [1, 0]])
+assert scipy.sparse.csgraph.laplacian(graph).tolist() == [[1, -1], [-1, 1]]
 import pyparsing
 assert issubclass(pyparsing.ParseException, Exception)
 """
