@@ -26,7 +26,7 @@ from stopgo.freed_memory import looking_seldom
 from stopgo.mission.console.process import ENDING
 from stopgo.mission.errors import InputError
 from stopgo.planner.geometry.side_work import can_fork
-from stopgo.spared_modules import SPARED_OF_RERUN, load_when_used
+from stopgo.spared_modules import SPARED_OF_RERUN, gather_when_used, load_when_used
 
 if TYPE_CHECKING:
     from stopgo.recordings.plan import PlanRecording
@@ -206,6 +206,7 @@ def serve(asked: IO[bytes], answers: IO[bytes]) -> None:
     """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
     leave_pandas_out()
     load_when_used(SPARED_OF_RERUN)
+    gather_when_used()
     with looking_seldom(), contextlib.suppress(EOFError):
         import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
 
