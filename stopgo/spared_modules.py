@@ -16,7 +16,7 @@ from typing import Any
 
 SPARED_OF_NUMPY = ("numpy.f2py", "numpy.ma", "numpy.polynomial", "numpy.random", "numpy.testing")
 """Loaded by scipy, which copies all names of numpy: half of the time that scipy.sparse takes to load."""
-SPARED = (*SPARED_OF_NUMPY, "ezdxf.tools.pattern")
+SPARED = (*SPARED_OF_NUMPY, "ezdxf.fonts.fonts", "ezdxf.tools.pattern")
 SPARED_OF_RERUN = ("rerun.experimental", "rerun.server", "rerun.urdf", "PIL.Image", "psutil")
 """Loaded by Rerun: a tenth of the time that it takes to load."""
 STAND_INS = {
