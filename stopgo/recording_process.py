@@ -1,8 +1,8 @@
 """A plan's recording in a process of its own, which loads Rerun while the floor is planned.
 
-The process is forked, so that it has what is loaded here; where none can be, it begins anew. The results go
-through a pipe, and the process writes and checks the file. If it ends early, for whatever reason, the
-recording is drawn here.
+The process is forked, so that it has what is loaded here; where none can be forked, a new one is started. The
+results go through a pipe, and the process writes and checks the file. If it ends early, for whatever reason,
+the recording is drawn here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a canvas hands to Rerun as arrays is what Rerun would make itself."""
+"""Arrays that a canvas hands to Rerun equal those that Rerun would make itself."""
 
 from __future__ import annotations
 
