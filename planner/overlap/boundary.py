@@ -18,15 +18,23 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps, whole_steps_of
+from stopgo.planner.geometry.shapes import (
+    GRID,
+    face_segments,
+    local_origin,
+    to_grid,
+    whole_steps,
+    whole_steps_of,
+)
 from stopgo.planner.overlap.surfaces import smooth_surfaces
-from stopgo.planner.space.targets import face_segments, units_on, without_needless_vertices
+from stopgo.planner.space.targets import units_on, without_needless_vertices
 from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.sight.mesh import Mesh
 from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
-from stopgo.planner.visibility.unit_ranges import ranges, runs_of
+from stopgo.planner.visibility.unit_ranges import runs_of
 
 PIECE_M = 0.05
 """Length in metres of the boundary's pieces, independent of the plan's units."""

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.overlap.boundary import EDGE_M, WIDER_M, Boundary, ShownBoundary
-from stopgo.planner.visibility.unit_ranges import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A rotation counts as its displacement at this distance: 0.1° as much as 1 cm, the tolerance of each."""

@@ -17,12 +17,12 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.selection import BoundOf, forget_large_cover, greedy_takes_at_most, select
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.visibility import visibility
-from stopgo.planner.visibility.unit_ranges import ranges
 
 STEPS = (-0.5, -0.25, 0.0, 0.25, 0.5)
 """Offsets of new candidates from a stop along both axes of its room, in spacings of the grid."""
