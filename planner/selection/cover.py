@@ -85,6 +85,11 @@ class Cover:
     def _transposed(self) -> Transposed:
         return Transposed(self.sees)
 
+    def forget_seers(self) -> None:
+        """Forget who sees each column, as much as the matrix itself; it is found again where it is used."""
+        for name in ("_transposed", "worths"):
+            vars(self).pop(name, None)
+
     @cached_property
     def adds_to(self) -> csr_array:
         """The transpose of `worth` (columns, demands)."""
