@@ -80,12 +80,14 @@ def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool
     load_when_used()
     from stopgo.planner.floors import options_of, read_floor, standing_bodies
 
+    if writing.beside:
+        import stopgo.mission.plan  # noqa: F401  the other process has it then
+
+        writing.recorder.start()
     read = read_floor(floor, options_of(settings))
     folder = result_folder(writing.out)
     for path in names(folder, 0).values():
         must_be_writable(path)
-    if writing.beside:
-        writing.recorder.start()
     with _print_findings_on_error(read):
         made = plan(read, settings, observe=writing.watch.observe, all_parts=all_parts)
     bodies = standing_bodies(floor, options_of(settings))

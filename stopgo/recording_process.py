@@ -1,7 +1,8 @@
 """A plan's recording in a process of its own, which loads Rerun while the floor is planned.
 
-The results go through a pipe, and the process writes and checks the file. If it ends early, for whatever
-reason, the recording is drawn here.
+The process is forked, so that it has what is loaded here; where none can be forked, a new one is started. The
+results go through a pipe, and the process writes and checks the file. If it ends early, for whatever reason,
+the recording is drawn here.
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ from __future__ import annotations
 import contextlib
 import copyreg
 import json
+import os
 import pickle
+import signal
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
@@ -20,8 +23,10 @@ from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any
 
 from stopgo.freed_memory import looking_seldom
+from stopgo.mission.console.process import ENDING
 from stopgo.mission.errors import InputError
-from stopgo.spared_modules import SPARED_OF_RERUN, load_when_used
+from stopgo.planner.geometry.side_work import can_fork
+from stopgo.spared_modules import SPARED_OF_RERUN, gather_when_used, load_when_used
 
 if TYPE_CHECKING:
     from stopgo.recordings.plan import PlanRecording
@@ -30,9 +35,11 @@ CHILD = """
 import json, sys
 sys.path[:] = json.loads(sys.stdin.buffer.readline())
 from stopgo.recording_process import serve
-serve()
+asked, answers = sys.stdin.buffer, sys.stdout.buffer
+sys.stdout = sys.stderr
+serve(asked, answers)
 """
-"""Program of the process; its first line of input is the path of modules."""
+"""Program of a process that is not forked; its first line of input is the path of modules."""
 
 CACHED = "_cached_"
 """Begin of the names of values that are derived from a result, and that no drawing reads."""
@@ -44,7 +51,7 @@ class RecordingProcess:
     """The process that draws the recordings of one command's plans, one after the other."""
 
     def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: subprocess.Popen[bytes] | _Fork | None = None
 
     @property
     def is_running(self) -> bool:
@@ -56,16 +63,7 @@ class RecordingProcess:
         if "rerun" in sys.modules or find_spec("rerun") is None or not sys.executable:
             return
         with contextlib.suppress(OSError):
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", CHILD],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C reaches this process, which ends the other
-            )
-            assert self._process.stdin is not None
-            self._process.stdin.write(json.dumps(sys.path).encode() + b"\n")
-            self._process.stdin.flush()
+            self._process = _Fork() if can_fork() else _program()
 
     def end(self) -> None:
         """End the process, also in the middle of its work."""
@@ -140,12 +138,75 @@ def recording_process() -> Iterator[RecordingProcess]:
         process.end()
 
 
-def serve() -> None:
+def _program() -> subprocess.Popen[bytes]:
+    """Start a process that loads all that it needs."""
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-c", CHILD],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # Ctrl-C reaches this process, which ends the other
+    )
+    assert process.stdin is not None
+    process.stdin.write(json.dumps(sys.path).encode() + b"\n")
+    process.stdin.flush()
+    return process
+
+
+class _Fork:
+    """A fork of this process that serves; it is used as a Popen is."""
+
+    def __init__(self) -> None:
+        asked, to = os.pipe()
+        back, answers = os.pipe()
+        self.stdin, self.stdout = os.fdopen(to, "wb"), os.fdopen(back, "rb")
+        self.pid = os.fork()
+        if not self.pid:
+            self._serve(asked, answers)
+        os.close(asked)
+        os.close(answers)
+
+    def _serve(self, asked: int, answers: int) -> None:
+        """In the other process: serve without this terminal; it never returns."""
+        try:
+            os.setsid()  # Ctrl-C reaches the first process, which ends this one
+            for name in ENDING:
+                signal.signal(getattr(signal, name), signal.SIG_DFL)
+            self.stdin.close()  # else the input would never end
+            self.stdout.close()
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            for number in (1, 2):
+                os.dup2(nowhere, number)
+            sys.stdout = sys.stderr = os.fdopen(nowhere, "w")  # a thread may hold the locks of the real ones
+            with os.fdopen(asked, "rb") as requests, os.fdopen(answers, "wb") as replies:
+                serve(requests, replies)
+        finally:
+            os._exit(0)
+
+    def kill(self) -> None:
+        """End it, also in the middle of its work."""
+        if self.pid:
+            os.kill(self.pid, signal.SIGKILL)
+
+    def wait(self) -> None:
+        """Wait until it has ended."""
+        if self.pid:
+            os.waitpid(self.pid, 0)
+            self.pid = 0
+
+    def communicate(self) -> None:
+        """Close the pipes, and wait until it has ended."""
+        with contextlib.suppress(BrokenPipeError):
+            self.stdin.close()
+        self.stdout.close()
+        self.wait()
+
+
+def serve(asked: IO[bytes], answers: IO[bytes]) -> None:
     """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
     leave_pandas_out()
     load_when_used(SPARED_OF_RERUN)
-    asked, answers = sys.stdin.buffer, sys.stdout.buffer
-    sys.stdout = sys.stderr
+    gather_when_used()
     with looking_seldom(), contextlib.suppress(EOFError):
         import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
 

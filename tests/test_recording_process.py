@@ -39,10 +39,11 @@ def results() -> tuple[object, ...]:
 
 @contextmanager
 def started() -> Iterator[RecordingProcess]:
-    """A process that was started, as if this one had not loaded Rerun."""
+    """A process that was started, as if this one had not loaded Rerun; a fork would have its locks."""
     with recording_process() as made:
         with pytest.MonkeyPatch.context() as patch:
             patch.delitem(sys.modules, "rerun", raising=False)
+            patch.setattr("stopgo.recording_process.can_fork", lambda: False)
             made.start()
         assert made.is_running
         yield made
@@ -185,3 +186,31 @@ def _runs(number: int) -> bool:
         return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+FORKED = """
+import pickle, sys
+from pathlib import Path
+from stopgo.recording_process import recording_process
+with recording_process() as process:
+    process.start()
+    assert type(process._process).__name__ == "_Fork"
+    drawing = process.draw("same", pickle.load(sys.stdin.buffer))
+    if sys.argv[2] == "killed":
+        process._process.kill()
+    drawing.write(Path(sys.argv[1]))
+    print(process.is_running)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="no process is forked here")
+@pytest.mark.parametrize("end", ["killed", "asked for nothing more"])
+def test_a_fork_writes_what_would_be_written_here(
+    results: tuple[object, ...], tmp_path: Path, end: str
+) -> None:
+    here, there = tmp_path / "here.rrd", tmp_path / "there.rrd"
+    RecordingProcess().draw("same", results).write(here)
+    command = [sys.executable, "-c", FORKED, str(there), end]
+    done = subprocess.run(command, input=pickled(results), capture_output=True, check=True)
+    assert done.stdout.split() == [b"False" if end == "killed" else b"True"]
+    assert check(there) == check(here)

@@ -52,14 +52,25 @@ def limits_of(settings: Settings) -> ViewLimits:
     The scanner does not see a cone below it. A wall is visible down to its foot only from outside the cone's
     radius on the floor, so that smaller distances count as too near.
     """
-    incidence, density, step = settings.most_incidence, settings.density, settings.angular_step
+    incidence, step, spacing = settings.most_incidence, settings.angular_step, most_spacing_mm(settings)
     return ViewLimits(
         max_incidence=None if incidence is None else math.radians(incidence),
         near=blind_range(settings),
-        spacing=None if density is None else density / 1000,
+        spacing=None if spacing is None else spacing / 1000,
         step=None if step is None else math.radians(step),
         rise=rise_of(settings),
     )
+
+
+def most_spacing_mm(settings: Settings) -> float | None:
+    """Return the largest distance between neighbouring points, mm; None if the angular step is not known.
+
+    Without a density it is a unit's length, so that a point falls on every unit; with the paper's rule any.
+    """
+    known = settings.angular_step is not None and settings.coverage_rule != "paper"
+    if settings.density is None and known:
+        return 1000 * settings.d_dis
+    return settings.density
 
 
 def rise_of(settings: Settings) -> float:

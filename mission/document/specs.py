@@ -10,7 +10,7 @@ from msgspec import UNSET, UnsetType
 
 from stopgo.mission import __version__
 from stopgo.mission.document import LimitsSpec, Origin, Policy, RobotSpec, Scan, ScannerSpec
-from stopgo.mission.document.limits import blind_range
+from stopgo.mission.document.limits import blind_range, most_spacing_mm
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, recorded_values
 
@@ -49,7 +49,7 @@ def limits_spec_of(settings: Settings) -> LimitsSpec | UnsetType:
     limits = {
         "max_incidence_deg": settings.most_incidence,
         "near": blind_range(settings) or None,
-        "density_mm": settings.density,
+        "density_mm": most_spacing_mm(settings),
         "wall_height": settings.wall_height,
         "views": settings.least_views if settings.least_views > 1 else None,
     }

@@ -50,6 +50,8 @@ class Simulation:
     """Minimum scanner range, along the floor."""
     step_deg: float = 0.1
     """Angle between neighbouring rays, in both directions."""
+    step_known: bool = False
+    """True if it is the scanner's or was given; else it is assumed, and the plan did not count on it."""
     noise_m: float = 0.002
     """Standard deviation of a distance."""
     height_m: float = 1.3
@@ -244,6 +246,8 @@ class PlanProof:
     network: ScanNetwork
     missed: dict[str, float]
     """Missed part of the promise, by reason."""
+    between_rays: float
+    """Acquired part of the promise that only rays aimed at it show."""
     clouds: tuple[ScanCloud, ...] = ()
     areas: tuple[ProvenArea, ...] = ()
     """By kind, if rays were cast at the model's solids."""

@@ -44,6 +44,7 @@ def proof_json(proof: PlanProof) -> dict[str, Any]:
         "rooms": [_coverage(item) for item in proof.rooms],
         "kinds": [_coverage(item) for item in proof.kinds],
         "missed": proof.missed,
+        "between_rays": round(proof.between_rays, 4),
         "stops": [msgspec.to_builtins(item) for item in proof.stops],
         "surface": _surface_json(proof.quality),
         "areas": [_area_json(item) for item in proof.areas],
@@ -133,10 +134,16 @@ def _sections(proof: PlanProof) -> Iterator[tuple[str, list[str]]]:
 
 
 def missed_words(proof: PlanProof) -> list[str]:
-    """Return the missed part of the promise by reason, and the part that was not promised."""
+    """Return the missed part of the promise by reason, that between two rays, and what was not promised."""
+    step = f"{proof.simulation.step_deg:g}°"
+    amounts = {
+        f"lie between two rays {step} apart; rays aimed at them meet them": proof.between_rays,
+        "acquired that were not promised": proof.whole.beyond,
+    }
     missed = [f"{amount:.1f} {proof.unit} missed: {reason}" for reason, amount in proof.missed.items()]
-    beyond = f"{proof.whole.beyond:.1f} {proof.unit} acquired that were not promised"
-    return [*missed, beyond] if proof.whole.beyond >= 0.05 else missed
+    return missed + [
+        f"{amount:.1f} {proof.unit} {words}" for words, amount in amounts.items() if amount >= 0.05
+    ]
 
 
 def surface_words(proof: PlanProof) -> list[str]:
@@ -230,8 +237,9 @@ def assumed_words(simulation: Simulation) -> list[str]:
         else f"walls up to {simulation.ceiling_m:g} m ({known}), openings equally high; "
         "floor and ceiling level"
     )
+    assumed = "" if simulation.step_known else " (assumed)"
     return [
-        f"rays every {simulation.step_deg:g}° to {simulation.range_m:g} m along {along}, "
+        f"rays every {simulation.step_deg:g}°{assumed} to {simulation.range_m:g} m along {along}, "
         f"noise {1000 * simulation.noise_m:g} mm",
         f"points up to {simulation.joining_m:g} m for registration",
         f"scanner level at {simulation.height_m:g} m, {cone}",

@@ -15,7 +15,16 @@ from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.mission.stages.figures import LEG_OVER_IGNORED
 from stopgo.planner.geometry.ring_index import RingIndex, areas_within
-from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, one_shape, polygon_parts, to_shape, union
+from stopgo.planner.geometry.shapes import (
+    HAIRLINE,
+    first_corner,
+    local_origin,
+    one_shape,
+    polygon_parts,
+    to_shape,
+    union,
+)
+from stopgo.planner.space.ignored_lines import over_ignored
 from stopgo.planner.space.local_shapes import ground_of, room_shapes
 from stopgo.planner.space.targets import solid_of
 
@@ -76,45 +85,6 @@ def legs_of(route: Route) -> tuple[BaseGeometry, ...]:
     legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
     lines = (leg - origin for leg in legs)
     return tuple(shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0]) for line in lines)
-
-
-def over_ignored(
-    floor: FloorPlan, legs: Sequence[BaseGeometry], *, stops: int, radius: float
-) -> Iterator[Finding]:
-    """Layers with lines that are not read, where a robot of this radius would drive over or into them.
-
-    Legs are in the local frame; those beyond the first `stops` lead back.
-    """
-    origin = local_origin(floor)
-    swept = [leg.buffer(radius) for leg in legs]
-    tree = shapely.STRtree(swept)
-    by_layer: dict[str, list[BaseGeometry]] = {}
-    for line in floor.ignored:
-        by_layer.setdefault(line.layer, []).append(shapely.LineString(line.points - origin))
-    for layer, lines in sorted(by_layer.items()):
-        line, leg = tree.query(lines, predicate="intersects")
-        if len(leg):
-            first = int(np.lexsort((line, leg))[0])
-            at = _first_corner(lines[line[first]].intersection(swept[leg[first]]), origin)
-            names = _named(sorted(set(leg.tolist())), stops)
-            message = (
-                f"the robot drives over lines on layer {layer}, which are not read: {names} "
-                f"(first at {at[0]:.2f}, {at[1]:.2f}); state their kind: {layer_option(layer)}, "
-                f"or {layer_option(layer, 'ignore')} if nothing is there"
-            )
-            yield Finding(LEG_OVER_IGNORED, message, at=at)
-
-
-def _named(legs: Sequence[int], stops: int) -> str:
-    names = [f"to stop {k + 1}" if k < stops else "back" for k in legs]
-    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
-    return f"leg{'s' * (len(names) > 1)} {', '.join(names[:4])}{more}"
-
-
-def _first_corner(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float]:
-    """The first corner of a shape, in the drawing's metres."""
-    x, y = min(map(tuple, shapely.get_coordinates(shape).tolist()))
-    return (float(x + origin[0]), float(y + origin[1]))
 
 
 def floor_of_rooms(space: NavigableSpace) -> list[float]:
@@ -201,7 +171,7 @@ def _stray_elements(floor: FloorPlan) -> Iterator[Finding]:
         away = 0.0 if shape.is_empty else float(shape.distance(outline))
         if away > STRAY:
             message = f"{item.id} lies {away:.0f} m from the floor; is it part of this storey?"
-            yield Finding("stray_element", message, item.id, _first_corner(shape, origin))
+            yield Finding("stray_element", message, item.id, first_corner(shape, origin))
 
 
 def _wall_gaps(space: NavigableSpace) -> Iterator[Finding]:

@@ -21,10 +21,10 @@ from stopgo.mission.document.specs import limits_spec_of, robot_of
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
-from stopgo.planner.appraisal.plausibility import over_ignored
 from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, holds, segments_of
 from stopgo.planner.space.gaps import CLEAR_SLACK, Walls
 from stopgo.planner.space.ground import Ground
+from stopgo.planner.space.ignored_lines import over_ignored
 from stopgo.planner.space.targets import solid_of
 
 ALLOWED = SLACK + CLEAR_SLACK

@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from stopgo.mission.console.table import duration, printable
 from stopgo.mission.document import Mission
 from stopgo.mission.document.problems import Problem
@@ -19,9 +17,15 @@ from stopgo.mission.floor import Finding, Rank
 from stopgo.mission.plan import PartPlan
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures, GroupCoverage, percent
-from stopgo.mission.stages.network import Network, network_lines, network_of, network_table
+from stopgo.mission.stages.network import (
+    CONTROL_FRAME,
+    Network,
+    frame_of,
+    network_lines,
+    network_of,
+    network_table,
+)
 from stopgo.mission.stages.seen_area import SeenSurface
-from stopgo.planner.overlap.registered import predicted_errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +135,13 @@ class PlanReport:
 
     def _error_lines(self) -> list[str]:
         """Line on the scan with the greatest predicted error in the frame of its network."""
-        if self.network is None or not self.network.overlaps:
+        errors = {stop.id: stop.error.major_m for stop in self.mission.stops if stop.error}
+        if self.network is None or not self.network.overlaps or not errors:
             return []
-        predicted = predicted_errors(self.part.route)
-        worst = int(np.argmax(np.where(np.isfinite(predicted.m), predicted.m, -1.0)))
-        at = f"{self.network.stops[worst]}: {1000 * predicted.m[worst]:.1f} mm (standard deviation)"
-        return [f"    error     predicted, in the frame of {predicted.frame}, at most at {at}"]
+        worst = max(errors, key=errors.__getitem__)
+        at = f"{worst}: {1000 * errors[worst]:.1f} mm (standard deviation)"
+        frame = frame_of(self.mission) or CONTROL_FRAME
+        return [f"    error     predicted, in the frame of {frame}, at most at {at}"]
 
     def as_text(self) -> str:
         """Return the lines for a person: the plan, its coverage, the floor left out, and the findings."""

@@ -23,10 +23,10 @@ from stopgo.mission.document import RobotSpec
 from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.routing.assemble import ROUNDING_M, ROUNDING_RAD
 from stopgo.planner.routing.roadmap import graph_of, outward_corners
-from stopgo.planner.visibility.unit_ranges import ranges
 
 ROUNDS = 40
 """Rounds in which parts of turns are lowered where a piece took less than no time."""

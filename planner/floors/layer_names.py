@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from dataclasses import dataclass
+from functools import cache
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ def reading_of(name: str) -> LayerReading | None:
 def _reading(plain: str) -> LayerReading | None:
     """Return the meaning by the first group of words that has one; within a group the last word decides."""
     for group in _GROUPS:
-        found = [(match, role) for role, pattern in group for match in pattern.finditer(plain)]
+        found = [(match, role) for role, words in group for match in any_of(words).finditer(plain)]
         if {"doors", "windows"} <= {role for _, role in found}:
             return LayerReading("openings", "words for doors and for windows")
         if found:
@@ -61,8 +62,9 @@ def _bare(text: str) -> str:
     return "".join(letter for letter in spread if not unicodedata.combining(letter))
 
 
+@cache
 def any_of(words: str) -> re.Pattern[str]:
-    """Return a pattern that matches any of the words in a plain name.
+    """Return a pattern that matches any of the words in a plain name; it is made at its first use.
 
     A word is whole, `x*` a beginning, `*x` an end; `+` joins words that follow.
     """
@@ -175,15 +177,11 @@ _FLOOR = """
 """
 
 
-def _group(*words: tuple[str, str]) -> tuple[tuple[str, re.Pattern[str]], ...]:
-    return tuple((role, any_of(listed)) for role, listed in words)
-
-
 _GROUPS = (
-    _group(("names", _ROOM_NAMES), ("rooms", _ROOM_LINES)),
-    _group(("ignore", _WRITTEN), ("ignore", _NOT_ON_THE_FLOOR)),
-    _group(("windows", _GLASS_WALLS), ("furniture", _ON_WALLS)),
-    _group(
+    (("names", _ROOM_NAMES), ("rooms", _ROOM_LINES)),
+    (("ignore", _WRITTEN), ("ignore", _NOT_ON_THE_FLOOR)),
+    (("windows", _GLASS_WALLS), ("furniture", _ON_WALLS)),
+    (
         ("railings", _RAILINGS),
         ("stairs", _STAIRS),
         ("furniture", _FURNITURE),
@@ -194,10 +192,10 @@ _GROUPS = (
         ("beams", _BEAMS),
         ("walls", _WALLS),
     ),
-    _group(("ignore", _DRAWN_OVER)),
-    _group(("rooms", _ROOMS)),
-    _group(("furniture", _PLACES)),
-    _group(("floor", _FLOOR)),
+    (("ignore", _DRAWN_OVER),),
+    (("rooms", _ROOMS),),
+    (("furniture", _PLACES),),
+    (("floor", _FLOOR),),
 )
 """Roles by words. The first group with a word of the name counts, and its last word decides.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from functools import cache
 
 _HOME = """
     BED BEDROOM* BEDRM BATH BATHROOM* BATHRM SHOWER TOILET* WC WASHROOM* KITCHEN* KITCHENETTE PANTRY LIVING
@@ -29,6 +30,7 @@ _WORK = """
 """
 
 
+@cache
 def _pattern(words: str) -> re.Pattern[str]:
     each = sorted({_bare(word) for word in words.split()})
     ends = [re.escape(word.rstrip("*")) + (r"\w*" if word.endswith("*") else "") for word in each]
@@ -41,7 +43,7 @@ def _bare(text: str) -> str:
     return "".join(letter for letter in spread if not unicodedata.combining(letter))
 
 
-_AT_HOME, _ANYWHERE = _pattern(_HOME), _pattern(_HOME + _WORK)
+_ANYWHERE = _HOME + _WORK
 _LONGEST = 60
 """Texts longer than this are notes, not names."""
 
@@ -50,4 +52,4 @@ def names_a_room(text: str, *, at_home: bool = False) -> bool:
     """Return True if a text names a room; with `at_home`, one that dwellings have, such as a kitchen."""
     if len(text) > _LONGEST:
         return False
-    return bool((_AT_HOME if at_home else _ANYWHERE).search(_bare(text)))
+    return bool(_pattern(_HOME if at_home else _ANYWHERE).search(_bare(text)))

@@ -22,6 +22,8 @@ from stopgo.planner.geometry.instance_cache import instance_cached
 
 GRID = 1e-5
 """Metres per grid step."""
+LINE_WALL = 1e-3
+"""Thickness in metres given to an occluding element that is drawn as a single line."""
 SLACK = 1e-6
 """Clearances may fall short by this much, in metres: float noise, far below any drawing's precision."""
 HAIRLINE = 4e-7
@@ -248,3 +250,15 @@ def segments_of(shape: BaseGeometry) -> FloatArray:
     coordinates = [shapely.get_coordinates(ring) for ring in rings]
     pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in coordinates]
     return np.concatenate(pairs) if pairs else np.empty((0, 2, 2))
+
+
+def face_segments(shape: BaseGeometry) -> FloatArray:
+    """Boundary segments (n, 2, 2) with the solid on the right hand, in a canonical order."""
+    segments = segments_of(shapely.orient_polygons(shape, exterior_cw=True))
+    return segments[np.lexsort(segments.reshape(-1, 4).T[::-1])]
+
+
+def first_corner(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float]:
+    """The first corner of a shape, in the drawing's metres."""
+    x, y = min(map(tuple, shapely.get_coordinates(shape).tolist()))
+    return (float(x + origin[0]), float(y + origin[1]))

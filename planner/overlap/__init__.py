@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from shapely.geometry.base import BaseGeometry
 
@@ -14,6 +15,7 @@ from stopgo.mission.stages import Candidates
 from stopgo.mission.stages.network import CONFIDENCE, FLOOR_M, NOISE_M, noise_factor
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.instance_cache import instance_cached, store
+from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.overlap.boundary import mesh_around, shown, solids_of
 from stopgo.planner.overlap.pair_kernel import firm_pairs
 from stopgo.planner.overlap.pairs import DIGITS, Overlaps, Pairs
@@ -23,6 +25,8 @@ ACCURACY_M = 0.01
 """Error that a registered pair may have, also at LEVER_M from the scanner."""
 LEAST_COMMON_M = 1.0
 """Least length of boundary in metres that both must see."""
+MANY = 5000
+"""Rows from which on two processes pair them."""
 ROUNDING = 0.5 * 10.0**-DIGITS
 """Error of a pair's rounded figures."""
 
@@ -53,9 +57,9 @@ def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
     settings, rows = candidates.settings, np.arange(len(candidates.kept))
     overlaps = Overlaps(shown(candidates, rows, only_wide=settings.least_overlap == 0))  # large, so not kept
-    kernel = compiled(firm_pairs, large=False)
-    pairs = _links(overlaps, settings) if kernel is None else links_by_kernel(kernel, overlaps, settings)
-    pairs = (tuple(ends.astype(np.int32) for ends in some) for some in pairs)  # there are millions
+    half, end = overlaps.rows // 2, overlaps.rows
+    with SideWork(lambda: _links(overlaps, settings, range(half, end)), forked=end >= MANY) as others:
+        pairs = _links(overlaps, settings, range(half)) + others.result()
     ends = tuple(np.concatenate([np.empty(0, np.int32), *ends]) for ends in zip(*pairs, strict=True))
     later = csr_array((np.ones(len(ends[0]), np.int8), ends), shape=(overlaps.rows,) * 2)
     return (later + later.T).tocsr()
@@ -78,19 +82,30 @@ def keep_pairs(candidates: Candidates, found: PairsFound) -> None:
     store(mesh_around, candidates, mesh)
 
 
-def _links(overlaps: Overlaps, settings: Settings) -> Iterator[tuple[IntArray, IntArray]]:
-    """Rows that register with later rows, and these, in numpy."""
-    for pairs in overlaps.later(least_m=LEAST_COMMON_M):
+def _links(overlaps: Overlaps, settings: Settings, rows: range) -> list[tuple[NDArray[np.int32], ...]]:
+    """Rows that register with later rows, and these, in blocks and in 32 bits: there are millions."""
+    kernel = compiled(firm_pairs, large=False)
+    if kernel is None:
+        pairs = _links_by_numpy(overlaps, settings, rows)
+    else:
+        pairs = links_by_kernel(kernel, overlaps, settings, rows)
+    return [tuple(ends.astype(np.int32) for ends in some) for some in pairs]
+
+
+def _links_by_numpy(
+    overlaps: Overlaps, settings: Settings, rows: range
+) -> Iterator[tuple[IntArray, IntArray]]:
+    for pairs in overlaps.later(rows, least_m=LEAST_COMMON_M):
         good = registers(pairs, settings)
         yield pairs.row[good], pairs.other[good]
 
 
 def links_by_kernel(
-    kernel: Callable[..., int], overlaps: Overlaps, settings: Settings
+    kernel: Callable[..., int], overlaps: Overlaps, settings: Settings, rows: range | None = None
 ) -> Iterator[tuple[IntArray, IntArray]]:
     """The same by the kernel, compiled or as written, with the rounding of the figures of a pair."""
     least = (LEAST_COMMON_M - ROUNDING, least_hold_m(settings) - ROUNDING)
-    for row, other, common in overlaps.firm(kernel, *least):
+    for row, other, common in overlaps.firm(kernel, *least, rows):
         share = np.round(common / np.minimum(overlaps.shown_m[row], overlaps.shown_m[other]), DIGITS)
         found = share >= settings.least_overlap
         yield row[found], other[found]

@@ -18,15 +18,23 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.instance_cache import instance_cached
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps, whole_steps_of
+from stopgo.planner.geometry.shapes import (
+    GRID,
+    face_segments,
+    local_origin,
+    to_grid,
+    whole_steps,
+    whole_steps_of,
+)
 from stopgo.planner.overlap.surfaces import smooth_surfaces
-from stopgo.planner.space.targets import face_segments, units_on, without_needless_vertices
+from stopgo.planner.space.targets import units_on, without_needless_vertices
 from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.sight.mesh import Mesh
 from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
-from stopgo.planner.visibility.unit_ranges import ranges, runs_of
+from stopgo.planner.visibility.unit_ranges import runs_of
 
 PIECE_M = 0.05
 """Length in metres of the boundary's pieces, independent of the plan's units."""
@@ -225,9 +233,9 @@ class _Stretches:
 
     def joined(self, face: IntArray) -> _Stretches:
         """The same pieces in as few stretches as possible, each of one `face` (pieces,), as all are here."""
-        order = np.lexsort((self.first, self.row))
-        row, first, last = self.row[order], self.first[order], self.last[order]
-        ahead = row * len(face)  # so that no piece of a row is beyond those of the next
+        ahead = self.row * len(face)  # so that no piece of a row is beyond those of the next
+        order = np.argsort(ahead + self.first, kind="stable")
+        row, first, last, ahead = self.row[order], self.first[order], self.last[order], ahead[order]
         farthest = np.maximum.accumulate(ahead + last)
         new = np.ones(len(row), dtype=bool)
         new[1:] = (np.diff(row) != 0) | (np.diff(face[first]) != 0)
@@ -332,11 +340,10 @@ def _measured(
     At distance d and incidence i points are d step / cos i apart. With h the distance from the face's line,
     this is d² step / h. Both limits on it and on i thus bound the distance from the foot of h.
     """
-    a, b = boundary.a[face], boundary.b[face]
-    along = (b - a) / np.hypot(*(b - a).T)[:, None]
-    to = xy - a
-    foot = to[:, 0] * along[:, 0] + to[:, 1] * along[:, 1]
-    height = np.abs(along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0])
+    along_x, along_y = (column[face] for column in (boundary.b - boundary.a).T / boundary.length)
+    to_x, to_y = (at - column[face] for at, column in zip(xy.T, boundary.a.T, strict=True))
+    foot = to_x * along_x + to_y * along_y
+    height = np.abs(along_x * to_y - along_y * to_x)
     dense = np.sqrt(np.maximum(0.0, height * (MOST_SPACING_M / step - height)))
     half = np.minimum(dense, height * math.tan(math.radians(MOST_INCIDENCE_DEG)))
     return foot - half, foot + half

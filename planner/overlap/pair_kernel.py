@@ -6,13 +6,16 @@ Plain functions over arrays: the same source runs interpreted and compiled, with
 
 Data
 ----
-- `pointer`, `surface`, `begin`, `end`: row r shows the stretches `pointer[r]` to `pointer[r + 1] - 1`, each
-  of a surface, from `begin` to `end` metres from the surface's start.
-- `shown_first`, `row_on`, `begin_on`, `end_on`: the same stretches by surfaces: those of surface s are
-  `shown_first[s]` to `shown_first[s + 1] - 1`, by ascending rows.
+- `pointer`, `place`, `surface`: row r shows the stretches `pointer[r]` to `pointer[r + 1] - 1`. Each has its
+  place among the stretches by surfaces, and its surface.
+- `shown_first`, `row_on`, `begin_on`, `end_on`: the stretches by surfaces: those of surface s are
+  `shown_first[s]` to `shown_first[s + 1] - 1`, by ascending rows. Each is of a row, and reaches from
+  `begin_on` to `end_on` metres from the surface's start.
 - `faces`, `around`, `along`: surface s has the faces `faces[s]` to `faces[s + 1] - 1`. If it is closed, it is
   `around[s]` metres around, else that is 0. Face f begins `along[f]` metres from its surface's start.
 - `normal_x`, `normal_y`, `arm`: of each face the normal, and the lever arm of its start about the origin.
+- `sums`: normal matrices of all that lies before both ends of each place, less the edges (12 * places,).
+- `sums_around`: the normal matrix of each closed surface (6 * surfaces,).
 - `xy`: position of each row, x and y in turn.
 - Scratch: `common` (rows,) and `moments` (6 * rows,), all 0 before and after; `touched` (rows,).
 """
@@ -22,11 +25,69 @@ from __future__ import annotations
 from typing import Any
 
 
+def sum_up(
+    edge: float, shown_first: Any, begin_on: Any, end_on: Any, faces: Any, around: Any, along: Any,
+    normal_x: Any, normal_y: Any, arm: Any, sums_before: Any, sums: Any, sums_around: Any,
+) -> None:  # fmt: skip
+    """Fill `sums` and `sums_around`, all 0 before.
+
+    `sums_before` receives the normal matrix of what lies before each face on its surface (6 * faces,).
+    """
+    for of in range(len(around)):
+        first, last = faces[of], faces[of + 1] - 1
+        for face in range(first, last):
+            for entry in range(6):
+                sums_before[6 * face + 6 + entry] = sums_before[6 * face + entry]
+            add_moments(
+                6 * face + 6, 0.0, along[face + 1] - along[face], normal_x[face], normal_y[face], arm[face],
+                sums_before,
+            )  # fmt: skip
+        if around[of] > 0.0:
+            add_before(
+                6 * of, around[of], first, last, along, normal_x, normal_y, arm, sums_before, sums_around,
+            )  # fmt: skip
+        for k in range(2 * shown_first[of], 2 * shown_first[of + 1]):
+            at = begin_on[k >> 1] + edge if k & 1 == 0 else end_on[k >> 1] - edge
+            if around[of] > 0.0 and at > around[of]:
+                at -= around[of]
+                for entry in range(6):
+                    sums[6 * k + entry] = sums_around[6 * of + entry]
+            add_before(6 * k, at, first, last, along, normal_x, normal_y, arm, sums_before, sums)
+
+
+def add_before(
+    to: int, at: float, first: int, last: int, along: Any, normal_x: Any, normal_y: Any, arm: Any,
+    sums_before: Any, sums: Any,
+) -> None:  # fmt: skip
+    """Add the normal matrix of what lies before a place on the surface of faces `first` to `last`."""
+    while first < last:  # the face of the place, by bisection
+        middle = (first + last + 1) >> 1
+        if along[middle] <= at:
+            first = middle
+        else:
+            last = middle - 1
+    for entry in range(6):
+        sums[to + entry] += sums_before[6 * first + entry]
+    add_moments(to, 0.0, at - along[first], normal_x[first], normal_y[first], arm[first], sums)
+
+
+def add_moments(at: int, a: float, b: float, x: float, y: float, arm: float, moments: Any) -> None:
+    """Add the normal matrix of a stretch of a face from a to b, about the origin and without the lever."""
+    s1, s2, s3 = b - a, (b * b - a * a) / 2, (b * b * b - a * a * a) / 3
+    turn = arm * s1 + s2
+    moments[at] += x * x * s1
+    moments[at + 1] += x * y * s1
+    moments[at + 2] += y * y * s1
+    moments[at + 3] += x * turn
+    moments[at + 4] += y * turn
+    moments[at + 5] += arm * arm * s1 + 2 * arm * s2 + s3
+
+
 def firm_pairs(
-    low: int, high: int, edge: float, least_stretch: float, least: float, hold: float, lever: float,
-    pointer: Any, surface: Any, begin: Any, end: Any, shown_first: Any, row_on: Any, begin_on: Any,
-    end_on: Any, faces: Any, around: Any, along: Any, normal_x: Any, normal_y: Any, arm: Any,
-    xy: Any, common: Any, moments: Any, touched: Any, out_row: Any, out_other: Any, out_common: Any,
+    low: int, high: int, least_stretch: float, least: float, hold: float, lever: float, pointer: Any,
+    place: Any, surface: Any, shown_first: Any, row_on: Any, begin_on: Any, end_on: Any, around: Any,
+    sums: Any, sums_around: Any, xy: Any, common: Any, moments: Any, touched: Any, out_row: Any,
+    out_other: Any, out_common: Any,
 ) -> int:  # fmt: skip
     """Pair the rows from `low` to below `high` with all later rows; return the number of pairs.
 
@@ -38,8 +99,8 @@ def firm_pairs(
         count = 0
         for own in range(pointer[row], pointer[row + 1]):
             count = add_stretch(
-                own, row, count, edge, least_stretch, surface, begin, end, shown_first, row_on, begin_on,
-                end_on, faces, around, along, normal_x, normal_y, arm, common, moments, touched,
+                place[own], shown_first[surface[own] + 1], count, least_stretch, around[surface[own]],
+                6 * surface[own], row_on, begin_on, end_on, sums, sums_around, common, moments, touched,
             )  # fmt: skip
         for k in range(count):
             other = touched[k]
@@ -59,83 +120,46 @@ def firm_pairs(
 
 
 def add_stretch(
-    own: int, row: int, count: int, edge: float, least_stretch: float, surface: Any, begin: Any, end: Any,
-    shown_first: Any, row_on: Any, begin_on: Any, end_on: Any, faces: Any, around: Any, along: Any,
-    normal_x: Any, normal_y: Any, arm: Any, common: Any, moments: Any, touched: Any,
+    own: int, last: int, count: int, least_stretch: float, lap: float, turn: int, row_on: Any, begin_on: Any,
+    end_on: Any, sums: Any, sums_around: Any, common: Any, moments: Any, touched: Any,
 ) -> int:  # fmt: skip
-    """Add what later rows see of a stretch; return the number of rows `touched` so far."""
-    of = surface[own]
-    first, last = shown_first[of], shown_first[of + 1]
-    while first < last:  # the first stretch of a later row, by bisection
-        middle = (first + last) >> 1
-        if row_on[middle] <= row:
-            first = middle + 1
-        else:
-            last = middle
-    lap, low, high = around[of], begin[own], end[own]
-    for place in range(first, shown_first[of + 1]):
-        ahead = -lap  # on a closed surface also one way around before, and after
-        while ahead <= lap:
-            a, b = max(low, begin_on[place] + ahead), min(high, end_on[place] + ahead)
+    """Add what later rows, from the place `own` to below `last`, see of a stretch.
+
+    Return the number of rows `touched` so far.
+    """
+    low, high = begin_on[own], end_on[own]
+    most = 1 if 0.0 < lap < high else 0
+    for place in range(own + 1, last):
+        other = row_on[place]
+        if other == row_on[own]:
+            continue
+        least = -1 if 0.0 < lap < end_on[place] else 0
+        for laps in range(least, most + 1):  # ways around a closed surface by which the other is ahead
+            ahead = laps * lap
+            a, b = begin_on[place] + ahead, end_on[place] + ahead
+            first, end, added = 12 * place, 12 * place + 6, 0
+            if low >= a:
+                a, first, added = low, 12 * own, laps
+            if high <= b:
+                b, end, added = high, 12 * own + 6, added - laps
             if b - a > least_stretch:
-                other = row_on[place]
                 if common[other] == 0.0:
                     touched[count] = other
                     count += 1
                 common[other] += b - a
-                add_common(
-                    6 * other, a + edge, b - edge, lap, faces[of], faces[of + 1], along, normal_x,
-                    normal_y, arm, moments,
-                )  # fmt: skip
-            if lap == 0.0:
-                break
-            ahead += lap
+                add_common(6 * other, first, end, added, turn, sums, sums_around, moments)
     return count
 
 
 def add_common(
-    at: int, a: float, b: float, lap: float, first: int, last: int, along: Any, normal_x: Any,
-    normal_y: Any, arm: Any, moments: Any,
+    at: int, first: int, end: int, added: int, turn: int, sums: Any, sums_around: Any, moments: Any
 ) -> None:  # fmt: skip
-    """Add the normal matrix of a stretch, which may go on beyond the start of a closed surface."""
-    if lap > 0.0 and b > lap:
-        add_faces(at, max(a - lap, 0.0), b - lap, first, last, along, normal_x, normal_y, arm, moments)
-        b = lap
-    if a < b:
-        add_faces(at, a, b, first, last, along, normal_x, normal_y, arm, moments)
-
-
-def add_faces(
-    at: int, a: float, b: float, first: int, last: int, along: Any, normal_x: Any, normal_y: Any, arm: Any,
-    moments: Any,
-) -> None:  # fmt: skip
-    """Add the normal matrix of a stretch of the surface of the faces from `first` to below `last`."""
-    high = last
-    while high - first > 1:  # the face in which the stretch begins, by bisection
-        middle = (first + high) >> 1
-        if along[middle] <= a:
-            first = middle
-        else:
-            high = middle
-    while first < last - 1 and along[first + 1] < b:
-        a, length = a - along[first], along[first + 1] - along[first]
-        add_moments(at, a, length, normal_x[first], normal_y[first], arm[first], moments)
-        first += 1
-        a = along[first]
-    a, b = a - along[first], b - along[first]
-    add_moments(at, a, b, normal_x[first], normal_y[first], arm[first], moments)
-
-
-def add_moments(at: int, a: float, b: float, x: float, y: float, arm: float, moments: Any) -> None:
-    """Add the normal matrix of a stretch of a face from a to b, about the origin and without the lever."""
-    s1, s2, s3 = b - a, (b * b - a * a) / 2, (b * b * b - a * a * a) / 3
-    turn = arm * s1 + s2
-    moments[at] += x * x * s1
-    moments[at + 1] += x * y * s1
-    moments[at + 2] += y * y * s1
-    moments[at + 3] += x * turn
-    moments[at + 4] += y * turn
-    moments[at + 5] += arm * arm * s1 + 2 * arm * s2 + s3
+    """Add the normal matrix of what lies between two of the `sums`, and `added` times the way around."""
+    for entry in range(6):
+        moments[at + entry] += sums[end + entry] - sums[first + entry]
+    if added != 0:
+        for entry in range(6):
+            moments[at + entry] += added * sums_around[turn + entry]
 
 
 def holds(moments: Any, at: int, x: float, y: float, hold: float, lever: float) -> bool:

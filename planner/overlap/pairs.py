@@ -11,14 +11,16 @@ weakest direction is NOISE_M / √hold_m, by independent errors along the walls,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.overlap.boundary import EDGE_M, WIDER_M, Boundary, ShownBoundary
-from stopgo.planner.visibility.unit_ranges import ranges
+from stopgo.planner.overlap.pair_kernel import sum_up
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A rotation counts as its displacement at this distance: 0.1° as much as 1 cm, the tolerance of each."""
@@ -72,35 +74,39 @@ class Overlaps:
             self._by_row[row] = self._pairs(np.array([row]), np.array([0]))
         return self._by_row[row]
 
-    def later(self, *, least_m: float = 0.0) -> Iterator[Pairs]:
-        """All rows with every later row that has at least so much boundary in common, in blocks.
+    def later(self, some: range | None = None, *, least_m: float = 0.0) -> Iterator[Pairs]:
+        """Some or all rows with every later row that has at least so much boundary in common, in blocks.
 
         They are not cached, since a large floor would take gigabytes.
         """
-        for begin in range(0, self.rows, BLOCK):
-            rows = np.arange(begin, min(begin + BLOCK, self.rows))
+        some = range(self.rows) if some is None else some
+        for begin in some[::BLOCK]:
+            rows = np.arange(begin, min(begin + BLOCK, some.stop))
             yield self._pairs(rows, rows + 1, least_m=least_m)
 
     def firm(
-        self, kernel: Callable[..., int], least_m: float, hold_m: float
+        self, kernel: Callable[..., int], least_m: float, hold_m: float, some: range | None = None
     ) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
-        """Pairs with so much boundary in common and more strength: rows, later rows, and metres in common."""
+        """Pairs with so much boundary in common and more strength: rows, later rows, and metres in common.
+
+        They are those of some of the rows, or of all.
+        """
         seen, rows = self._seen, self.rows
-        normal, arm = seen.boundary.normals
-        edges = np.arange(len(seen.boundary.first) + 1)
-        first = np.searchsorted(seen.surface[self._order], edges)
-        faces = np.append(seen.boundary.first, len(arm))
-        on = (values[self._order] for values in (self._row, seen.begin, seen.end))
-        shown = (seen.pointer, seen.surface, seen.begin, seen.end, first, *on, faces)
+        first = np.searchsorted(seen.surface[self._order], np.arange(len(seen.boundary.first) + 1))
+        row_on, begin, end = self._row[self._order], seen.begin[self._order], seen.end[self._order]
+        sums = _sums_before(seen.boundary, first, begin, end)
+        place = np.empty_like(self._order)
+        place[self._order] = np.arange(len(place))
         scratch = np.zeros(rows), np.zeros(6 * rows), np.zeros(rows, np.int64)
-        along, xy = np.ascontiguousarray(seen.boundary.along), np.ascontiguousarray(seen.xy).ravel()
-        data = (*shown, seen.boundary.around, along, *normal.T.copy(), arm, xy, *scratch)
-        limits = (EDGE_M, WIDER_M, least_m, hold_m, LEVER_M)
-        for low in range(0, rows, BLOCK):
-            high = min(low + BLOCK, rows)
+        xy = np.ascontiguousarray(seen.xy).ravel()
+        shown = (seen.pointer, place, seen.surface, first, row_on, begin, end)
+        data = (*shown, seen.boundary.around, *sums, xy, *scratch)
+        some = range(rows) if some is None else some
+        for low in some[::BLOCK]:
+            high = min(low + BLOCK, some.stop)
             size = (high - low) * (rows - low)
             row, other, common = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
-            many = kernel(low, high, *limits, *data, row, other, common)
+            many = kernel(low, high, WIDER_M, least_m, hold_m, LEVER_M, *data, row, other, common)
             yield row[:many].copy(), other[:many].copy(), common[:many].copy()
 
     def middle_of_common(self, row: int, other: int) -> FloatArray:
@@ -120,13 +126,20 @@ class Overlaps:
 
     def normal_matrix(self, row: int, other: int) -> FloatArray:
         """N of a pair about the local origin (3, 3), without the lever."""
-        _, there, begin, end = self._common(np.array([row]), np.array([0]))
-        own = self._row[there] == other
-        index = np.zeros(int(own.sum()), dtype=np.int64)
-        found: FloatArray = self._moments(
-            self._seen.surface[there[own]], begin[own] + EDGE_M, end[own] - EDGE_M, index, 1
-        )[0]
+        found: FloatArray = self.normal_matrices([(row, other)])[0]
         return found
+
+    def normal_matrices(self, pairs: Sequence[tuple[int, int]]) -> FloatArray:
+        """N of different pairs of rows about the local origin (n, 3, 3), without the lever."""
+        key = np.array([row * self.rows + other for row, other in pairs], dtype=np.int64)
+        order, rows = np.argsort(key), np.unique(key // max(1, self.rows))
+        mine, there, begin, end = self._common(rows, np.zeros(len(rows), np.int64))
+        of = self._row[mine] * self.rows + self._row[there]
+        place = np.searchsorted(key, of, sorter=order)
+        asked = np.flatnonzero(np.isin(of, key))
+        there, index = there[asked], order[place[asked]]
+        begin, end = begin[asked] + EDGE_M, end[asked] - EDGE_M
+        return self._moments(self._seen.surface[there], begin, end, index, len(key))
 
     def weakest_move(self, row: int, other: int) -> FloatArray:
         """Small move (x, y, rotation times LEVER_M) of a row that a pair resists least, unit length (3,)."""
@@ -176,6 +189,19 @@ class Overlaps:
         for (i, j), entry in zip(ENTRIES, entries, strict=True):
             found[:, i, j] = found[:, j, i] = np.bincount(index, entry, many)
         return found
+
+
+def _sums_before(
+    boundary: Boundary, first: IntArray, begin: FloatArray, end: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Normal matrices before both ends of stretches by surfaces, and of closed surfaces, for the kernel."""
+    normal, arm = boundary.normals
+    faces, along = np.append(boundary.first, len(arm)), np.ascontiguousarray(boundary.along)
+    before, sums, around = (np.zeros(6 * size) for size in (len(arm), 2 * len(begin), len(boundary.first)))
+    shape = (faces, boundary.around, along, *normal.T.copy(), arm)
+    kernel: Callable[..., None] = compiled(sum_up, large=False) or sum_up
+    kernel(EDGE_M, first, begin, end, *shape, before, sums, around)
+    return sums, around
 
 
 def _with_laps(seen: ShownBoundary, mine: IntArray, there: IntArray) -> tuple[IntArray, IntArray, FloatArray]:

@@ -39,12 +39,10 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     overlaps, settings = _overlaps_of_stops(route), _settings(route)
     names = stop_names(overlaps.rows)
     found = []
-    for k in range(overlaps.rows):
-        pairs = overlaps.of(k)
+    for pairs in overlaps.later():
         for at in registers(pairs, settings):
-            if (later := int(pairs.other[at])) > k:
-                figures = (float(values[at]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
-                found.append(Overlap(names[k], names[later], *map(rounded, figures)))
+            figures = (float(values[at]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
+            found.append(Overlap(names[pairs.row[at]], names[pairs.other[at]], *map(rounded, figures)))
     return tuple(found)
 
 
@@ -71,7 +69,10 @@ def predicted_errors(route: Route) -> PredictedErrors:
     ends = [(number[pair.a], number[pair.b]) for pair in registered_pairs(route)]
     xy = route.xy - local_origin(route.space.floor)
     noise = noise_factor(_settings(route).range_noise)
-    information = [information_of(overlaps.normal_matrix(a, b), xy[b], noise) for a, b in ends]
+    matrices = overlaps.normal_matrices(ends)
+    information = [
+        information_of(matrix, xy[b], noise) for matrix, (_, b) in zip(matrices, ends, strict=True)
+    ]
     covariances, frame = network_errors(xy, ends, information, seen_control(route.space, xy))
     ellipses = error_ellipses(covariances)
     return PredictedErrors(ellipses, CONTROL_FRAME if frame is None else stops[frame])

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
+    from stopgo.mission.geometry import IntArray
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
     from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
@@ -59,11 +60,10 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
     from stopgo.planner.routing import route
 
-    seen = _seen(found, observe)
     settings = found.space.settings
-    with _Prepared(seen, planned) as prepared, _later_bound(seen) as later:
+    with _seen(found, planned, observe) as (seen, prepared), _later_bound(seen) as later:
         selection = _selected(seen, later)
-        prepared.keep_mesh()
+        prepared.keep_graph()
         driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
         observe(selection if driven is None else driven.selection)
         driven = driven or route(selection)
@@ -75,8 +75,14 @@ MANY = 5000
 """Candidates from which work that nothing waits for yet is done in a process of its own."""
 
 
-def _seen(found: Candidates, observe: Observe) -> Visibility:
-    """Return the visibility of the candidates; the pairs of many that register are found meanwhile."""
+@contextmanager
+def _seen(
+    found: Candidates, planned: frozenset[int], observe: Observe
+) -> Iterator[tuple[Visibility, _Prepared]]:
+    """Yield the visibility of the candidates, and results that need no stops.
+
+    The pairs of many that register are found meanwhile.
+    """
     from stopgo.planner.geometry.side_work import SideWork
     from stopgo.planner.overlap import keep_pairs, pairs_found
     from stopgo.planner.selection import cover_problem
@@ -85,13 +91,17 @@ def _seen(found: Candidates, observe: Observe) -> Visibility:
     observe(found)
     settings = found.settings
     many = len(found.kept) >= MANY and settings.registers and settings.fov >= 360  # else with headings
-    with SideWork(lambda: pairs_found(found), forked=many) as pairs:
-        seen = visibility(found)
-        observe(seen)
-        if many:
-            cover_problem(seen)  # kept for the selection, and made while the pairs are found
-            keep_pairs(seen.candidates, pairs.result())
-    return seen
+    with ExitStack() as after:
+        with SideWork(lambda: pairs_found(found), forked=many) as pairs:
+            seen = visibility(found)
+            observe(seen)
+            if many:
+                cover_problem(seen)  # kept for the selection, and made while the pairs are found
+            prepared = after.enter_context(_Prepared(seen, planned))
+            if many:
+                keep_pairs(seen.candidates, pairs.result())
+        del pairs  # and what it holds
+        yield seen, prepared
 
 
 class _Prepared:
@@ -109,22 +119,23 @@ class _Prepared:
     def __exit__(self, *error: Any) -> None:
         self._work.__exit__(*error)
 
-    def _found(self) -> tuple[FiguresBefore, Mesh | None]:
+    def _found(self) -> tuple[FiguresBefore, tuple[Mesh, IntArray] | None]:
         from stopgo.planner.appraisal.figures_of_route import FiguresBefore
-        from stopgo.planner.routing.roadmap import drive_mesh
+        from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
 
         space = self._seen.space
         needed = self._seen.rows >= MANY and space.settings.graph == "exact"
-        return FiguresBefore.of(self._seen, self._planned), drive_mesh(space) if needed else None
+        figures = FiguresBefore.of(self._seen, self._planned)
+        return figures, (drive_mesh(space), corner_pieces(space)) if needed else None
 
-    def keep_mesh(self) -> None:
-        """Keep the mesh for the route, if another process has made it."""
+    def keep_graph(self) -> None:
+        """Keep the mesh and the pieces between corners for the route, if another process has found them."""
         from stopgo.planner.geometry.instance_cache import store
-        from stopgo.planner.routing.roadmap import drive_mesh
+        from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
 
-        mesh = self._work.result()[1] if self._work.is_apart else None
-        if mesh is not None:
-            store(drive_mesh, self._seen.space, mesh)
+        if self._work.is_apart and (graph := self._work.result()[1]):
+            store(drive_mesh, self._seen.space, graph[0])
+            store(corner_pieces, self._seen.space, graph[1])
 
     def figures(self, route: Route) -> FiguresBefore:
         """The figures that need no route, of the visibility that it has."""
@@ -196,10 +207,9 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     from stopgo.planner.appraisal.figures_of_route import figures_of_share
     from stopgo.planner.routing.assemble import assemble
 
-    seen = _seen(found, observe)
-    with _Prepared(seen, planned) as prepared:
+    with _seen(found, planned, observe) as (seen, prepared):
         selection = _selected(seen)
-        prepared.keep_mesh()
+        prepared.keep_graph()
         driven, division = _divided(selection)
         observe(driven.selection)
         observe(driven)

@@ -1,4 +1,4 @@
-"""Dijkstra's search from one point of a graph, as far as its nearest points or one other point.
+"""Dijkstra's search from one point of a graph, as far as its nearest points, one other or all points.
 
 Plain functions over lists or arrays: the same source runs interpreted and compiled, with the types of
 `dijkstra_kernel_compiled.pxd`. Lengths are floating-point numbers. They are added along each path from its
@@ -16,6 +16,9 @@ Data, for n nodes, of which the first are the points
 from __future__ import annotations
 
 from typing import Any
+
+MOST = 1e300
+"""Metres that no path has."""
 
 
 def reach(
@@ -91,3 +94,54 @@ def pop(size: int, key: Any, item: Any) -> int:
     if size > 0:
         key[at], item[at] = value, node
     return size
+
+
+def find_lengths(
+    source: int, points: int, first: Any, to: Any, length: Any, away: Any, queue: Any, place: Any
+) -> None:
+    """Find the lengths of the shortest paths from one point to all points.
+
+    `away`, infinite before, receives them, and upper bounds for other nodes. Each node is once in the heap
+    `queue`, at its `place`, and four nodes follow each.
+    """
+    away[source], queue[0], size, left = 0.0, source, 1, points
+    while size > 0 and left > 0:
+        here = queue[0]
+        size -= 1
+        sink(queue[size], size, away, queue, place)
+        left -= here < points
+        for edge in range(first[here], first[here + 1]):
+            there = to[edge]
+            total = away[here] + length[edge]
+            if total < away[there]:
+                if away[there] > MOST:
+                    place[there] = size
+                    size += 1
+                away[there] = total
+                rise(there, away, queue, place)
+
+
+def rise(node: int, away: Any, queue: Any, place: Any) -> None:
+    """Move a node towards the head of the queue, from its place or the end."""
+    at = place[node]
+    while at > 0 and away[queue[(at - 1) >> 2]] > away[node]:
+        queue[at] = queue[(at - 1) >> 2]
+        place[queue[at]] = at
+        at = (at - 1) >> 2
+    queue[at], place[node] = node, at
+
+
+def sink(node: int, size: int, away: Any, queue: Any, place: Any) -> None:
+    """Put a node in the place of the head of the queue, and move it behind all nearer nodes."""
+    at = 0
+    while 4 * at + 1 < size:
+        best = 4 * at + 1
+        for below in range(4 * at + 2, min(4 * at + 5, size)):
+            if away[queue[below]] < away[queue[best]]:
+                best = below
+        if away[queue[best]] >= away[node]:
+            break
+        queue[at] = queue[best]
+        place[queue[at]] = at
+        at = best
+    queue[at], place[node] = node, at

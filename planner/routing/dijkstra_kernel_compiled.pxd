@@ -23,3 +23,19 @@ cdef whole push(whole size, double value, whole node, double[::1] key, whole[::1
 
 @cython.locals(at=whole, below=whole, node=whole, value=double)
 cdef whole pop(whole size, double[::1] key, whole[::1] item) noexcept nogil
+
+cdef double MOST
+
+@cython.locals(edge=whole, here=whole, left=whole, size=whole, there=whole, total=double)
+cpdef void find_lengths(
+    whole source, whole points, const whole[::1] first, const whole[::1] to, const double[::1] length,
+    double[::1] away, whole[::1] queue, whole[::1] place
+) noexcept nogil
+
+@cython.locals(at=whole)
+cdef void rise(whole node, const double[::1] away, whole[::1] queue, whole[::1] place) noexcept nogil
+
+@cython.locals(at=whole, below=whole, best=whole)
+cdef void sink(
+    whole node, whole size, const double[::1] away, whole[::1] queue, whole[::1] place
+) noexcept nogil

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -10,10 +11,16 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import SLACK
+from stopgo.planner.geometry.side_work import SideWork
+from stopgo.planner.routing.dijkstra_kernel import find_lengths
 
 CHUNK = 256
 """Points whose distances to all nodes are in memory at a time."""
+MANY = 20_000_000
+"""Pieces in all searches together from which on two processes search."""
 MOST_KEPT = 32_000_000
 """Nodes of all the trees of paths that are kept, 128 MB."""
 
@@ -50,17 +57,29 @@ class Paths:
             return kept
         again = start in self._trees and len(self.xy) * len(self._trees) <= MOST_KEPT
         limit = np.inf if again else float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
-        found: IntArray = dijkstra(self.graph, False, start, return_predecessors=True, limit=limit)[1]
+        found: IntArray = dijkstra(self._both_ways, True, start, return_predecessors=True, limit=limit)[1]
         self._trees[start] = found if again else None
         return found
+
+    @cached_property
+    def _both_ways(self) -> csr_array:
+        """The graph with each piece in both directions, those to higher nodes first, as scipy takes them."""
+        back = self.graph.T.tocsr()
+        first = self.graph.indptr + back.indptr
+        ahead, many = ranges(first[:-1], np.diff(self.graph.indptr)), first[-1]
+        after = np.delete(np.arange(many), ahead)
+        to, length = np.empty(many, dtype=first.dtype), np.empty(many)
+        for place, half in ((ahead, self.graph), (after, back)):
+            to[place], length[place] = half.indices, half.data
+        return csr_array((length, to, first), shape=self.graph.shape)
 
     def before(self, points: IntArray) -> IntArray:
         """The node before each node on its shortest path from each of these points (n, nodes)."""
         kept = [self._trees.get(point) for point in points.tolist()]
         if any(tree is None for tree in kept):
-            found: IntArray = dijkstra(self.graph, False, points, return_predecessors=True, limit=self.limit)[
-                1
-            ]
+            found: IntArray = dijkstra(
+                self._both_ways, True, points, return_predecessors=True, limit=self.limit
+            )[1]
             return found
         return np.array(kept)
 
@@ -85,15 +104,38 @@ def shortest_paths(
     metres, are not found.
     """
     graph, kept = edge_lengths(xy, edges), {}
+    if not trees or points * len(xy) > MOST_KEPT:
+        return Paths(frozen(xy), frozen(_lengths(graph, points, limit)), graph, limit=limit)
     lengths = np.empty((points, points))
     for chunk in np.split(np.arange(points), range(CHUNK, points, CHUNK)):
-        if trees and points * len(xy) <= MOST_KEPT:
-            away, before = dijkstra(graph, False, chunk, return_predecessors=True, limit=limit)
-            kept.update(zip(chunk.tolist(), before, strict=True))
-        else:
-            away = dijkstra(graph, False, chunk, limit=limit)
+        away, before = dijkstra(graph, False, chunk, return_predecessors=True, limit=limit)
+        kept.update(zip(chunk.tolist(), before, strict=True))
         lengths[chunk] = away[:, :points]
-    return Paths(xy=frozen(xy), lengths=frozen(lengths), graph=graph, limit=limit, _trees=kept)
+    return Paths(frozen(xy), frozen(lengths), graph, limit=limit, _trees=kept)
+
+
+def _lengths(graph: csr_array, points: int, limit: float) -> FloatArray:
+    """Lengths of the paths between the first points (points, points); a second process finds half of many."""
+    kernel = compiled(find_lengths, large=False)
+    if kernel is None or np.isfinite(limit):
+        chunks = np.split(np.arange(points), range(CHUNK, points, CHUNK))
+        return np.concatenate([dijkstra(graph, False, chunk, limit=limit)[:, :points] for chunk in chunks])
+    both = (graph + graph.T).tocsr()
+    pieces = (both.indptr.astype(np.int64), both.indices.astype(np.int64), both.data)
+
+    def found_from(sources: range) -> FloatArray:
+        lengths, away = np.empty((len(sources), points)), np.empty(graph.shape[0])
+        queue, place = (np.zeros(len(away), dtype=np.int64) for _ in range(2))
+        for k, source in enumerate(sources):
+            away[:] = np.inf
+            kernel(source, points, *pieces, away, queue, place)
+            lengths[k] = away[:points]
+        return lengths
+
+    half = points // 2
+    many = points * graph.nnz >= MANY
+    with SideWork(lambda: found_from(range(half, points)), forked=many) as others:
+        return np.concatenate([found_from(range(half)), others.result()])
 
 
 def edge_lengths(xy: FloatArray, edges: IntArray) -> csr_array:

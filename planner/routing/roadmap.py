@@ -115,6 +115,14 @@ def drive_mesh(space: NavigableSpace) -> Mesh:
     return mesh_of(whole_steps(_drive_area(space)))
 
 
+@instance_cached
+def corner_pieces(space: NavigableSpace) -> IntArray:
+    """Pairs (m, 2) of mutually visible corners that may be a straight piece of a shortest path."""
+    corners = outward_corners(space)
+    found = straight_pieces(drive_mesh(space), corners.xy, np.arange(len(corners.xy)), corners.sides)
+    return _tangent(found, corners.xy, corners.sides)
+
+
 def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntArray:
     """Links (k, 2) from points that lie on a gap crossing, such as stops in doorways, to its ends."""
     if not len(links):
@@ -134,7 +142,8 @@ def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first
     sides = np.zeros((len(nodes), 2, 2))
     of_corners = np.arange(first, first + len(corners.xy))
     sides[of_corners] = corners.sides
-    return _tangent(straight_pieces(drive_mesh(space), nodes, of_corners, corners.sides), nodes, sides)
+    some = straight_pieces(drive_mesh(space), nodes, of_corners, corners.sides, between_corners=False)
+    return np.concatenate([_tangent(some, nodes, sides), first + corner_pieces(space)])
 
 
 def _tangent(edges: IntArray, nodes: FloatArray, sides: FloatArray) -> IntArray:

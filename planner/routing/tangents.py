@@ -23,16 +23,21 @@ ROOM = 16
 """Nodes per view for which there is room at first."""
 
 
-def straight_pieces(mesh: Mesh, nodes: FloatArray, corners: IntArray, sides: FloatArray) -> IntArray:
+def straight_pieces(
+    mesh: Mesh, nodes: FloatArray, corners: IntArray, sides: FloatArray, *, between_corners: bool = True
+) -> IntArray:
     """Pairs (m, 2) of nodes (n, 2), local metres, between which a piece may lead; some are there repeatedly.
 
     The nodes `corners` (c,) are vertices of the mesh. Their `sides` (c, 2, 2) are the vectors to the previous
-    and to the next corner, zero where a path may pass in any direction.
+    and to the next corner, zero where a path may pass in any direction. Pieces between two corners that have
+    sides are left out unless `between_corners`.
     """
     at, to_sides = to_grid(nodes), to_grid(sides)
     looking = to_sides.any(axis=(1, 2))
     bent = corners[looking]
     all_round = np.setdiff1d(np.arange(len(nodes)), bent)
+    looking &= between_corners
+    bent = bent[: np.count_nonzero(looking)]
     viewer = np.concatenate([all_round, bent, bent])
     right, left = limits_of(at[bent], to_sides[looking])
     number = len(mesh.vertices) + np.arange(len(right))

@@ -76,6 +76,15 @@ class ModelScene:
         slope = np.abs(np.einsum("ij,ij->i", self._normal[met], directions))
         return self._away(met, origins, directions), np.where(met == NONE, 1.0, slope)
 
+    def reached(self, position: FloatArray, towards: FloatArray, normal: FloatArray) -> BoolArray:
+        """True for points (n, 3), from a position, at which a ray meets their surfaces of these normals."""
+        far = np.linalg.norm(towards, axis=1)
+        directions = towards / np.maximum(far, 1e-9)[:, None]
+        away = self.away(np.broadcast_to(position, directions.shape), directions)
+        cosine = np.abs(np.einsum("ij,ij->i", directions, normal))
+        found: BoolArray = np.abs(away - far) * cosine <= ON_SURFACE_M
+        return found
+
     def existing(self, strips: Strips) -> BoolArray:
         """True for cells that have a surface in the model (cells,): no opening of the wall is there."""
         found = np.zeros(strips.cells, dtype=bool)
@@ -130,9 +139,8 @@ def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulati
     far = np.linalg.norm(towards, axis=1)
     directions = towards / np.maximum(far, 1e-9)[:, None]
     cosine = np.abs(np.einsum("ij,ij->i", directions, strips.normal))
-    cell = np.flatnonzero(_within(towards, far, pose, simulation) & (cosine > 1e-3))
-    away = scene.away(np.broadcast_to(pose.position, (len(cell), 3)), directions[cell])
-    on = np.abs(away - far[cell]) * cosine[cell] <= ON_SURFACE_M
+    cell = np.flatnonzero(in_reach(towards, pose, simulation) & (cosine > 1e-3))
+    on = scene.reached(pose.position, towards[cell], strips.normal[cell])
     width = _widths(strips, cell)
     columns = _columns_on(towards[cell], strips.normal[cell], width, pose, simulation)
     on &= columns > 0
@@ -176,10 +184,10 @@ def _columns_on(
     return np.where(level > UPRIGHT, count, 1)
 
 
-def _within(towards: FloatArray, far: FloatArray, pose: ScannerPose, simulation: Simulation) -> BoolArray:
+def in_reach(towards: FloatArray, pose: ScannerPose, simulation: Simulation) -> BoolArray:
     """True for cells in the scanner's range, field of view and above its blind cone."""
     level = np.hypot(towards[:, 0], towards[:, 1])
-    reach = far if simulation.slant else level
+    reach = np.linalg.norm(towards, axis=1) if simulation.slant else level
     aside = np.arctan2(towards[:, 1], towards[:, 0]) - pose.heading
     turned = np.abs(np.remainder(aside + np.pi, 2 * np.pi) - np.pi)
     steepest = math.radians(90 - simulation.cone_deg / 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -14,12 +14,12 @@ import shapely
 from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.document.limits import limits_of, section_height
+from stopgo.mission.document.limits import ViewLimits, limits_of, section_height
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.floor.model_solids import ModelSolids
-from stopgo.mission.geometry import BoolArray, FloatArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import (
     CloudQuality,
     PlanProof,
@@ -37,6 +37,7 @@ from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
 from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model, sloped
+from stopgo.planner.scan_simulation.narrow_units import Reaching, aimed_scan
 from stopgo.planner.scan_simulation.registration import OrientedCloud, registered, surface_of
 from stopgo.planner.scan_simulation.scan_network import scan_network
 from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, pose_of, scanned, scene_at
@@ -187,6 +188,12 @@ class _ScanSite:
             return scanned(scene, self.strips, pose, self.simulation)
         return scanned_model(self.scene, self.strips, pose, self.simulation)
 
+    def reaching(self, scene: SolidScene, pose: ScannerPose) -> Reaching:
+        """The test if rays from a pose reach points, at the same solids."""
+        if self.scene is None:
+            return lambda towards, normal: scene.unobstructed(towards)
+        return partial(self.scene.reached, pose.position)
+
     def pose_of(self, stop: Stop, number: int) -> ScannerPose:
         """The scanner's pose at a stop."""
         pose = pose_of(stop, origin=self.solids.origin, height=self.simulation.height_m, number=number)
@@ -204,7 +211,9 @@ def _scans(
         say(f"scanning from {stop.id}, {len(clouds) + 1} of {len(poses)}")
         scene = scene_at(site.solids, pose)
         scan = site.scanned(scene, pose)
-        tally.take(scan, _sighted(site, scene, pose))
+        sighted = _sighted(site, scene, pose)
+        narrow = _narrow(site, pose, sighted & ~tally.take(scan, sighted))
+        tally.take_aimed(aimed_scan(narrow, site.strips, pose, site.simulation, site.reaching(scene, pose)))
         surfaces.append(surface_of(scan.cloud, site.simulation))
         clouds.append(ScanCloud(stop.id, _drawn(pose, scan, MOST_DRAWN // len(poses), ceiling, origin)))
     return surfaces, clouds
@@ -220,7 +229,8 @@ def _proof(
 ) -> PlanProof:
     """The result of the simulation: what was promised, what was acquired, and how scans register."""
     settings = site.space.settings
-    seen = frozen(tally.views >= np.clip(tally.sights, 1, settings.least_views), np.bool_)
+    needed = np.clip(tally.sights, 1, settings.least_views)
+    seen = frozen(tally.views + tally.aimed_views >= needed, np.bool_)
     return PlanProof(
         mission=mission,
         simulation=site.simulation,
@@ -229,6 +239,7 @@ def _proof(
         promised=promise.units,
         grain=float(promise.weight.max()),
         missed=promise.missed(seen, frozen(tally.sights > 0, np.bool_)),
+        between_rays=promise.amount(seen & (tally.views < needed)),
         unit="units" if settings.coverage_rule == "paper" else "m",
         whole=promise.whole(seen),
         rooms=promise.rooms(seen),
@@ -274,6 +285,8 @@ class _PointTally:
         self._step = math.radians(simulation.step_deg)
         self.views = np.zeros(len(strips.low), np.int16)
         """Stops that show each unit as well as required (units,)."""
+        self.aimed_views = np.zeros(len(strips.low), np.int16)
+        """Stops that show it only by rays aimed at it (units,)."""
         self._spacing = np.full(strips.cells, np.inf)
         self._points = np.zeros(strips.cells)
         self._stops = np.zeros(strips.cells, np.int16)
@@ -283,7 +296,8 @@ class _PointTally:
         self.of_stop: list[tuple[int, int, int]] = []
         """Visible units, units with points, and points of each scan."""
 
-    def take(self, scan: ScanCount, sighted: BoolArray) -> None:
+    def take(self, scan: ScanCount, sighted: BoolArray) -> BoolArray:
+        """Count a scan; true for each unit that it shows as required (units,)."""
         self.sights += sighted
         self._points[scan.cell] += scan.points
         self._stops[scan.cell] += 1
@@ -293,6 +307,14 @@ class _PointTally:
         shown = self._asked.shown(scan)
         self.views += shown
         self.of_stop.append((int(sighted.sum()), int(shown.sum()), int(scan.points.sum())))
+        return shown
+
+    def take_aimed(self, scan: ScanCount) -> None:
+        """Count the units that rays aimed at them show; these add nothing to the quality of the cloud."""
+        shown = self._asked.shown(scan)
+        self.aimed_views += shown
+        sighted, own, points = self.of_stop[-1]
+        self.of_stop[-1] = sighted, own + int(shown.sum()), points
 
     @property
     def hit(self) -> BoolArray:
@@ -393,13 +415,17 @@ class _PromisedCoverage:
     def _required(self, fraction: float | None) -> float | None:
         return fraction if self.alone else None
 
+    def amount(self, units: BoolArray) -> float:
+        """Amount of these units (units,) that are promised."""
+        return 0.0 if self.units is None else float(self.weight[self.units & units].sum())
+
     def missed(self, seen: BoolArray, sighted: BoolArray) -> dict[str, float]:
         """Amount of promised units missed, by reason; `sighted` units have visible midpoints."""
         if self.units is None:
             return {}
         reason = GRAZED if limits_of(self.space.settings).none else NOT_AS_ASKED
         masks = {reason: self.units & ~seen & sighted, HIDDEN: self.units & ~seen & ~sighted}
-        return {name: float(self.weight[mask].sum()) for name, mask in masks.items() if mask.any()}
+        return {name: self.amount(mask) for name, mask in masks.items() if mask.any()}
 
     def _coverage(
         self,
@@ -431,16 +457,29 @@ def _sighted(site: _ScanSite, scene: SolidScene, pose: ScannerPose) -> BoolArray
     along = (targets.b - targets.a)[segment]
     before = along[:, 0] * points[:, 1] - along[:, 1] * points[:, 0] < 0  # the stop is left of a -> b
     wanted = near & (before | ~targets.occluding[segment])
-    wanted &= _in_view(space, pose, points) & _within_limits(space, points, along)
+    wanted &= _in_view(space, pose, points) & _within_limits(limits_of(space.settings), points, along)
     found = np.zeros(targets.total, dtype=bool)
     if wanted.any():
         found[unit[wanted]] = scene.unobstructed(frozen(points[wanted]))
     return found
 
 
-def _within_limits(space: NavigableSpace, points: FloatArray, along: FloatArray) -> BoolArray:
-    """True for midpoints, relative to the scanner, within the plan's limits at the scanner's height."""
-    limits = limits_of(space.settings)
+def _narrow(site: _ScanSite, pose: ScannerPose, units: BoolArray) -> IntArray:
+    """The units, of those in sight without points, whose neighbouring points are close enough (n,).
+
+    If the angular step is not known, any are.
+    """
+    found, settings, step = np.flatnonzero(units), site.space.settings, site.simulation.step_deg
+    if settings.angular_step is None and not site.simulation.step_known:
+        return found
+    targets = site.space.targets
+    along = (targets.b - targets.a)[targets.unit_segment[found]]
+    limits = limits_of(replace(settings, angular_step=step))
+    return found[_within_limits(limits, site.unit_xy[found] - pose.position[:2], along)]
+
+
+def _within_limits(limits: ViewLimits, points: FloatArray, along: FloatArray) -> BoolArray:
+    """True for midpoints, relative to the scanner, within limits at the scanner's height."""
     away = np.hypot(points[:, 0], points[:, 1])
     across = np.abs(along[:, 0] * points[:, 1] - along[:, 1] * points[:, 0])
     cosine = across / np.maximum(away * np.hypot(*along.T), 1e-12)

@@ -63,6 +63,8 @@ def verify_file(
     simulation = replace(_as_modelled(simulation, planned), **assumed)
     if "ceiling_m" in assumed:
         simulation = replace(simulation, ceiling_known=False)
+    if "step_deg" in assumed:
+        simulation = replace(simulation, step_known=True)
     if simulation.height_m >= simulation.ceiling_m:
         raise InputError(
             f"--scanner-height {simulation.height_m:g}: not below the ceiling at "
@@ -97,6 +99,7 @@ def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
         height_m=scanner_height(settings),
         cone_deg=blind_cone_deg(settings),
         joining_m=max(settings.farthest_overlap, simulation.range_m),
+        step_known=settings.angular_step is not None,
         **{name: value for name, value in known.items() if value is not None},
     )
     return simulation if ceiling is None else replace(simulation, ceiling_m=ceiling, ceiling_known=True)

@@ -191,7 +191,10 @@ class Searches:
         def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
             nonlocal bound, last
             bound = bound or early_bound(cover, found=len(start))
-            asked = cover.with_one_of_each(conditions.sets)
+            sets = conditions.sets
+            if sets:
+                cover.forget_seers()  # before the next one: each is a large part of the memory
+            asked = cover.with_one_of_each(sets)
             again = repaired_again(asked, last) if 0 < len(last) < len(start) else None
             first = start if again is None else again
             last = improved(asked, first, at_least=bound, settled=settled)

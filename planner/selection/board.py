@@ -19,8 +19,7 @@ class Board:
         self._reached = cover.reached(self._covered)
         self.weight: IntArray = np.ones(len(cover.needed), dtype=np.int64)
         """Penalty per missing unit of each demand (demands,)."""
-        bare = cover.worth * (self._left == 1)[None, :]
-        self._adds = np.ascontiguousarray(cover.sums_of(bare.T.tocsr()).toarray().T)
+        self._adds = self._worths.by_row(np.flatnonzero(self._left == 1), np.arange(len(cover.needed)))
         """Immediate gain of each row for each demand (demands, rows)."""
         self._losses: dict[int, tuple[bytes, IntArray]] = {}
         """Cache per leaving row: the columns that only it covers, and their worth to each demand."""

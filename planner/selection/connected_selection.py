@@ -57,6 +57,7 @@ class ConnectedCover:
         """The covering problem with one demand for each separator found."""
         if len(self.cuts) not in self._problems:
             self._problems.clear()  # before the next one: each is a large part of the memory
+            self._offering.forget_seers()
             self._problems[len(self.cuts)] = self._with_cuts()
         return self._problems[len(self.cuts)]
 

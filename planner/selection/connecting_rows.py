@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from stopgo.mission.geometry import IntArray
+from stopgo.mission.geometry import FloatArray, IntArray
+
+BLOCK = 1_000_000
+"""Links looked at together, so that those of an open hall take no more memory."""
 
 
 def connecting_rows(
@@ -35,19 +39,30 @@ def _shortest_path(links: csr_array, region: IntArray, components: list[IntArray
     """The fewest rows of a region that lead from one component to another."""
     members = np.concatenate(components)
     component = np.repeat(np.arange(len(components)), [len(one) for one in components])
-    inside = links[region][:, region]
+    inside = links if len(region) == links.shape[0] else links[region][:, region]
     start = np.searchsorted(region, members)
-    steps, before, source = dijkstra(
-        inside, directed=False, indices=start, unweighted=True, min_only=True, return_predecessors=True
+    steps, before, source = dijkstra(  # both directions are there
+        inside, directed=True, indices=start, unweighted=True, min_only=True, return_predecessors=True
     )
-    of = np.full(len(region), -1, dtype=np.int64)
+    of = np.full(len(region), -1, dtype=np.int32)
     of[start] = component
-    a, b = inside.tocoo().coords
-    across = of[source[a]] != of[source[b]]
-    a, b = a[across], b[across]
-    k = int(np.argmin(steps[a] + steps[b]))
-    path = [row for end in (a[k], b[k]) for row in _traced(int(end), before)]
+    ends = _nearest_across(inside, steps, of[source])
+    path = [row for end in ends for row in _traced(end, before)]
     return np.setdiff1d(region[path], members)
+
+
+def _nearest_across(inside: csr_array, steps: FloatArray, side: IntArray) -> tuple[int, int]:
+    """Ends of the first link between rows of two sides (rows,) with the fewest steps to both ends."""
+    pointer, found = inside.indptr, [(np.inf, 0)]
+    begins = np.searchsorted(pointer, np.arange(0, pointer[-1], BLOCK))
+    for low, high in pairwise(np.unique([*begins, len(side)]).tolist()):
+        to, many = inside.indices[pointer[low] : pointer[high]], np.diff(pointer[low : high + 1])
+        both = np.repeat(steps[low:high], many) + steps[to]
+        both[np.repeat(side[low:high], many) == side[to]] = np.inf
+        k = int(np.argmin(both))
+        found.append((float(both[k]), int(pointer[low]) + k))
+    link = min(found)[1]
+    return int(np.searchsorted(pointer, link, side="right")) - 1, int(inside.indices[link])
 
 
 def _traced(row: int, before: IntArray) -> list[int]:

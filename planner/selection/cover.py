@@ -15,10 +15,10 @@ from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack, 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.selection.demands import Demands
 from stopgo.planner.selection.worth_kernel import add_views, sum_by_row
 from stopgo.planner.selection.worths import Transposed, Worths
-from stopgo.planner.visibility.unit_ranges import ranges
 
 BLOCK = 1_000_000
 """Runs of units, and entries, that are widened at a time: long ranges have many millions."""
@@ -84,6 +84,11 @@ class Cover:
     @cached_property
     def _transposed(self) -> Transposed:
         return Transposed(self.sees)
+
+    def forget_seers(self) -> None:
+        """Forget who sees each column, as much as the matrix itself; it is found again where it is used."""
+        for name in ("_transposed", "worths"):
+            vars(self).pop(name, None)
 
     @cached_property
     def adds_to(self) -> csr_array:

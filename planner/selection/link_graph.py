@@ -11,9 +11,9 @@ from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.component_kernel import find_neighbours, grow_parts
-from stopgo.planner.visibility.unit_ranges import ranges
 
 
 @instance_cached

@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.geometry import FloatArray, IntArray, read_only
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.selection import BoundOf, forget_large_cover, greedy_takes_at_most, select
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.visibility import visibility
-from stopgo.planner.visibility.unit_ranges import ranges
 
 STEPS = (-0.5, -0.25, 0.0, 0.25, 0.5)
 """Offsets of new candidates from a stop along both axes of its room, in spacings of the grid."""
@@ -115,10 +115,18 @@ def merged(seen: Visibility, more: Visibility) -> Visibility:
         seen,
         candidates=replace(one, **both, extra=extra),
         pointer=_frozen(seen.pointer, seen.pointer[-1] + more.pointer[1:]),
-        segment=_frozen(seen.segment, more.segment),
-        first=_frozen(seen.first, more.first),
-        last=_frozen(seen.last, more.last),
+        segment=_continued(seen, more, "segment"),
+        first=_continued(seen, more, "first"),
+        last=_continued(seen, more, "last"),
     )
+
+
+def _continued(seen: Visibility, more: Visibility, name: str) -> NDArray[Any]:
+    """An array of both; that of `seen` becomes a part of it, as long ranges have many millions of runs."""
+    own = getattr(seen, name)
+    both = _frozen(own, getattr(more, name))
+    vars(seen)[name] = both[: len(own)]
+    return both
 
 
 def with_rows(seen: Visibility, rows: IntArray) -> Visibility:
@@ -142,4 +150,4 @@ def with_rows(seen: Visibility, rows: IntArray) -> Visibility:
 
 def _frozen(*arrays: NDArray[Any]) -> NDArray[Any]:
     """The arrays in one, read-only."""
-    return frozen(np.concatenate(arrays), arrays[0].dtype)
+    return read_only(np.concatenate(arrays, dtype=arrays[0].dtype))

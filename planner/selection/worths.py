@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.selection.worth_kernel import add_worth, add_worth_by_row, take_gain
-from stopgo.planner.visibility.unit_ranges import ranges
 
 
 class _Entries(NamedTuple):

@@ -30,6 +30,8 @@ from stopgo.planner.space.targets import occluders_of, targets_of
 
 MANY = 1000
 """Elements from which targets, and what concerns rooms, are found in processes of their own."""
+MANY_CORNERS = 8000
+"""The same for the corners of elements: round columns have many."""
 NOTHING = np.empty((0, 2, 2))
 T = TypeVar("T")
 
@@ -39,7 +41,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
-    with _SideWorks(forked=len(floor.elements) >= MANY) as works:
+    with _SideWorks(forked=_is_large(floor)) as works:
         scanned = partial(_occluders_and_targets, floor, settings)
         scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
         ground = Ground.of(floor, settings)
@@ -72,6 +74,11 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     store(obstacles_of, space, obstacle_shape)
     store(drive_parts_of, space, parts)
     return space
+
+
+def _is_large(floor: FloorPlan) -> bool:
+    corners = sum(len(solid.exterior) for item in floor.elements for solid in item.solids)
+    return len(floor.elements) >= MANY or corners >= MANY_CORNERS
 
 
 class _SideWorks(ExitStack):

@@ -17,12 +17,20 @@ from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
 from stopgo.planner.geometry.ring_index import RingIndex
-from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
+from stopgo.planner.geometry.shapes import (
+    HAIRLINE,
+    LINE_WALL,
+    SLACK,
+    boundary_lines,
+    polygon_parts,
+    to_shape,
+    widened,
+)
 from stopgo.planner.space.connected_parts import Parts
 from stopgo.planner.space.gaps import Gap, Walls, gaps_between
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import Crossing, middle_and_normal
-from stopgo.planner.space.targets import LINE_WALL, solid_of
+from stopgo.planner.space.targets import solid_of
 
 NEAR_OPENING = 1.6
 """Distance from an opening (m) within which the obstacle that blocks it is searched."""

@@ -16,6 +16,8 @@ from stopgo.mission.stages import Targets
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import (
     GRID,
+    LINE_WALL,
+    face_segments,
     local_origin,
     mended,
     one_shape,
@@ -37,8 +39,6 @@ CLEAR = 2.5
 straightened faces do not cross."""
 FLUSH = 3 * GRID
 """A line along a face, at most this far (m) from it, is flush with it."""
-LINE_WALL = 1e-3
-"""Thickness in metres given to an occluding element that is drawn as a single line."""
 
 
 def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
@@ -187,15 +187,6 @@ def _occluding_faces(floor: FloorPlan, occluders: BaseGeometry) -> tuple[FloatAr
     owners = owners_of(faces, floor)
     wanted = [k for k, owner in enumerate(owners) if owner >= 0 and floor.elements[owner].target]
     return faces[wanted], [owners[k] for k in wanted]
-
-
-def face_segments(shape: BaseGeometry) -> FloatArray:
-    """Boundary segments (n, 2, 2) with the solid on the right hand, in a canonical order."""
-    oriented = [shapely.orient_polygons(part, exterior_cw=True) for part in polygon_parts(shape)]
-    rings = [shapely.get_coordinates(r) for part in oriented for r in (part.exterior, *part.interiors)]
-    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings]
-    segments = np.concatenate(pairs) if pairs else np.empty((0, 2, 2))
-    return segments[np.lexsort(segments.reshape(-1, 4).T[::-1])]
 
 
 def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:

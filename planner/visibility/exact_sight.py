@@ -8,8 +8,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray, bounds, frozen, read_only
 from stopgo.mission.stages import Candidates, NavigableSpace, Visibility
-from stopgo.planner.geometry.shapes import local_origin, to_grid, whole_steps_of
-from stopgo.planner.space.targets import LINE_WALL
+from stopgo.planner.geometry.shapes import LINE_WALL, local_origin, to_grid, whole_steps_of
 from stopgo.planner.visibility.sight.mesh import Mesh, mesh_of
 from stopgo.planner.visibility.sight.sight import scene_of, sight
 

@@ -78,7 +78,8 @@ LIMITS = ("max_incidence", "near", "density", "wall_height", "views")
 
 def without_limit(settings: Settings, key: str) -> Settings:
     """The settings with one limit switched off."""
-    off: dict[str, Any] = dict.fromkeys((key, "blind_cone") if key == "near" else (key,))
+    also = {"near": ("blind_cone",), "density": ("angular_step",)}
+    off: dict[str, Any] = dict.fromkeys((key, *also.get(key, ())))
     if key == "max_incidence":
         off[key] = ANY_INCIDENCE
     return replace(settings, **off)

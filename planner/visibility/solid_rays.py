@@ -22,9 +22,10 @@ from stopgo.mission.floor import Element
 from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace, Visibility
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.visibility.covered_faces import covered_faces
-from stopgo.planner.visibility.unit_ranges import ranges, visibility_of
+from stopgo.planner.visibility.unit_ranges import visibility_of
 
 COLUMN_M = 0.05
 """Side of a column; doubled for floors with more than MOST_COLUMNS."""

@@ -33,10 +33,3 @@ def runs_of(units: IntArray, segments: IntArray) -> tuple[IntArray, IntArray]:
     new[1:] = (np.diff(units) != 1) | (np.diff(segment) != 0)
     starts = np.flatnonzero(new)
     return units[starts], units[np.append(starts[1:], len(units))[: len(starts)] - 1]
-
-
-def ranges(first: IntArray, counts: IntArray) -> IntArray:
-    """`first[k]`, `first[k] + 1`, …, `counts[k]` of each, one after the other."""
-    ends = np.cumsum(counts)
-    total = int(ends[-1]) if len(ends) else 0
-    return np.arange(total) + np.repeat(first - (ends - counts), counts)

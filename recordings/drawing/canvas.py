@@ -174,6 +174,18 @@ def arrow_of_lines(lines: NDArray[Any]) -> pa.Array:
     return pa.ListArray.from_arrays(ends, points, type=kind)
 
 
+def arrow_of_classes(rows: Iterable[tuple[int, str, Sequence[int]]]) -> pa.Array:
+    """Return classes as Rerun stores them; to convert them it would load 35 ms of Arrow."""
+    kind = rr.components.AnnotationContextBatch(None).as_arrow_array().type
+    without = {"keypoint_annotations": [], "keypoint_connections": []}
+    infos = [
+        {"id": number, "label": label, "color": int.from_bytes(colour, "big")}
+        for number, label, colour in rows
+    ]
+    classes = [{"class_id": info["id"], "class_description": {"info": info, **without}} for info in infos]
+    return pa.array([classes], kind)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Sheet:
     """Identity and extent of a recording, known before anything is drawn."""
@@ -229,4 +241,4 @@ def _prepare(canvas: Canvas) -> None:
     canvas.show(entities.PLAN, flip)
     canvas.show(entities.FIELD, flip)
     canvas.show(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    canvas.show(entities.ROOT, rr.AnnotationContext(palette.class_rows()))
+    canvas.show(entities.ROOT, rr.AnnotationContext(arrow_of_classes(palette.class_rows())))

@@ -16,10 +16,9 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
+from stopgo.planner.geometry.shapes import GRID, face_segments, local_origin, to_grid, whole_steps_of
 from stopgo.planner.routing.roadmap import paths_between
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.space.targets import face_segments
 from stopgo.planner.visibility.exact_sight import viewpoints_of
 from tests.faults.sizes import FULL
 from tests.planner.oracle import visible_pairs

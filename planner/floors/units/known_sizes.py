@@ -14,18 +14,15 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.drawing import BROKEN_INPUT
 from stopgo.planner.floors.layer_names import any_of, plain_name
 
-_THINGS = tuple(
-    (metres, any_of(words))
-    for metres, words in (
-        (2.0, "BED BEDS BETT BETTEN CAMA CAMAS LETTO LETTI BEDDEN LOZKO LUZKO ŁÓŻKO"),
-        (1.7, "BATHTUB* TUB BADEWANNE* WANNE BAIGNOIRE* BANERA* VASCA WANNA"),
-        (0.9, "SHOWER* DUSCHE* DUCHA* DOCCIA PRYSZNIC* RECEVEUR"),
-        (0.65, "WC TOILET TOILETS INODORO* KIBEL* SEDES* KLOSETT* CLOSESTOOL BIDET*"),
-        (0.6, "WASHER* WASHING+MACHINE WASCHMASCHINE* PRALKA LAVADORA* LAVATRICE* LAVE+LINGE DISHWASHER*"),
-        (0.6, "STOVE* COOKER* HOB HERD KUCHENKA"),
-        (0.55, "WASHBASIN* BASIN* WASCHBECKEN* WASCHTISCH* LAVABO* UMYWALKA LAVANDINO*"),
-        (0.5, "CHAIR CHAIRS STUHL STUEHLE CHAISE CHAISES SILLA SILLAS SEDIA SEDIE KRZESLO KRZESŁO"),
-    )
+_THINGS = (
+    (2.0, "BED BEDS BETT BETTEN CAMA CAMAS LETTO LETTI BEDDEN LOZKO LUZKO ŁÓŻKO"),
+    (1.7, "BATHTUB* TUB BADEWANNE* WANNE BAIGNOIRE* BANERA* VASCA WANNA"),
+    (0.9, "SHOWER* DUSCHE* DUCHA* DOCCIA PRYSZNIC* RECEVEUR"),
+    (0.65, "WC TOILET TOILETS INODORO* KIBEL* SEDES* KLOSETT* CLOSESTOOL BIDET*"),
+    (0.6, "WASHER* WASHING+MACHINE WASCHMASCHINE* PRALKA LAVADORA* LAVATRICE* LAVE+LINGE DISHWASHER*"),
+    (0.6, "STOVE* COOKER* HOB HERD KUCHENKA"),
+    (0.55, "WASHBASIN* BASIN* WASCHBECKEN* WASCHTISCH* LAVABO* UMYWALKA LAVANDINO*"),
+    (0.5, "CHAIR CHAIRS STUHL STUEHLE CHAISE CHAISES SILLA SILLAS SEDIA SEDIE KRZESLO KRZESŁO"),
 )
 """Usual length in metres of the longer side, and names of blocks that show such a thing from above."""
 _MOST_PARTS = 2000
@@ -41,8 +38,9 @@ def furniture_in(drawing: Drawing) -> list[float]:
     """Drawing units per metre by each insert of a block that is named after a thing of known size."""
     found: list[float] = []
     sizes: dict[str, tuple[float, float, float] | None] = {}
-    for insert in drawing.modelspace().query("INSERT"):
-        assert isinstance(insert, Insert), "the query asks for inserts"
+    for insert in drawing.modelspace():
+        if not isinstance(insert, Insert):
+            continue
         name = str(insert.dxf.name)
         if name not in sizes:
             sizes[name] = _size_of(name, drawing.blocks.get(name))
@@ -58,7 +56,7 @@ def furniture_in(drawing: Drawing) -> list[float]:
 def _size_of(name: str, block: BlockLayout | None) -> tuple[float, float, float] | None:
     """Usual length in metres, and width and depth as drawn, of a block that shows a thing of known size."""
     plain = plain_name(name)
-    metres = next((metres for metres, words in _THINGS if words.search(plain)), None)
+    metres = next((metres for metres, words in _THINGS if any_of(words).search(plain)), None)
     if metres is None or block is None or not 0 < len(block) <= _MOST_PARTS:
         return None
     kinds = {item.dxftype() for item in block}

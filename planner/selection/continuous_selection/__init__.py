@@ -19,6 +19,7 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.candidates import judged
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.selection import cover_problem, select
 from stopgo.planner.selection.continuous_selection.cells import CellVisibility, PositionCells
@@ -27,7 +28,6 @@ from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.refine import extra_candidates, merged, with_rows
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 from stopgo.planner.visibility import visibility
-from stopgo.planner.visibility.unit_ranges import ranges
 
 ROUNDS = 8
 """Rounds of prices and cuts."""

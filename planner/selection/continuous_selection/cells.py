@@ -43,13 +43,13 @@ from stopgo.mission.document.limits import ViewLimits, limits_of
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Candidates
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import GRID, SLACK, local_origin, to_grid
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 from stopgo.planner.visibility.exact_sight import open_space
 from stopgo.planner.visibility.sight.kernel import look_from_all_cells
 from stopgo.planner.visibility.sight.sight import Scene, scene_of
-from stopgo.planner.visibility.unit_ranges import ranges
 
 LARGEST_CELL = 0.5
 """Metres; a cell narrower than the clearance of its positions contains no wall."""

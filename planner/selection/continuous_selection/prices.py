@@ -13,8 +13,8 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.selection.linear_programme import minimised
-from stopgo.planner.visibility.unit_ranges import ranges
 
 
 @dataclass(frozen=True, eq=False)

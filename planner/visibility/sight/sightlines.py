@@ -19,8 +19,7 @@ import shapely
 from stopgo.mission.document.limits import limits_of
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
-from stopgo.planner.space.targets import face_segments
+from stopgo.planner.geometry.shapes import GRID, face_segments, local_origin, to_grid, whole_steps_of
 from stopgo.planner.visibility.sight.well_seen import SeenSegments, well_seen
 from stopgo.planner.visibility.solid_rays import solid_rays
 

@@ -14,6 +14,7 @@ from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
 from stopgo.mission.stages.network import CONFIDENCE, MOST_NOISE_MM, predicted_error_m
+from stopgo.planner import overlap
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
 from stopgo.planner.overlap import ACCURACY_M, least_hold_m, links_by_kernel, links_of, overlaps_of
@@ -154,6 +155,18 @@ def test_links_are_the_same_in_numpy_as_written_and_compiled(
         for kernel in (firm_pairs, machine_code(firm_pairs))
     ]
     written, built = (sorted(zip(*map(np.concatenate, zip(*one, strict=True)), strict=True)) for one in pairs)
-    interpret(monkeypatch)
-    assert written == built
-    assert (fast != links_of(found)).nnz == 0 and 100 < fast.nnz == 2 * len(built)
+    assert written == built and 100 < fast.nnz == 2 * len(built)
+    monkeypatch.setattr(overlap, "MANY", 0)
+    for _ in range(2):  # in two processes, and then interpreted
+        assert (fast != links_of(replace(found))).nnz == 0
+        interpret(monkeypatch)
+
+
+def test_normal_matrices_are_those_of_each_pair() -> None:
+    found = candidates(navigable(read_floor(SAMPLE), Settings(grid=2.0)))
+    overlaps = overlaps_of(found)
+    pairs = [(row, int(other)) for row in (7, 3, 5) for other in overlaps.of(row).other[::-4]]
+    assert len(pairs) > 10
+    several = overlaps.normal_matrices(pairs)
+    assert several.tolist() == [overlaps.normal_matrix(*pair).tolist() for pair in pairs]
+    assert overlaps.normal_matrices([]).shape == (0, 3, 3)

@@ -24,6 +24,12 @@ from tests.planner.worlds import PAPER, box, column, element, hall, shared, two_
 SETTINGS = Settings(robot_radius=0.3, edge=0.3)
 
 
+@pytest.fixture(autouse=True)
+def _pieces_found_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Find the pieces between corners again for each search, as tests compare ways to find them."""
+    monkeypatch.setattr(roadmap, "corner_pieces", vars(roadmap.corner_pieces)["__wrapped__"])
+
+
 def random_floor(seed: int) -> FloorPlan:
     """A hall of 9 × 7 m with up to seven things in it, some of them touching."""
     random = np.random.default_rng(seed)

@@ -16,9 +16,8 @@ from stopgo.mission.geometry import Polygon, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, Candidates, Targets, Visibility
 from stopgo.planner.candidates import candidates
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
+from stopgo.planner.geometry.shapes import GRID, face_segments, local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.navigable import navigable
-from stopgo.planner.space.targets import face_segments
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.exact_sight import exact
 from tests.faults.sizes import some

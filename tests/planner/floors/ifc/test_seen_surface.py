@@ -189,7 +189,8 @@ def test_what_lies_between_two_rays_is_not_acquired_and_not_claimed(
     """Rays 2° apart are 7 to 28 cm apart at 2 to 8 m: they miss many units of 5 cm, seen from two rooms."""
     pytest.importorskip("embreex")
     read(two_rooms())
-    planned(tmp_path / "house.ifc", "--angular-step", "2", "--min-views", "2", "--max-incidence", "90")
+    options = ["--angular-step", "2", "--density", "400", "--min-views", "2", "--max-incidence", "90"]
+    planned(tmp_path / "house.ifc", *options)
     capsys.readouterr()
     mission, floor = str(tmp_path / "plan" / "mission.json"), str(tmp_path / "house.ifc")
     main(["prove", mission, "--floor", floor, "--solids", "model", "--json"])

@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 import shapely
 
-from stopgo.planner.geometry.shapes import GRID, polygon_parts, snapped_union, to_grid, whole_steps
-from stopgo.planner.space.targets import face_segments, units_on
+from stopgo.planner.geometry.shapes import (
+    GRID,
+    face_segments,
+    polygon_parts,
+    snapped_union,
+    to_grid,
+    whole_steps,
+)
+from stopgo.planner.space.targets import units_on
 from stopgo.planner.visibility.sight.mesh import containing, mesh_of
 from stopgo.planner.visibility.sight.sight import Runs, Scene, scene_of, sight
 from stopgo.planner.visibility.sight.sightlines import Midpoints

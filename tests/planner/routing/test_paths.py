@@ -1,0 +1,46 @@
+"""Lengths of paths between all pairs: the same in scipy, as written and compiled, in one process or two."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse.csgraph import dijkstra
+
+from stopgo.planner.routing import paths
+from stopgo.planner.routing.dijkstra_kernel import find_lengths
+from stopgo.planner.routing.paths import edge_lengths, shortest_paths
+from tests.planner.kernels import interpret, machine_code
+from tests.planner.routing.test_nearby_paths import network
+
+POINTS = 50
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_all_lengths_are_those_of_scipy(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    xy, edges = network(seed)
+    graph = edge_lengths(xy, edges)
+    both = (graph + graph.T).tocsr()
+    pieces = (both.indptr.astype(np.int64), both.indices.astype(np.int64), both.data)
+    asked = dijkstra(graph, directed=False, indices=range(POINTS))[:, :POINTS]
+    for kernel in (find_lengths, machine_code(find_lengths)):
+        for source in range(0, POINTS, 7):
+            away, *heap = np.full(len(xy), np.inf), np.zeros(len(xy), np.int64), np.zeros(len(xy), np.int64)
+            kernel(source, POINTS, *pieces, away, *heap)
+            assert away[:POINTS].tolist() == asked[source].tolist()
+    assert shortest_paths(xy, edges, POINTS).lengths.tolist() == asked.tolist()
+    monkeypatch.setattr(paths, "MANY", 0)
+    assert shortest_paths(xy, edges, POINTS).lengths.tolist() == asked.tolist()
+    interpret(monkeypatch)
+    assert shortest_paths(xy, edges, POINTS).lengths.tolist() == asked.tolist()
+
+
+def test_paths_are_those_of_a_search_of_pieces_without_direction() -> None:
+    """On a lattice, where many paths are of one length."""
+    place = np.random.default_rng(1).permutation(400)
+    cells = place.reshape(20, 20)
+    xy = np.empty((400, 2))
+    xy[place] = np.stack(np.divmod(np.arange(400), 20), axis=1)
+    across, along = (np.stack([some[:-1], some[1:]], axis=-1).reshape(-1, 2) for some in (cells, cells.T))
+    found = shortest_paths(xy, np.concatenate([across, along]), 9)
+    asked = dijkstra(found.graph, directed=False, indices=range(9), return_predecessors=True)[1]
+    assert found.before(np.arange(9)).tolist() == asked.tolist()
