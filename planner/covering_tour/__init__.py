@@ -17,14 +17,16 @@ from stopgo.mission.geometry import IntArray, frozen
 from stopgo.mission.stages import LeastTime, Route, Selection
 from stopgo.planner.covering_tour.least_time_bound import least_time
 from stopgo.planner.covering_tour.problem import TourProblem, problem_of
+from stopgo.planner.covering_tour.route_stretches import by_stretches
 from stopgo.planner.covering_tour.search import shorter_line
-from stopgo.planner.covering_tour.timed_line import PointLine
-from stopgo.planner.routing import assembled, legs_between, points_and_ends, tour_bound
+from stopgo.planner.routing import points_and_ends, route_along
 from stopgo.planner.routing.assemble import assemble
 from stopgo.planner.selection import coverage_steps
 from stopgo.planner.selection.greedy import in_greedy_order
 
 METHOD = "stops and tour together, by tabu search"
+WHOLE_UP_TO = 200
+"""Stops up to which a route is improved as a whole."""
 
 
 def least_time_route(route: Route, *, done: IntArray | None = None) -> Route:
@@ -33,7 +35,7 @@ def least_time_route(route: Route, *, done: IntArray | None = None) -> Route:
     Rows `done` were scanned before: they count as seen and are not visited.
     """
     problem = problem_of(route, done)
-    found = _driven(route, problem, shorter_line(problem.times, problem.task, problem.line))
+    found = _driven(route, problem, _stops_in_order(problem))
     two_step_s, seconds = _seconds(route), _seconds(found)
     best = found if seconds < two_step_s else route
     least_s = min(seconds, two_step_s)
@@ -47,32 +49,37 @@ def with_known_time(two_step: Route, quicker: Route) -> Route:
     return two_step if known is None else replace(two_step, time=replace(known, seconds=known.two_step_s))
 
 
+def _stops_in_order(problem: TourProblem) -> IntArray:
+    """Rows of the stops that take least time, in their order."""
+    if len(problem.route.order) > WHOLE_UP_TO and problem.settings.graph == "exact":
+        return by_stretches(problem)
+    line = shorter_line(problem.times, problem.task, problem.line)
+    return problem.rows[problem.stops_of(line)]
+
+
 def _seconds(route: Route) -> float:
     """Duration of the route by its mission's schedule."""
     return schedule(assemble(route)).total_s
 
 
-def _driven(route: Route, problem: TourProblem, line: PointLine) -> Route:
-    """The route that drives a line."""
-    stops = problem.stops_of(line)
-    selection = _selected(route.selection, problem, np.array(stops, dtype=np.int64))
+def _driven(route: Route, problem: TourProblem, rows: IntArray) -> Route:
+    """The route that drives to the stops at rows in this order."""
+    selection = _selected(route.selection, problem, rows)
     index = {int(row): k for k, row in enumerate(selection.chosen)}
     points, ends = points_and_ends(selection)
-    order = [index[int(problem.rows[stop])] for stop in stops]
+    order = [index[row] for row in rows.tolist()]
     ends = replace(ends, first=order[0] if ends.first is not None and ends.first < len(order) else ends.first)
     first = [ends.first] if ends.first is not None and ends.first >= len(order) else []
     last = [ends.last] if ends.last is not None else []
     sequence = [*first, *order, *last]
-    legs = legs_between(selection.space, points)
-    bound = tour_bound(legs.lengths, sequence, ends)
-    return assembled(selection, points, legs, sequence, ends, bound, METHOD)
+    return route_along(selection, points, sequence, ends, METHOD)
 
 
-def _selected(before: Selection, problem: TourProblem, stops: IntArray) -> Selection:
-    """The selection of these stops, in the order of their gain in coverage."""
-    stay = problem.task.stays[stops]
-    others = in_greedy_order(problem.task.cover, np.sort(stops[~stay]))
-    rows = problem.rows[np.concatenate([np.sort(stops[stay]), others]).astype(np.int64)]
+def _selected(before: Selection, problem: TourProblem, rows: IntArray) -> Selection:
+    """The selection of these rows, in the order of their gain in coverage."""
+    stay = np.isin(rows, problem.staying)
+    others = in_greedy_order(problem.left_to_see, np.sort(rows[~stay]))
+    rows = np.concatenate([np.sort(rows[stay]), others]).astype(np.int64)
     steps = coverage_steps(problem.whole, np.concatenate([problem.done, rows]))[len(problem.done) :]
     fewest = ", proved fewest" if len(rows) == before.bound and "proved fewest" in before.method else ""
     method = f"{before.method.partition(', proved fewest')[0]}, then with the tour{fewest}"

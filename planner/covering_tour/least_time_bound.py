@@ -30,16 +30,19 @@ DETOUR_S = 3.0
 """Cost of each stop at first, when only their number has a price."""
 EARNED = (0.0, 0.3)
 """Fractions of a stop's cost that targets and demands may pay at first; the rest is the number's price."""
-WORK = 330_000_000
+WORK = 270_000_000
 """Pieces of paths evaluated in all steps together."""
-FEWEST_STEPS, MOST_STEPS = 60, 240
-FIRST_STEP, AIM, SMOOTHING, PATIENCE = 1.5, 1.03, 0.2, 8
+FEWEST_STEPS, MOST_STEPS = 15, 240
+FIRST_STEP, AIM, SMOOTHING, PATIENCE = 1.5, 1.2, 0.2, 8
 """The first step as a multiple of Polyak's for AIM times the best bound; as in the multiplier bound."""
 FEW_NODES = 2_000_000
 """Nodes times zones up to which all paths are found."""
-TREES = 300
-TREE_WORK = 100_000_000
-"""One-trees of each step, and edges examined in them; of very many zones there are fewer."""
+FIRST_TREES, FIRST_STEP_OF_WEIGHTS = 1500, 2.0
+"""One-trees at the first prices, and the first change of weights, as in `tour_bound`."""
+TREES, STEP_OF_WEIGHTS = 150, 0.2
+"""The same at further prices, from the weights of the former."""
+TREE_WORK = 1_000_000_000
+"""Edges examined in the one-trees of each step; of very many zones there are fewer."""
 FEWEST_TREES = 60
 WEIGHTS = (0.05, 20.0)
 """Least and largest weight of a column, as a multiple of the mean, by whose root its price changes faster."""
@@ -106,8 +109,10 @@ def least_time(route: RouteRequirements) -> float:
     if len(sets[0]) > MANY_ZONES:
         sets = sets[:1]
     found = [_Relaxation(route, route.graph, zones, 0.0) for zones in sets]
-    values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in found]
-    plain = found[int(np.argmax(values))]
+    plain = found[0]
+    if len(found) > 1:
+        values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in found]
+        plain = found[int(np.argmax(values))]
     lost = route.legs_without_turn * turned.half_turn_s / 2
     both = [plain, _Relaxation(route, turned, plain.zones, lost)]
     values = [one.at(one.first_prices(0.0, DETOUR_S)).seconds for one in both]
@@ -139,6 +144,8 @@ class _Relaxation:
         self._outer = [np.array([end]) for end in route.outer]
         self._zones = [*self._outer, *zones]
         self.known_s, self._rows = route.known_s, route.cover.rows
+        self._weight: IntArray | None = None
+        """Weights of the zones at the former prices."""
         weight = route.cover.weight / max(1, route.cover.total) * route.cover.columns
         demands = np.full(len(route.cover.needed) - 1, DEMAND_STEP)
         self.steps = np.concatenate([np.sqrt(np.clip(weight, *WEIGHTS)), demands, [1.0]])
@@ -176,7 +183,7 @@ class _Relaxation:
         seconds, nearest, ways, work = self._between(more)
         begin = np.array([zone[np.argmin(more[zone])] for zone in self._zones], dtype=np.int64)
         cost, beyond = self._cost(seconds, more[begin] / 2)
-        value, pairs = _least_tour(nanometres(cost))
+        value, pairs, self._weight = _least_tour(nanometres(cost), self._weight)
         count = len(self._zones)
         inside = pairs[(pairs < count).all(axis=1)]
         ends = pairs[(pairs >= count).any(axis=1)].min(axis=1)
@@ -235,18 +242,26 @@ def _before(way: tuple[IntArray, IntArray], node: int) -> int:
     return int(way[1][np.searchsorted(way[0], node)])
 
 
-def _least_tour(cost: IntArray) -> tuple[int, IntArray]:
-    """Lower bound on a closed tour over the points, in the unit of `cost`, and its edges (n, 2)."""
+def _least_tour(cost: IntArray, start: IntArray | None) -> tuple[int, IntArray, IntArray | None]:
+    """Lower bound on a closed tour over the points, in the unit of `cost`, its edges (n, 2), and weights.
+
+    The search for weights begins at those of a similar matrix, if there are any.
+    """
     count = len(cost)
     if count <= FEW:
         order = best_of_all(cost)
-        return length_of(cost, order), np.stack([order, np.roll(order, -1)], axis=1)
-    steps = min(TREES, max(FEWEST_TREES, TREE_WORK // count**2))
-    value, weight = highest(growing(cost), count, best=np.iinfo(np.int64).max, steps=steps)
+        return length_of(cost, order), np.stack([order, np.roll(order, -1)], axis=1), None
+    if start is None:
+        trees, step = FIRST_TREES, FIRST_STEP_OF_WEIGHTS
+    else:
+        trees, step = TREES, STEP_OF_WEIGHTS
+    trees = min(trees, max(FEWEST_TREES, TREE_WORK // count**2))
+    most = np.iinfo(np.int64).max
+    value, weight = highest(growing(cost), count, best=most, steps=trees, first_step=step, start=start)
     tree = one_tree(cost, weight)
     last = np.argsort(tree.costs[-1, :-1], kind="stable")[:2]
     first, second = [*tree.reached[1:], *last], [*tree.before[1:], count - 1, count - 1]
-    return value, np.stack([first, second], axis=1)
+    return value, np.stack([first, second], axis=1), weight
 
 
 def _highest(relaxation: _Relaxation) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from stopgo.mission.document import RobotSpec
 from stopgo.mission.document.schedule import turn_time
 from stopgo.mission.document.straight_times import straight_times
-from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.paths import Paths
@@ -59,7 +59,7 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
     """
     whole_turn = round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
     if legs.graph.ours:
-        seconds, leaving, arriving = _followed(legs.paths, len(legs.points), robot)
+        seconds, leaving, arriving = _followed(legs.paths, np.isfinite(legs.lengths), robot)
     else:
         step = legs.points[None, :, :] - legs.points[:, None, :]
         seconds = straight_times(legs.lengths, speed=robot.speed, acceleration=robot.acceleration)
@@ -77,15 +77,16 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
     )
 
 
-def _followed(paths: Paths, count: int, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Seconds (n, n) of the paths between the first points, and headings at their beginnings and ends."""
+def _followed(paths: Paths, found: BoolArray, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Seconds (n, n) of the paths found between points, and headings at their beginnings and ends."""
+    count = len(found)
     seconds, leaving, arriving = (np.zeros((count, count)) for _ in range(3))
     for first in range(0, count, SOURCES):
         source = np.arange(first, min(count, first + SOURCES))
         before = paths.before(source)
-        start, end = np.nonzero(source[:, None] < np.arange(count)[None, :])
-        found = _back(paths.xy, before, source, start, end, robot)
-        for table, values in zip((seconds, leaving, arriving), found, strict=True):
+        start, end = np.nonzero((source[:, None] < np.arange(count)[None, :]) & found[source])
+        followed = _back(paths.xy, before, source, start, end, robot)
+        for table, values in zip((seconds, leaving, arriving), followed, strict=True):
             table[source[start], end] = values
     for table, other in ((seconds, seconds), (leaving, arriving), (arriving, leaving)):
         low = np.tril_indices(count, -1)

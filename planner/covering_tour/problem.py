@@ -39,6 +39,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
@@ -84,6 +85,8 @@ class TourProblem:
     done: IntArray
     """Rows scanned before: they count as seen and are no stops."""
     joins: ConnectionTest
+    joins_among: Callable[[IntArray, IntArray], ConnectionTest]
+    """Returns the test for some rows, by their index in these, together with other rows that all stay."""
 
     @property
     def candidates(self) -> Candidates:
@@ -120,6 +123,11 @@ class TourProblem:
     def _xy(self) -> FloatArray:
         found: FloatArray = self.candidates.xy[self.candidates.kept[self.rows]].reshape(-1, 2)
         return found
+
+    @cached_property
+    def all_rows(self) -> IntArray:
+        """All rows that are offered or required, ascending: the points of the time bound."""
+        return np.union1d(self.offered, self.stays).astype(np.int64)
 
     @cached_property
     def legs(self) -> Legs:
@@ -162,15 +170,21 @@ class TourProblem:
         )
 
     @cached_property
+    def staying(self) -> IntArray:
+        """Rows that must stay: those required, and the one where a closed route without a start begins."""
+        return self.stays if self.begin is None else np.append(self.stays, self.rows[self.begin])
+
+    @cached_property
+    def left_to_see(self) -> Cover:
+        """The covering problem that these rows leave, over all rows."""
+        return self.cover if self.begin is None else self.cover.after(self.rows[[self.begin]])
+
+    @cached_property
     def task(self) -> LineTask:
-        stays = np.isin(self.rows, self.stays)
-        if self.begin is not None:
-            stays[self.begin] = True
-        cover = self.cover if self.begin is None else self.cover.after(self.rows[[self.begin]])
         rank = rank_at_door(self.candidates, self.rows)[0] if self.settings.start is None else None
         return LineTask(
-            cover=_of_rows(cover, self.rows),
-            stays=stays,
+            cover=of_rows(self.left_to_see, self.rows),
+            stays=np.isin(self.rows, self.staying),
             rank=None if self.begin is not None else rank,
             joins=lambda positions: self.joins(self.rows[positions])[self.rows],
         )
@@ -178,8 +192,8 @@ class TourProblem:
     def bound_problem(self, rows: IntArray, known_s: float) -> RouteRequirements:
         """The problem of the time bound over all candidates; `rows` are a plan's stops in its order."""
         settings, robot = self.settings, robot_of(self.settings)
-        all_rows = np.union1d(self.offered, self.stays).astype(np.int64)
-        cover, points = _of_rows(self.cover, all_rows), len(all_rows)
+        all_rows = self.all_rows
+        cover, points = of_rows(self.cover, all_rows), len(all_rows)
         given = self._ends[: len(self._ends) - (self.begin is not None)]
         xy = np.concatenate([self.candidates.xy[self.candidates.kept[all_rows]], given])
         required = np.searchsorted(all_rows, self.stays)
@@ -223,17 +237,20 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
     visibility, chosen = route.visibility, np.unique(route.selection.chosen)
     stays: IntArray = np.empty(0, dtype=np.int64)
     joins: ConnectionTest = partial(_any_rows, visibility.rows)
+    among: Callable[[IntArray, IntArray], ConnectionTest] = _any_among
     registers = visibility.settings.registers
     if done is not None:
         whole, cover = remaining_cover(visibility, done)
         if registers:
-            cover, joins = _joined(visibility, whole, done, chosen, offered_for_follow_up(visibility, done))
+            cover, joins, among = _joined(
+                visibility, whole, done, chosen, offered_for_follow_up(visibility, done)
+            )
     else:
         whole, stays, cover = cover_problem(visibility)
         if registers:
-            cover, joins = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
+            cover, joins, among = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
     offered = np.flatnonzero(np.diff(cover.sees.indptr)).astype(np.int64)
-    nearest = _nearest(visibility.candidates, offered, chosen)
+    nearest = nearest_rows(visibility.candidates, offered, chosen, most=MOST_POSITIONS)
     return TourProblem(
         route=route,
         whole=whole,
@@ -243,6 +260,7 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
         stays=stays,
         done=np.empty(0, np.int64) if done is None else done,
         joins=joins,
+        joins_among=among,
     )
 
 
@@ -250,10 +268,14 @@ def _any_rows(count: int, rows: IntArray) -> BoolArray:
     return np.ones(count, dtype=bool)
 
 
+def _any_among(rows: IntArray, others: IntArray) -> ConnectionTest:
+    return partial(_any_rows, len(rows))
+
+
 def _joined(
     visibility: Visibility, whole: Cover, fixed: IntArray, chosen: IntArray, offered: IntArray
-) -> tuple[Cover, ConnectionTest]:
-    """The remaining covering problem where scans must register, and the test for connection.
+) -> tuple[Cover, ConnectionTest, Callable[[IntArray, IntArray], ConnectionTest]]:
+    """The remaining covering problem where scans must register, and the tests for connection.
 
     Rows `fixed` are required or were scanned before. Rows pass the test if, together with `fixed`, they
     are connected at least as well as the chosen rows.
@@ -262,19 +284,24 @@ def _joined(
     task = ConnectedCover(cover, links_of(visibility.candidates), offered)
     most = task.parts(np.union1d(chosen, fixed))
     left = whole.after(fixed).offering(np.sort(np.concatenate(task.regions)))
-    return left, lambda rows: task.parts_with_each(np.union1d(rows, fixed)) <= most
+
+    def among(rows: IntArray, others: IntArray) -> ConnectionTest:
+        parts = task.among(rows, np.setdiff1d(np.union1d(others, fixed), rows).astype(np.int64))
+        return lambda chosen: parts(chosen) <= most
+
+    return left, lambda rows: task.parts_with_each(np.union1d(rows, fixed)) <= most, among
 
 
-def _nearest(candidates: Candidates, offered: IntArray, chosen: IntArray) -> IntArray:
-    """The offered rows nearest to the chosen ones, at most MOST_POSITIONS."""
-    if len(offered) <= MOST_POSITIONS:
+def nearest_rows(candidates: Candidates, offered: IntArray, chosen: IntArray, *, most: int) -> IntArray:
+    """The offered rows nearest to the chosen ones, so many at most."""
+    if len(offered) <= most:
         return offered
     xy = candidates.xy[candidates.kept]
-    away = np.min([np.hypot(*(xy[offered] - xy[row]).T) for row in chosen], axis=0)
-    return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:MOST_POSITIONS]])
+    away = cKDTree(xy[chosen]).query(xy[offered])[0]
+    return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:most]])
 
 
-def _of_rows(cover: Cover, rows: IntArray) -> Cover:
+def of_rows(cover: Cover, rows: IntArray) -> Cover:
     """The problem over these rows alone, renumbered."""
     return Cover(cover.sees[rows], cover.worth, cover.needed, cover.views)
 

@@ -90,12 +90,36 @@ def _route_over_nearby(selection: Selection, points: FloatArray, ends: Ends) -> 
     order = canonical(by_place[shortest_over(cost, seed=selection.settings.seed)])
     del cost
     sequence = _sequence(order, ends, len(points))
+    return _along_nearby(selection, points, sequence, ends, METHODS["default"], paths)
+
+
+def _along_nearby(
+    selection: Selection,
+    points: FloatArray,
+    sequence: list[int],
+    ends: Ends,
+    method: str,
+    paths: NearbyPaths,
+) -> Route:
+    """The route over many points in a given order, whose own lengths are made exact."""
     legs = paths.learn(np.stack([sequence, np.roll(sequence, -1)], axis=1))
     if len(points) <= BOUNDS_UP_TO:
         bound = tour_bound(paths.at_least(), sequence, ends)
     else:
         bound = _bound_over_nearby(paths, float(legs.sum() if ends.closed else legs[:-1].sum()), ends)
-    return assembled(selection, points, paths, sequence, ends, bound, METHODS["default"])
+    return assembled(selection, points, paths, sequence, ends, bound, method)
+
+
+def route_along(
+    selection: Selection, points: FloatArray, sequence: list[int], ends: Ends, method: str
+) -> Route:
+    """The route over points (stops first) in a given order, with a lower bound on all orders."""
+    if len(points) > ALL_PAIRS_UP_TO and selection.settings.graph == "exact":
+        paths = nearby_paths_between(selection.space, points)
+        return _along_nearby(selection, points, sequence, ends, method, paths)
+    legs = legs_between(selection.space, points)
+    bound = tour_bound(legs.lengths, sequence, ends)
+    return assembled(selection, points, legs, sequence, ends, bound, method)
 
 
 def _most_by_place(paths: NearbyPaths, by_place: IntArray, ends: Ends) -> FloatArray:
@@ -322,6 +346,7 @@ __all__ = [
     "points_and_ends",
     "rank_at_door",
     "route",
+    "route_along",
     "tour_bound",
     "tour_matrix",
 ]

@@ -158,6 +158,10 @@ class NearbyPaths:
         """The polyline (n, 2) from one point to another, both included."""
         return straightened(self._xy[self._search.nodes(start, end)])
 
+    def keep_paths_to(self, point: int) -> None:
+        """Find the paths from all points to one, so that none is searched for later."""
+        self._search.keep(point)
+
 
 class _PointSearch:
     """Dijkstra's search over a graph from one of its points, prepared for many searches."""
@@ -175,9 +179,20 @@ class _PointSearch:
             self._kernel, arrays = reach, [array.tolist() for array in arrays]
         self.points, self._arrays = points, arrays
         self._before, self._found, self._away = arrays[4], arrays[9], arrays[10]
+        self._kept: dict[int, Any] = {}
+        """By point: the next node of each node on its path to the point."""
+        self._place: dict[int, int] = {}
+        """Place of each point among those found by the last search."""
+        self._source = -1
+
+    def keep(self, target: int) -> None:
+        """Find the paths from all points to one, and keep them."""
+        self.nearest(target, self.points)
+        self._kept[target] = self._before.copy()
 
     def nearest(self, source: int, wanted: int) -> tuple[IntArray, FloatArray]:
         """The nearest other points of one, fewer where no path leads to so many, and their distances."""
+        self._source = -1
         many = self._kernel(source, -1, self.points, wanted, *self._arrays) if wanted else 0
         return np.array(self._found[:many], dtype=np.int64), np.array(self._away[:many], dtype=np.float64)
 
@@ -195,15 +210,27 @@ class _PointSearch:
 
     def nodes(self, source: int, target: int) -> list[int]:
         """The nodes on the shortest path from one point to another, both included."""
+        if target in self._kept:
+            return _followed(self._kept[target], source, target)
         self._found_at(source, target)
-        nodes = [target]
-        while nodes[-1] != source:
-            nodes.append(int(self._before[nodes[-1]]))
-        return nodes[::-1]
+        return _followed(self._before, target, source)[::-1]
 
     def _found_at(self, source: int, target: int) -> int:
-        """Search up to a point; its place among the points found."""
-        many = self._kernel(source, target, self.points, self.points, *self._arrays)
-        if not many or self._found[many - 1] != target:
+        """Search up to a point, unless the last search reached it; its place among the points found."""
+        if source != self._source or target not in self._place:
+            many = self._kernel(source, target, self.points, self.points, *self._arrays)
+            self._source, self._place = (
+                source,
+                dict(zip(map(int, self._found[:many]), range(many), strict=True)),
+            )
+        if target not in self._place:
             raise ValueError(f"no path from point {source} to point {target}")
-        return int(many) - 1
+        return self._place[target]
+
+
+def _followed(following: Any, node: int, end: int) -> list[int]:
+    """The nodes from one to another, by the node that follows each."""
+    nodes = [node]
+    while nodes[-1] != end:
+        nodes.append(int(following[nodes[-1]]))
+    return nodes

@@ -35,6 +35,8 @@ class Paths:
     """(points, points) in metres; infinite where there is no path."""
     graph: csr_array
     """(nodes, nodes): lengths of the straight pieces."""
+    limit: float = np.inf
+    """Metres beyond which paths were not searched."""
     _trees: dict[int, IntArray | None] = field(default_factory=dict)
     """By point: the node before each node (nodes,), once a second path from the point was asked for."""
 
@@ -75,7 +77,9 @@ class Paths:
         """The node before each node on its shortest path from each of these points (n, nodes)."""
         kept = [self._trees.get(point) for point in points.tolist()]
         if any(tree is None for tree in kept):
-            found: IntArray = dijkstra(self._both_ways, True, points, return_predecessors=True)[1]
+            found: IntArray = dijkstra(
+                self._both_ways, True, points, return_predecessors=True, limit=self.limit
+            )[1]
             return found
         return np.array(kept)
 
@@ -91,28 +95,31 @@ def straightened(line: FloatArray) -> FloatArray:
     return frozen(np.concatenate([line[:1], inner, line[-1:]]))
 
 
-def shortest_paths(xy: FloatArray, edges: IntArray, points: int, *, trees: bool = False) -> Paths:
+def shortest_paths(
+    xy: FloatArray, edges: IntArray, points: int, *, trees: bool = False, limit: float = np.inf
+) -> Paths:
     """Shortest paths between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2).
 
-    With `trees` what leads to each node is kept, if there is room for it.
+    With `trees` what leads to each node is kept, if there is room for it. Paths longer than the limit, in
+    metres, are not found.
     """
     graph, kept = edge_lengths(xy, edges), {}
     if not trees or points * len(xy) > MOST_KEPT:
-        return Paths(xy=frozen(xy), lengths=frozen(_lengths(graph, points)), graph=graph)
+        return Paths(frozen(xy), frozen(_lengths(graph, points, limit)), graph, limit=limit)
     lengths = np.empty((points, points))
     for chunk in np.split(np.arange(points), range(CHUNK, points, CHUNK)):
-        away, before = dijkstra(graph, directed=False, indices=chunk, return_predecessors=True)
+        away, before = dijkstra(graph, False, chunk, return_predecessors=True, limit=limit)
         kept.update(zip(chunk.tolist(), before, strict=True))
         lengths[chunk] = away[:, :points]
-    return Paths(xy=frozen(xy), lengths=frozen(lengths), graph=graph, _trees=kept)
+    return Paths(frozen(xy), frozen(lengths), graph, limit=limit, _trees=kept)
 
 
-def _lengths(graph: csr_array, points: int) -> FloatArray:
+def _lengths(graph: csr_array, points: int, limit: float) -> FloatArray:
     """Lengths of the paths between the first points (points, points); a second process finds half of many."""
     kernel = compiled(find_lengths, large=False)
-    if kernel is None:
+    if kernel is None or np.isfinite(limit):
         chunks = np.split(np.arange(points), range(CHUNK, points, CHUNK))
-        return np.concatenate([dijkstra(graph, False, chunk)[:, :points] for chunk in chunks])
+        return np.concatenate([dijkstra(graph, False, chunk, limit=limit)[:, :points] for chunk in chunks])
     both = (graph + graph.T).tocsr()
     pieces = (both.indptr.astype(np.int64), both.indices.astype(np.int64), both.data)
 

@@ -67,15 +67,18 @@ def highest(
     best: int,
     steps: int,
     first_step: float = FIRST_STEP,
+    start: IntArray | None = None,
 ) -> tuple[int, IntArray]:
     """The highest value found of one-trees at weights of the points, and these weights (points,).
+
+    The search begins at the weights `start`, else at none.
 
     The weight of a point rises if a one-tree uses the point too often, and falls if too seldom, by steps
     that shrink to nothing with the square of those that are left. Every tour changes by the same amount, so
     that the value less that amount remains a bound.
     """
-    weight, before = np.zeros(points), np.zeros(points)
-    top = np.zeros(points, dtype=np.int64)
+    top = np.zeros(points, dtype=np.int64) if start is None else start
+    weight, before = top.astype(float), np.zeros(points)
     value, degree = tree_at(top)
     most, longest = value, first_step * max(value, 1) / (2 * points)
     for k in range(steps):

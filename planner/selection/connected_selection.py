@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import block_array, csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.connecting_rows import connecting_rows
@@ -100,15 +100,26 @@ class ConnectedCover:
 
     def parts_with_each(self, rows: IntArray) -> IntArray:
         """Surplus components of these rows and one more, for each other row (all rows,)."""
-        inside = rows[self._region_of[rows] >= 0]
-        components, begun = components_of(self.links, inside), np.unique(self._region_of[inside])
-        met = [np.empty(0, np.int64), *map(self.graph.neighbours, components)]
-        joined = np.bincount(np.concatenate(met), minlength=len(self._region_of))
-        added = np.isin(self._region_of, begun).astype(np.int64) - joined
-        added[self._region_of < 0] = 0
-        added[rows] = 0
-        parts: IntArray = len(components) - len(begun) + added
-        return parts
+        return _parts_with_each(self.graph, self._region_of, rows)
+
+    def among(self, rows: IntArray, others: IntArray) -> Callable[[IntArray], IntArray]:
+        """`parts_with_each` for selections of `others` and some of the `rows`, and for each of these rows.
+
+        Each component of the others counts as one row, as no link between them changes. Rows are given by
+        their index in `rows`, and so is the result.
+        """
+        components = components_of(self.links, others[self._region_of[others] >= 0])
+        sizes = [len(component) for component in components]
+        ends = np.concatenate([np.empty(0, np.int64), *components])
+        entries = (np.ones(len(ends), np.int64), (np.repeat(np.arange(len(sizes)), sizes), ends))
+        whole = csr_array(entries, shape=(len(sizes), self.links.shape[0]))
+        joined = (whole @ self.links.astype(np.int64))[:, rows]
+        among = self.links[rows][:, rows].astype(np.int64)
+        links = csr_array(block_array([[among, joined.T], [joined, None]]) if sizes else among)
+        regions = [self._region_of[component[:1]] for component in components]
+        region_of = np.concatenate([self._region_of[rows], *regions])
+        graph, fixed = LinkGraph(links), np.arange(len(rows), len(rows) + len(sizes))
+        return lambda chosen: _parts_with_each(graph, region_of, np.append(chosen, fixed))[: len(rows)]
 
     def in_region(self, rows: IntArray, number: int) -> IntArray:
         """Those of the rows that are in the region of this number."""
@@ -217,3 +228,16 @@ def _without_some_idle(task: ConnectedCover, rows: IntArray) -> IntArray:
             inside[row] = 0
             rows = rows[rows != row]
     return rows
+
+
+def _parts_with_each(graph: LinkGraph, region_of: IntArray, rows: IntArray) -> IntArray:
+    """Surplus components of rows and one more, for each other row (all rows,), by the region of each."""
+    inside = rows[region_of[rows] >= 0]
+    components, begun = components_of(graph.links, inside), np.unique(region_of[inside])
+    met = [np.empty(0, np.int64), *map(graph.neighbours, components)]
+    joined = np.bincount(np.concatenate(met), minlength=len(region_of))
+    added = np.isin(region_of, begun).astype(np.int64) - joined
+    added[region_of < 0] = 0
+    added[rows] = 0
+    parts: IntArray = len(components) - len(begun) + added
+    return parts

@@ -28,7 +28,7 @@ TURNING = (0.2, 0.4, 0.7, 1.0)
 """Fractions of half a turn added to each path in the search, tried in order until tours meet their limit."""
 SPARE_S = 1e-3
 """Seconds that a tour stays below its limit, since missions are rounded to micrometres."""
-WIDER = (1.0, 1.02, 1.05, 1.1, 1.2, 1.4, 2.0, 4.0, 16.0)
+WIDER = (1.02, 1.05, 1.1, 1.2, 1.4, 2.0, 4.0, 16.0)
 """Multiples of the bound used as time limit in the search for a fleet's tours."""
 SEARCH_UP_TO = 500
 """Stops up to which tours of a fleet are searched; of more a search this short finds none that are better."""
@@ -119,9 +119,9 @@ def _longest(clock: TourTimes, tours: Tours, numbers: list[int]) -> float:
 def _cut(clock: TourTimes, route: Route, numbers: list[int]) -> Tours:
     """The route's stops in equal stretches, each for the start that reaches it first."""
     stretches = [tuple(stretch.tolist()) for stretch in np.array_split(route.order, len(numbers))]
-    least, tours = clock.least, []
+    likely, tours = clock.likely, []
     for number in numbers:
-        nearest = min(stretches, key=lambda stretch: min(least[clock.stops + number, list(stretch)]))
+        nearest = min(stretches, key=lambda stretch: min(likely[clock.stops + number, list(stretch)]))
         stretches.remove(nearest)
         tours.append(nearest)
     return tuple(tours)
@@ -129,7 +129,7 @@ def _cut(clock: TourTimes, route: Route, numbers: list[int]) -> Tours:
 
 def _fleet_tours(clock: TourTimes, numbers: list[int], limit_s: float, *, seed: int) -> Tours | None:
     found = vehicle_tours(
-        clock.estimate(TURNING[0]),
+        np.maximum(clock.turned_s, 0.0),
         stops=clock.stops, depots=[clock.stops + k for k in numbers], pause_s=clock.pause_s,
         limit_s=limit_s, closed=clock.closed, seed=seed,
     )  # fmt: skip
@@ -218,7 +218,7 @@ def _route(whole: Route, clock: TourTimes, tour: Tour, start: int) -> Route:
     back = clock.line(line[-1], line[0]) if clock.closed and len(clock.line(line[-1], line[0])) > 1 else None
     legs = approaches if back is None else [*approaches, back]
     x, y = clock.points[clock.stops + start].tolist()
-    lengths = clock.legs.lengths[np.ix_(line, line)]
+    lengths = clock.lengths[np.ix_(line, line)]
     least = tour_bound(lengths, list(range(len(line))), Ends(0, None, clock.closed, ""))
     return Route(
         selection=selection,

@@ -182,8 +182,8 @@ def _left_out(clock: TourTimes, tour: Tour, start: int) -> FloatArray:
     """Driving time that a tour saves without each of its stops, about (stops,)."""
     line = np.array([clock.stops + start, *tour, clock.stops + start])
     a, at, b = line[:-2], line[1:-1], line[2:]
-    least = clock.least
-    return np.asarray(least[a, at] + least[at, b] - least[a, b])
+    likely = clock.likely
+    return np.asarray(likely[a, at] + likely[at, b] - likely[a, b])
 
 
 def _added(clock: TourTimes, stops: IntArray, tour: Tour, start: int) -> FloatArray:
@@ -194,8 +194,8 @@ def _added(clock: TourTimes, stops: IntArray, tour: Tour, start: int) -> FloatAr
 
 def _added_at(clock: TourTimes, stops: IntArray, line: IntArray) -> FloatArray:
     """Driving time that each stop adds in each leg of a line (stops, legs), about."""
-    least, a, b = clock.least, line[:-1], line[1:]
-    return np.asarray(least[stops[:, None], a] + least[stops[:, None], b] - least[a, b])
+    likely, a, b = clock.likely, line[:-1], line[1:]
+    return np.asarray(likely[stops[:, None], a] + likely[stops[:, None], b] - likely[a, b])
 
 
 def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
@@ -204,18 +204,18 @@ def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
         yield from _reordered(tour)
         return
     line = np.array([clock.stops + start, *tour, clock.stops + start])
-    least, n = clock.least, len(tour)
-    step = least[line[:-1], line[1:]]
-    a, b = np.triu_indices(n + 1, 2)  # the stretch from stop a to before stop b is reversed
-    turned = least[line[a], line[b]] + least[line[a + 1], line[b + 1]] - step[a] - step[b]
-    found = [(gain, begin, end, -1) for gain, begin, end in _best(turned, a, b)]
+    n, away = len(tour), clock.likely[np.ix_(line, line)]
+    step = np.diagonal(away, 1)
+    # the stretch from stop a to before stop b is reversed
+    turned = away[:-1, :-1] + away[1:, 1:] - step[:, None] - step
+    turned[np.tri(n + 1, k=1, dtype=bool)] = np.inf
+    found = [(gain, begin, end, -1) for gain, begin, end in _best(turned)]
     for size in (1, 2, 3):
-        first, at = (index.ravel() for index in np.indices((n - size + 1, n + 1)))
-        apart = (at < first) | (at > first + size)
-        first, at = first[apart], at[apart]
-        closed = least[line[first], line[first + size + 1]] - step[first] - step[first + size]
-        moved = closed + least[line[at], line[first + 1]] + least[line[first + size], line[at + 1]] - step[at]
-        found += [(gain, begin, place, size) for gain, begin, place in _best(moved, first, at)]
+        closed = np.diagonal(away, size + 1) - step[: n - size + 1] - step[size:]
+        moved = closed[:, None] + away[1 : n - size + 2, :-1] + away[size : n + 1, 1:] - step
+        first, at = np.arange(n - size + 1)[:, None], np.arange(n + 1)
+        moved[(at >= first) & (at <= first + size)] = np.inf
+        found += [(gain, begin, place, size) for gain, begin, place in _best(moved)]
     for _, begin, place, size in sorted(found)[:LIKELY]:
         if size < 0:
             yield (*tour[:begin], *tour[begin:place][::-1], *tour[place:])
@@ -225,13 +225,13 @@ def _orders_to_try(clock: TourTimes, tour: Tour, start: int) -> Iterator[Tour]:
         yield (*rest[:at], *stretch, *rest[at:])
 
 
-def _best(change: FloatArray, first: IntArray, second: IntArray) -> Iterator[tuple[float, int, int]]:
+def _best(change: FloatArray) -> Iterator[tuple[float, int, int]]:
     """The changes with the least driving time, LIKELY of them, with their two places."""
-    if len(change) > LIKELY:
-        likely = np.flatnonzero(change <= np.partition(change, LIKELY - 1)[LIKELY - 1])
-        change, first, second = change[likely], first[likely], second[likely]
-    for k in np.argsort(change, kind="stable")[:LIKELY].tolist():
-        yield float(change[k]), int(first[k]), int(second[k])
+    flat = change.ravel()
+    likely = np.flatnonzero(flat <= np.partition(flat, LIKELY - 1)[LIKELY - 1])
+    best = likely[np.argsort(flat[likely], kind="stable")][:LIKELY]
+    for gain, first, second in zip(flat[best], *np.unravel_index(best, change.shape), strict=True):
+        yield float(gain), int(first), int(second)
 
 
 def _reordered(tour: Tour) -> Iterator[Tour]:

@@ -13,12 +13,15 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.routing.assemble import ROUNDING_M, ROUNDING_RAD
-from stopgo.planner.routing.proof import tour_proof
+from stopgo.planner.routing.proof import BRANCH_UP_TO, tour_proof
 from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
-from stopgo.planner.task_allocation.tour_times import TourTimes
+from stopgo.planner.routing.tour_bound import NEVER, growing, highest
+from stopgo.planner.task_allocation.tour_times import DETOURS_UP_TO, TourTimes
 
 NOISE = 1e-6
 """Seconds by which floating-point noise may raise a bound."""
+MOST_STEPS, WORK = 3_000, 8_000_000_000
+"""One-trees of a bound over many points, and edges examined in them; counts, so that speed is no matter."""
 
 
 def least_makespan(clock: TourTimes, starts: IntArray) -> float:
@@ -29,8 +32,9 @@ def least_makespan(clock: TourTimes, starts: IntArray) -> float:
     """
     times = clock.least
     tours, stops = len(starts), clock.stops
-    together = stops * clock.pause_s + driven_together(times, stops, closed=clock.closed)
-    together = max(together, stops * clock.pause_s + driven_and_turned(clock, tours))
+    together = stops * clock.pause_s + driven_and_turned(clock, tours)
+    if stops <= DETOURS_UP_TO:
+        together = max(together, stops * clock.pause_s + driven_together(times, stops, closed=clock.closed))
     even = float(seconds_by_count(clock, times)[math.ceil(stops / tours) - 1])
     farthest = float(alone(clock, times).max()) + clock.pause_s
     return max(together / tours, even, farthest) - NOISE
@@ -83,8 +87,16 @@ def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:
     if not closed:
         # the sparse solver would ignore an edge of length 0
         return max(0.0, float(minimum_spanning_tree(whole + 1e-9).sum()) - 1e-9 * (stops + 1))
-    order = shortest_tour(whole, seed=1)
-    return tour_proof(nanometres(whole), order).bound / NANOMETRES
+    return least_tour(whole)
+
+
+def least_tour(times: FloatArray) -> float:
+    """Lower bound in seconds on a closed tour over all points of a matrix (n, n), which is gone then."""
+    if len(times) <= BRANCH_UP_TO:
+        return tour_proof(nanometres(times), shortest_tour(times, seed=1)).bound / NANOMETRES
+    cost = nanometres(times, in_place=True)
+    steps = min(MOST_STEPS, WORK // len(cost) ** 2)
+    return highest(growing(cost), len(cost), best=NEVER, steps=steps)[0] / NANOMETRES
 
 
 def driven_and_turned(clock: TourTimes, tours: int) -> float:
@@ -98,16 +110,16 @@ def driven_and_turned(clock: TourTimes, tours: int) -> float:
     whole -= lowest
     np.fill_diagonal(whole, 0.0)
     legs = clock.stops + (tours if clock.closed else 0)
-    least = tour_proof(nanometres(whole), shortest_tour(whole, seed=1)).bound / NANOMETRES
+    least = least_tour(whole)
     rounding = ROUNDING_M / clock.robot.speed + 2 * ROUNDING_RAD / clock.robot.turn_rate
     return least + len(whole) * lowest - legs * rounding
 
 
 def _closed_together(clock: TourTimes, tours: int) -> FloatArray:
     """Seconds between stops and as many copies of the nearest start as tours, no two next to each other."""
-    stops = clock.stops
-    among = clock.turned_s[:stops, :stops]
-    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
+    stops, turned = clock.stops, clock.turned_s
+    among = turned[:stops, :stops]
+    there = np.repeat(turned[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
     apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
     return np.block([[among, there], [there.T, apart]])
 
@@ -118,9 +130,9 @@ def _open_together(clock: TourTimes, tours: int) -> FloatArray:
     Each end is next to a stop and to the start of the next tour. The last stop has no turn, so that its
     one leg's share is taken off.
     """
-    stops = clock.stops
-    among = clock.turned_s[:stops, :stops]
-    there = np.repeat(clock.turned_s[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
+    stops, turned = clock.stops, clock.turned_s
+    among = turned[:stops, :stops]
+    there = np.repeat(turned[:stops, stops:].min(axis=1)[:, None], tours, axis=1)
     last = np.repeat(-clock.largest_share_s[:, None], tours, axis=1)
     apart = np.full((tours, tours), 2.0 * float(max(among.max(), there.max())))
     following = apart * (1 - np.eye(tours))

@@ -18,9 +18,11 @@ from stopgo.mission.document.schedule import leg_times
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from stopgo.mission.stages import Selection
-from stopgo.planner.routing import legs_between
+from stopgo.mission.stages import NavigableSpace, Selection
+from stopgo.planner.routing import ALL_PAIRS_UP_TO, legs_between
 from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.nearby_paths import NearbyPaths
+from stopgo.planner.routing.roadmap import nearby_paths_between
 from stopgo.planner.task_allocation.turn_shares import turn_shares
 
 Tour = tuple[int, ...]
@@ -28,8 +30,10 @@ Tour = tuple[int, ...]
 
 MICROSECONDS = 1e6
 """Per second."""
-NEAR = 30
+NEAR = 150
 """Nearest points of each point to which corners of paths are counted in advance."""
+ROWS = 256
+"""Points whose paths are timed as straight ones at a time."""
 DETOURS_UP_TO = 500
 """Points up to which lower bounds allow for detours; this takes time with the cube of their number."""
 
@@ -54,7 +58,7 @@ class TourTimes:
     the same on every machine.
     """
 
-    legs: Legs
+    legs: Legs | NearbyPaths
     points: FloatArray
     stops: int
     robot: RobotSpec
@@ -70,6 +74,12 @@ class TourTimes:
     def _table(self) -> _LegTimes:
         """The legs timed so far."""
         return _LegTimes.unknown(len(self.points))
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Metres of every path (n, n); of many points lower bounds, but between near ones."""
+        legs = self.legs
+        return legs.lengths if isinstance(legs, Legs) else frozen(legs.at_least())
 
     @property
     def starts(self) -> range:
@@ -125,8 +135,10 @@ class TourTimes:
         """Time the legs from `a` to `b` that were not timed before."""
         unknown = self._table.spent[a, b] < 0
         if unknown.any():
-            for pair in np.unique(np.stack([a[unknown], b[unknown]], axis=1), axis=0).tolist():
-                self._time_leg(*pair)
+            pairs = np.unique(np.sort(np.stack([a[unknown], b[unknown]], axis=1), axis=1), axis=0)
+            away = self.lengths[tuple(pairs.T)]
+            for k in np.lexsort((-away, pairs[:, 0])).tolist():  # the farthest first: one search finds all
+                self._time_leg(*pairs[k].tolist())
 
     def _time_leg(self, a: int, b: int) -> None:
         """Time a leg from rest to rest, with its headings; in the other direction it takes as long."""
@@ -162,19 +174,36 @@ class TourTimes:
         return frozen(times)
 
     @cached_property
+    def likely(self) -> FloatArray:
+        """About the seconds (n, n) of every path, for a search: those of few points, else upper bounds."""
+        if isinstance(self.legs, Legs):
+            return self.least
+        times = self._straight_s(self.legs.at_most())
+        times[self._counted] = self._driven_s[self._counted]
+        return frozen(times)
+
+    def _straight_s(self, lengths: FloatArray) -> FloatArray:
+        """Seconds of straight paths, some rows at a time: of thousands of points each table is large."""
+        speed, acceleration = self.robot.speed, self.robot.acceleration
+        times = np.empty_like(lengths)
+        for k in range(0, len(lengths), ROWS):
+            some = straight_times(lengths[k : k + ROWS], speed=speed, acceleration=acceleration)
+            times[k : k + ROWS] = some
+        return times
+
+    @cached_property
     def _driven_s(self) -> FloatArray:
         """Seconds (n, n) of paths from rest to rest, without turns at their ends.
 
         Corners are counted only on paths to the nearest points and to the starts.
         """
-        speed, acceleration = self.robot.speed, self.robot.acceleration
-        times = straight_times(self.legs.lengths, speed=speed, acceleration=acceleration)
+        times = self._straight_s(self.lengths)
         a, b = np.nonzero(self._counted)
         self._time_legs(a, b)
         times[a, b] = self._table.spent[a, b] / MICROSECONDS
         return frozen(times)
 
-    @cached_property
+    @property
     def turned_s(self) -> FloatArray:
         """Lower bounds in seconds (n, n) on paths, with their shares of the turns at both ends.
 
@@ -182,7 +211,10 @@ class TourTimes:
         start has no shares. Legs whose corners were not counted may leave in any direction, so that their
         share is the negative of the largest other one.
         """
-        return frozen(self._driven_s + (self._shares + self._shares.T))
+        shares = self._shares
+        turned = shares + shares.T
+        turned += self._driven_s
+        return frozen(turned)
 
     @property
     def largest_share_s(self) -> FloatArray:
@@ -196,7 +228,7 @@ class TourTimes:
         shares = np.zeros((len(self.points), len(self.points)))
         for stop in range(self.stops):
             near = np.flatnonzero(self._counted[stop] & (self._table.leaving[stop] >= 0))
-            near = near[np.argsort(self.legs.lengths[stop, near], kind="stable")]
+            near = near[np.argsort(self.lengths[stop, near], kind="stable")]
             away = self._table.leaving[stop, near] / MICROSECONDS * self.robot.turn_rate
             scan = float(self.heading[stop]) if len(self.heading) else None
             found = turn_shares(away, turn_rate=self.robot.turn_rate, scan=scan)
@@ -207,14 +239,17 @@ class TourTimes:
     def estimate(self, turning: float) -> FloatArray:
         """Seconds (n, n) of every path, and of a fraction of half a turn before it."""
         turn = turning * math.pi / self.robot.turn_rate
-        return frozen(np.where(self.legs.lengths > 0, self._driven_s + turn, 0.0))
+        return frozen(np.where(self.lengths > 0, self._driven_s + turn, 0.0))
 
     @cached_property
     def _counted(self) -> BoolArray:
         """True (n, n) between points if corners of the path are counted: the nearest ones, and starts."""
-        near = np.argsort(self.legs.lengths, axis=1, kind="stable")[:, 1 : NEAR + 1]
-        counted = np.zeros(self.legs.lengths.shape, dtype=bool)
-        counted[np.arange(len(self.points))[:, None], near] = True
+        counted = np.zeros(self.lengths.shape, dtype=bool)
+        if isinstance(self.legs, Legs):
+            near = np.argsort(self.lengths, axis=1, kind="stable")[:, 1 : NEAR + 1]
+            counted[np.arange(len(self.points))[:, None], near] = True
+        else:
+            counted[tuple(self.legs.near_pairs(NEAR)[0].T)] = True
         counted[:, self.stops :] = True
         counted |= counted.T
         np.fill_diagonal(counted, False)
@@ -231,7 +266,7 @@ def tour_times(
     rows = candidates.kept[selection.chosen]
     heading = candidates.heading[rows] if len(candidates.heading) else np.empty(0)
     return TourTimes(
-        legs=legs_between(candidates.space, points),
+        legs=_legs(candidates.space, points, len(selection.chosen)),
         points=frozen(points),
         stops=len(selection.chosen),
         robot=robot_of(settings),
@@ -240,6 +275,16 @@ def tour_times(
         start_heading=headings,
         closed=closed,
     )
+
+
+def _legs(space: NavigableSpace, points: FloatArray, stops: int) -> Legs | NearbyPaths:
+    """The paths between points, the starts after the stops; of many points those between near ones."""
+    if len(points) <= ALL_PAIRS_UP_TO or space.settings.graph != "exact":
+        return legs_between(space, points, trees=True)
+    paths = nearby_paths_between(space, points)
+    for start in range(stops, len(points)):
+        paths.keep_paths_to(start)
+    return paths
 
 
 def _last_known(headings: IntArray) -> IntArray:

@@ -170,3 +170,22 @@ def test_trees_that_are_kept_are_those_found_again(monkeypatch: pytest.MonkeyPat
         assert kept.lengths.tolist() == again.lengths.tolist()
         assert kept.before(few).tolist() == again.before(few).tolist()
         assert all(kept.path(a, 5).tolist() == again.path(a, 5).tolist() for a in few.tolist())
+
+
+def test_paths_to_a_point_that_are_kept_are_as_short() -> None:
+    near, paths = both(5)
+    near.keep_paths_to(59)
+    for a in range(59):
+        line = near.path(a, 59)
+        assert polyline_length(line) == pytest.approx(paths.lengths[a, 59])
+        assert line[[0, -1]].tolist() == paths.xy[[a, 59]].tolist()
+
+
+def test_paths_beyond_the_limit_are_not_found() -> None:
+    xy, edges = network(4)
+    every, near = (shortest_paths(xy, edges, 30, limit=limit) for limit in (np.inf, 40.0))
+    found = every.lengths <= 40.0
+    assert 30 < found.sum() < 900
+    assert np.array_equal(np.isfinite(near.lengths), found)
+    assert near.lengths[found].tolist() == every.lengths[found].tolist()
+    assert (near.before(np.arange(3))[:, :30][~found[:3]] < 0).all()

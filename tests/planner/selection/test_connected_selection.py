@@ -141,3 +141,16 @@ def test_components_with_each_further_row_are_counted_at_once(seed: int) -> None
         rows = np.sort(random.choice(30, count, replace=False))
         each = [task.parts(np.union1d(rows, [row]).astype(np.int64)) for row in range(30)]
         assert task.parts_with_each(rows).tolist() == each
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rows_that_stay_count_by_their_components(seed: int) -> None:
+    task, random = task_of(seed, rows=30, near=0.2), np.random.default_rng(seed)
+    mixed = random.permutation(30)
+    rows, others = np.sort(mixed[:12]), np.sort(mixed[12:20])
+    parts = task.among(rows, others)
+    for _ in range(10):
+        chosen = np.flatnonzero(random.random(12) < 0.4)
+        each = task.parts_with_each(np.union1d(rows[chosen], others))
+        assert parts(chosen).tolist() == each[rows].tolist()
+    assert task.among(rows, others[:0])(chosen).tolist() == task.parts_with_each(rows[chosen])[rows].tolist()

@@ -135,6 +135,31 @@ def test_bounds_without_detours_hold_too(monkeypatch: pytest.MonkeyPatch) -> Non
     assert least_makespan(clock, np.zeros(1, np.int64)) <= best_time(clock, [*range(clock.stops)], 0, known)
 
 
+@pytest.mark.parametrize("robots", [1, 2, 3])
+def test_bounds_from_near_paths_hold_too(robots: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    starts, known, stops = np.zeros(robots, np.int64), {}, tuple(range(clock_of(route_of("hall")).stops))
+    bound = least_makespan(clock_of(route_of("hall")), starts)
+    for name, value in (("ALL_PAIRS_UP_TO", 0), ("NEAR", 3), ("DETOURS_UP_TO", 0)):
+        monkeypatch.setattr(tour_times_module, name, value)
+    clock = clock_of(route_of("hall"))
+    best = min(
+        max(best_time(clock, group, 0, known) for group in groups)
+        for groups in partitions(stops)
+        if len(groups) == robots
+    )
+    assert 0.5 * bound < least_makespan(clock, starts) <= best + 1e-6
+
+
+def test_many_stops_are_divided_by_the_paths_near_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    route = route_of("hall", robots=2)
+    monkeypatch.setattr(tour_times_module, "ALL_PAIRS_UP_TO", 0)
+    made = dividing.divided(route)
+    assert sorted(np.concatenate([part.selection.chosen for part in made.routes])) == sorted(
+        route.selection.chosen
+    )
+    assert made.bound <= dividing.division_cost(made)[0]
+
+
 @cache
 def settled(world: str, **changes: Any) -> DividedPlan:
     made = plan(WORLDS[world], Settings(range=3.5, start=START, **changes))

@@ -22,8 +22,8 @@ class StraightDrives:
     def __init__(self, stops: int, seed: int) -> None:
         xy = np.concatenate([np.random.default_rng(seed).uniform(0, 60, (stops, 2)), [(0.0, 0.0)]])
         self.stops, self.timed = stops, 0
-        self.least = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
-        self._rows = self.least.tolist()
+        self.likely = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
+        self._rows = self.likely.tolist()
 
     def seconds(self, tour: Tour, start: int = 0) -> float:
         self.timed += 1
