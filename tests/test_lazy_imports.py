@@ -30,7 +30,6 @@ REASONS = {
     "stopgo.planner.floors.linework.swings": "as candidates.triangulation",
     "stopgo.planner.floors.rings": "as candidates.triangulation",
     "stopgo.planner.routing.grid_graph": "as candidates.triangulation: few plans use grids",
-    "stopgo.planner.geometry.side_work": "Windows has no fcntl; no process is forked there",
     "stopgo.planner.pipeline": "`import stopgo.planner` loads no stage",
     "stopgo.recordings.viewing.importer": "Rerun asks of every file; most are not ours",
 }

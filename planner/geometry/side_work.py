@@ -24,8 +24,6 @@ from stopgo.mission.console.running_step import TICKING
 from stopgo.mission.geometry import frozen
 
 T = TypeVar("T")
-PIPE = 2**20
-"""Bytes of an answer that may wait to be read, the most that Linux allows every user."""
 
 
 class SideWork(Generic[T]):
@@ -77,11 +75,7 @@ class SideWork(Generic[T]):
         self._end()
 
     def _fork(self) -> None:
-        import fcntl  # not on Windows
-
         self._answer, end = os.pipe()
-        with contextlib.suppress(OSError):  # too much for one user; else a large answer takes fewer turns
-            fcntl.fcntl(end, fcntl.F_SETPIPE_SZ, PIPE)
         process = 0
         with contextlib.suppress(OSError):  # too many processes, or too little memory
             process = os.fork()
