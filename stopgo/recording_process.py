@@ -23,7 +23,7 @@ from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any
 
 from stopgo.freed_memory import looking_seldom
-from stopgo.mission.console.process import ENDING
+from stopgo.mission.console.process import ending_signals
 from stopgo.mission.errors import InputError
 from stopgo.planner.geometry.side_work import can_fork
 from stopgo.spared_modules import SPARED_OF_RERUN, gather_when_used, load_when_used
@@ -160,18 +160,23 @@ class _Fork:
         asked, to = os.pipe()
         back, answers = os.pipe()
         self.stdin, self.stdout = os.fdopen(to, "wb"), os.fdopen(back, "rb")
-        self.pid = os.fork()
-        if not self.pid:
-            self._serve(asked, answers)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ending_signals())  # else both may answer one
+        try:
+            self.pid = os.fork()
+            if not self.pid:
+                self._serve(asked, answers, before)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         os.close(asked)
         os.close(answers)
 
-    def _serve(self, asked: int, answers: int) -> None:
+    def _serve(self, asked: int, answers: int, mask: set[int]) -> None:
         """In the other process: serve without this terminal; it never returns."""
         try:
             os.setsid()  # Ctrl-C reaches the first process, which ends this one
-            for name in ENDING:
-                signal.signal(getattr(signal, name), signal.SIG_DFL)
+            for ending in ending_signals():
+                signal.signal(ending, signal.SIG_DFL)
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             self.stdin.close()  # else the input would never end
             self.stdout.close()
             nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -186,12 +191,14 @@ class _Fork:
     def kill(self) -> None:
         """End it, also in the middle of its work."""
         if self.pid:
-            os.kill(self.pid, signal.SIGKILL)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, signal.SIGKILL)
 
     def wait(self) -> None:
         """Wait until it has ended."""
         if self.pid:
-            os.waitpid(self.pid, 0)
+            with contextlib.suppress(ChildProcessError):  # where SIGCHLD is ignored it has gone by itself
+                os.waitpid(self.pid, 0)
             self.pid = 0
 
     def communicate(self) -> None:

@@ -213,6 +213,7 @@ class ZenohLink:
         self._declared: list[Any] = []
         self._publishers: list[zenoh.Publisher] = []
         self._queriers: dict[str, zenoh.Querier] = {}
+        self._asking, self._closed = threading.Lock(), False
         self._lock = threading.Lock()
         self._silent = False
         self.may_be_sent = False
@@ -330,10 +331,14 @@ class ZenohLink:
         A router says who serves a key only after it was asked, so the answer may come too late for the
         first question on a key. The queriers are kept for the next one.
         """
-        if key not in self._queriers:
-            self._queriers[key] = self._session.declare_querier(key, target=zenoh.QueryTarget.ALL_COMPLETE)
-        status: Any = self._queriers[key].matching_status  # zenoh declares it as a bool, which it is not
-        return bool(status.matching)
+        with self._asking:
+            if self._closed:
+                return False
+            if key not in self._queriers:
+                target = zenoh.QueryTarget.ALL_COMPLETE
+                self._queriers[key] = self._session.declare_querier(key, target=target)
+            status: Any = self._queriers[key].matching_status  # declared as a bool, which it is not
+            return bool(status.matching)
 
     def hear(self, key: str, heard: Hearing) -> None:
         judged = self._signing.verify_publications(heard)
@@ -353,7 +358,10 @@ class ZenohLink:
         with self._lock:
             _undeclare(self._declared)
             _undeclare(self._publishers)
-            _undeclare(list(self._queriers.values()))
+        with self._asking:
+            self._closed = True
+            while self._queriers:
+                self._queriers.popitem()[1].undeclare()
 
 
 def _undeclare(declared: list[Any]) -> None:

@@ -42,7 +42,7 @@ class Signals:
             return self
         if self._whole_process:
             sys.unraisablehook = _raise_again
-        for number in _ending_signals():
+        for number in ending_signals():
             if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
                 self._before[number] = signal.signal(number, self._handle)
         return self
@@ -65,7 +65,7 @@ class Signals:
         raise SystemExit(128 + number)
 
 
-def _ending_signals() -> list[signal.Signals]:
+def ending_signals() -> list[signal.Signals]:
     """Return the signals of ENDING that this system has."""
     return [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
 

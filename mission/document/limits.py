@@ -69,7 +69,7 @@ def most_spacing_mm(settings: Settings) -> float | None:
     """
     known = settings.angular_step is not None and settings.coverage_rule != "paper"
     if settings.density is None and known:
-        return 1000 * settings.d_dis
+        return round(1000 * settings.d_dis, 6)
     return settings.density
 
 

@@ -124,6 +124,16 @@ class TourProblem:
         found: FloatArray = self.candidates.xy[self.candidates.kept[self.rows]].reshape(-1, 2)
         return found
 
+    @property
+    def begins_at_door(self) -> bool:
+        """True if the route begins at the stop nearest an exterior door, where there is one."""
+        return self.settings.start is None and self.begin is None
+
+    @cached_property
+    def placed_rows(self) -> IntArray:
+        """All these rows and those of stops, which may only connect scans, ascending."""
+        return np.union1d(self.all_rows, self.rows).astype(np.int64)
+
     @cached_property
     def all_rows(self) -> IntArray:
         """All rows that are offered or required, ascending: the points of the time bound."""
@@ -181,11 +191,11 @@ class TourProblem:
 
     @cached_property
     def task(self) -> LineTask:
-        rank = rank_at_door(self.candidates, self.rows)[0] if self.settings.start is None else None
+        rank = rank_at_door(self.candidates, self.rows)[0] if self.begins_at_door else None
         return LineTask(
             cover=of_rows(self.left_to_see, self.rows),
             stays=np.isin(self.rows, self.staying),
-            rank=None if self.begin is not None else rank,
+            rank=rank,
             joins=lambda positions: self.joins(self.rows[positions])[self.rows],
         )
 

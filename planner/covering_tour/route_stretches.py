@@ -19,7 +19,7 @@ from stopgo.planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, Leg
 from stopgo.planner.covering_tour.problem import TourProblem, nearest_rows, of_rows
 from stopgo.planner.covering_tour.search import LineTask, shorter_line
 from stopgo.planner.covering_tour.timed_line import LineTimes
-from stopgo.planner.routing import GRAPHS
+from stopgo.planner.routing import GRAPHS, rank_at_door
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.paths import shortest_paths
 from stopgo.planner.routing.roadmap import graph_of
@@ -51,7 +51,7 @@ def by_stretches(problem: TourProblem) -> IntArray:
 
 def pieces_of(problem: TourProblem) -> tuple[FloatArray, IntArray]:
     """Nodes and straight pieces of the paths between all rows of a problem, which are the first nodes."""
-    return graph_of(problem.route.space, problem.candidates.xy[problem.candidates.kept[problem.all_rows]])
+    return graph_of(problem.route.space, problem.candidates.xy[problem.candidates.kept[problem.placed_rows]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +72,9 @@ class _Stretch:
     def rows(self) -> IntArray:
         """Row of each position (positions,)."""
         offered = np.setdiff1d(self.problem.offered, self.others)
+        if self.problem.begins_at_door:  # no other stop may be nearer to the door than the first
+            rank = rank_at_door(self.problem.candidates, np.append(offered, self.done[0]))[0]
+            offered = offered if rank is None else offered[rank[:-1] > rank[-1]]
         nearest = nearest_rows(self.problem.candidates, offered, self.own, most=POSITIONS)
         return np.union1d(nearest, self.own).astype(np.int64)
 
@@ -128,7 +131,7 @@ class _Stretch:
 
     def _legs(self) -> Legs:
         """Paths between the points, over those nodes that these paths may use."""
-        (xy, edges), whole = self.pieces, self.problem.all_rows
+        (xy, edges), whole = self.pieces, self.problem.placed_rows
         points = np.searchsorted(whole, self._points)
         line = np.concatenate([self.done[-1:], self.own, self.left[:1]])
         at = xy[np.searchsorted(whole, line)]

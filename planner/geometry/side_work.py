@@ -7,6 +7,7 @@ a result, the work is done when its result is needed.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import io
 import os
 import pickle
@@ -24,6 +25,8 @@ from stopgo.mission.console.running_step import TICKING
 from stopgo.mission.geometry import frozen
 
 T = TypeVar("T")
+PR_SET_PDEATHSIG = 1
+"""Option of Linux's prctl: the signal that a process gets when its parent ends."""
 
 
 class SideWork(Generic[T]):
@@ -76,18 +79,19 @@ class SideWork(Generic[T]):
 
     def _fork(self) -> None:
         self._answer, end = os.pipe()
-        process = 0
+        process, parent = 0, os.getpid()
         with contextlib.suppress(OSError):  # too many processes, or too little memory
             process = os.fork()
             if not process:
-                self._serve(end)
+                self._serve(end, parent)
         os.close(end)
         self._process = process
 
-    def _serve(self, end: int) -> None:
+    def _serve(self, end: int, parent: int) -> None:
         """In the other process: do the work, and answer; it never returns."""
         try:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+            _end_with(parent)
             os.close(self._answer)
             if self._before >= 0:
                 select.select([self._before], [], [])  # there is something to read, or its process has ended
@@ -113,7 +117,8 @@ class SideWork(Generic[T]):
         if self._process:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self._process, signal.SIGKILL)
-            os.waitpid(self._process, 0)
+            with contextlib.suppress(ChildProcessError):  # where SIGCHLD is ignored it has gone by itself
+                os.waitpid(self._process, 0)
         self._process, self._answer = 0, -1
 
 
@@ -140,3 +145,11 @@ def can_fork() -> bool:
     others = [thread for thread in threading.enumerate() if thread.name != TICKING]
     alone = others == [threading.main_thread()]
     return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and alone
+
+
+def _end_with(parent: int) -> None:
+    """Let this process end with the one that forked it, also if that is killed; on Linux."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, int(signal.SIGKILL))
+    if os.getppid() != parent:
+        os._exit(0)

@@ -23,6 +23,8 @@ from stopgo.planner.scan_simulation.strips import CELL_M, Strips
 
 ON_SURFACE_M = 0.02
 """A hit this far before or behind a cell's plane, along its normal, is on the cell."""
+GRAZING = 1e-3
+"""Cosine of the incidence at which a ray shows nothing of a surface."""
 PROBE_M = 0.05
 """Distance from which a cell's surface is looked for."""
 UPRIGHT = 0.05
@@ -82,7 +84,7 @@ class ModelScene:
         directions = towards / np.maximum(far, 1e-9)[:, None]
         away = self.away(np.broadcast_to(position, directions.shape), directions)
         cosine = np.abs(np.einsum("ij,ij->i", directions, normal))
-        found: BoolArray = np.abs(away - far) * cosine <= ON_SURFACE_M
+        found: BoolArray = (np.abs(away - far) * cosine <= ON_SURFACE_M) & (cosine > GRAZING)
         return found
 
     def existing(self, strips: Strips) -> BoolArray:
@@ -139,7 +141,7 @@ def scanned_model(scene: ModelScene, strips: Strips, pose: ScannerPose, simulati
     far = np.linalg.norm(towards, axis=1)
     directions = towards / np.maximum(far, 1e-9)[:, None]
     cosine = np.abs(np.einsum("ij,ij->i", directions, strips.normal))
-    cell = np.flatnonzero(in_reach(towards, pose, simulation) & (cosine > 1e-3))
+    cell = np.flatnonzero(in_reach(towards, pose, simulation) & (cosine > GRAZING))
     on = scene.reached(pose.position, towards[cell], strips.normal[cell])
     width = _widths(strips, cell)
     columns = _columns_on(towards[cell], strips.normal[cell], width, pose, simulation)

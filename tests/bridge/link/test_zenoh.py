@@ -197,6 +197,32 @@ def test_a_question_that_arrived_unanswered_may_be_sent(behind_router: bool) -> 
         assert link.may_be_sent
 
 
+def test_a_question_ends_quietly_if_its_link_closes() -> None:
+    endpoint, arrived, ended = f"tcp/127.0.0.1:{free_port()}", threading.Event(), threading.Event()
+    kept = []
+
+    def keep(query: zenoh.Query) -> None:
+        kept.append(query)
+        arrived.set()
+
+    config = zenoh.Config()
+    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with zenoh.open(config) as other, connecting(endpoint) as link:
+        served = other.declare_queryable("a/b", keep, complete=True)
+        link.await_others(1, 20.0)
+
+        def ask() -> None:
+            while not arrived.is_set():
+                link.ask("a/b", timeout_s=0.5)
+            ended.set()
+
+        threading.Thread(target=ask).start()
+        assert arrived.wait(20.0)
+        link.close()
+        assert served and ended.wait(20.0)
+
+
 def test_a_session_that_is_open_does_not_keep_the_interpreter() -> None:
     code = (
         "from stopgo.bridge.link.zenoh_link import listening\n"

@@ -69,3 +69,31 @@ def test_paths_are_found_as_far_as_a_stretch_needs_them(monkeypatch: pytest.Monk
     driven = two_step("hall", 1)
     made = least_time_route(driven)
     assert made.time is not None and made.time.seconds <= seconds_of(driven)
+
+
+def test_no_stop_of_a_stretch_is_nearer_to_the_door_than_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The door is where the last stop of the route is, so that most candidates are nearer to it."""
+    problem = problem_of(two_step("hall", 1))
+    xy = problem.candidates.xy[problem.candidates.kept]
+    rows = problem.route.selection.chosen[problem.route.order][::-1]
+    door = xy[rows[0]] + 0.3
+
+    def ranked(candidates: object, asked: np.ndarray) -> tuple[np.ndarray, str]:
+        return np.argsort(np.argsort(np.hypot(*(xy[asked] - door).T), kind="stable")), "a door"
+
+    monkeypatch.setattr(stretches, "rank_at_door", ranked)
+    legs = np.full(len(rows), 99.0)
+    pieces = stretches.pieces_of(problem)
+    stretch = stretches._Stretch(problem, pieces, rows[:1], rows[1:-1], rows[-1:], legs, -1)
+    away = np.hypot(*(xy - door).T)
+    added = np.setdiff1d(stretch.rows, stretch.own)
+    assert len(added)
+    assert (away[added] > away[rows[0]]).all() == problem.begins_at_door
+
+
+def test_stops_that_only_connect_scans_have_their_own_places() -> None:
+    problem = problem_of(two_step("corridor", 0, register=True))
+    assert set(problem.rows.tolist()) <= set(problem.placed_rows.tolist())
+    nodes = stretches.pieces_of(problem)[0][: len(problem.placed_rows)]
+    at = problem.candidates.kept[problem.placed_rows]
+    assert np.allclose(nodes, problem.candidates.xy[at])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from functools import partial
 from pathlib import Path
@@ -128,3 +129,43 @@ def test_a_plan_is_the_same_with_a_second_process(
     assert forked.figures == alone.figures
     assert forked.mission == alone.mission
     assert not forked.space.targets.a.flags.writeable
+
+
+def test_a_process_whose_end_was_taken_note_of_elsewhere_is_no_error() -> None:
+    """A parent that ignores SIGCHLD passes that on, and children then go without being waited for."""
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        with SideWork(lambda: "done", forked=True) as work:
+            assert work.result() == "done"
+        with SideWork(lambda: "done", forked=True):
+            pass
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
+def test_what_a_killed_process_has_begun_ends_with_it(tmp_path: Path) -> None:
+    place = tmp_path / "workers"
+
+    def long_work() -> str:
+        _noted(place)
+        signal.alarm(60)
+        signal.pause()
+        return ""
+
+    def nested() -> str:
+        with SideWork(long_work, forked=True) as inner:
+            return inner.result()
+
+    with SideWork(nested, forked=True):
+        wait_until(lambda: place.exists() and bool(_workers(place)))
+        (worker,) = _workers(place)
+    wait_until(lambda: not _runs(worker))
+
+
+def _runs(process: int) -> bool:
+    """True unless a process has ended; one that nobody has waited for has ended too."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
