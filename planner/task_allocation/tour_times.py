@@ -175,7 +175,7 @@ class TourTimes:
 
     @cached_property
     def likely(self) -> FloatArray:
-        """About the seconds (n, n) of every path, for a search: of many points upper bounds, but between near ones."""
+        """About the seconds (n, n) of every path, for a search; of many points upper bounds for far ones."""
         if isinstance(self.legs, Legs):
             return self.least
         times = self._straight_s(self.legs.at_most())
