@@ -175,7 +175,7 @@ class TourTimes:
 
     @cached_property
     def likely(self) -> FloatArray:
-        """About the seconds (n, n) of every path, for a search: those of few points, else upper bounds."""
+        """About the seconds (n, n) of every path, for a search; of many points upper bounds for far ones."""
         if isinstance(self.legs, Legs):
             return self.least
         times = self._straight_s(self.legs.at_most())
@@ -239,7 +239,8 @@ class TourTimes:
     def estimate(self, turning: float) -> FloatArray:
         """Seconds (n, n) of every path, and of a fraction of half a turn before it."""
         turn = turning * math.pi / self.robot.turn_rate
-        return frozen(np.where(self.lengths > 0, self._driven_s + turn, 0.0))
+        times = self._driven_s if isinstance(self.legs, Legs) else self.likely
+        return frozen(np.where(self.lengths > 0, times + turn, 0.0))
 
     @cached_property
     def _counted(self) -> BoolArray:
