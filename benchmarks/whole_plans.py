@@ -115,13 +115,13 @@ def same(former: Path, present: Path) -> str:
     return ", ".join([*differ, *missing]) or ("same" if names else "none")
 
 
-def plans(folder: Path) -> Iterator[Plan]:
-    """Floors at hand, then large ones that are drawn into a folder."""
+def plans(folder: Path, counts: tuple[int, ...] = COPIES) -> Iterator[Plan]:
+    """Floors at hand, then so many copies of one, and a hall, that are drawn into a folder."""
     at_hand = {name: path for name, path in FLOORS.items() if path.exists()}
     yield from (Plan(name, path) for name, path in at_hand.items())
     if "office-l1" in at_hand:
         floor = read_floor(at_hand["office-l1"], FloorOptions())
-        for count in COPIES:
+        for count in counts:
             path = folder / f"copies-{count}.dxf"
             path.write_bytes(layered_dxf(copies(floor, count)))
             yield Plan(f"office-l1, {count} times", path)
@@ -187,10 +187,11 @@ def main() -> None:
     """Plan everything, print, and write the tables."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        made = list(plans(folder))
         if len(sys.argv) > 1:
-            put("former", former_table(Path(sys.argv[1]).resolve(), made, folder))
+            few = list(plans(folder, COPIES[:1]))
+            put("former", former_table(Path(sys.argv[1]).resolve(), few, folder))
             return
+        made = list(plans(folder))
         runs = []
         for plan in made:
             runs.append((plan, planned(ROOT, plan, folder / "out")))
