@@ -19,8 +19,6 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements, _Relaxation, least_time
-from stopgo.planner.covering_tour.leg_kernel import follow
-from stopgo.planner.covering_tour.leg_table import MICROSECONDS, leg_table
 from stopgo.planner.covering_tour.problem import TourProblem, problem_of
 from stopgo.planner.covering_tour.search import shorter_line
 from stopgo.planner.covering_tour.time_graph import TimeGraph
@@ -28,6 +26,8 @@ from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
 from stopgo.planner.routing.assemble import assemble
+from stopgo.planner.routing.leg_kernel import follow
+from stopgo.planner.routing.leg_table import MICROSECONDS, leg_table
 from stopgo.planner.selection import cover_problem
 from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size, some

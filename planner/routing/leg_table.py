@@ -14,9 +14,9 @@ from stopgo.mission.document import RobotSpec
 from stopgo.mission.document.schedule import turn_time
 from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.planner.covering_tour.leg_kernel import follow
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.shapes import SLACK
+from stopgo.planner.routing.leg_kernel import follow
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.paths import Paths
 
@@ -45,6 +45,12 @@ class LegTable:
     whole_turn: int
     """Microseconds of a full turn."""
 
+    @classmethod
+    def empty(cls, points: int, robot: RobotSpec) -> LegTable:
+        """A table without legs; what is negative is not known yet."""
+        none = (np.full((points, points), NO_HEADING, dtype=np.int64) for _ in range(3))
+        return cls(*none, whole_turn=_whole_turn(robot))
+
     def turns(self, a: IntArray, b: IntArray) -> IntArray:
         """Microseconds to turn between headings in the shorter direction; 0 where either is none."""
         apart = np.abs(a - b)
@@ -61,7 +67,7 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
 
     The paths of a third-party graph count as straight, because only their lengths are known.
     """
-    whole_turn = round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
+    whole_turn = _whole_turn(robot)
     if legs.graph.ours:
         seconds, leaving, arriving = _followed(legs.paths, len(legs.points), robot)
     else:
@@ -79,6 +85,10 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
         arriving=frozen(np.where(driven, headings[1], NO_HEADING), np.int64),
         whole_turn=whole_turn,
     )
+
+
+def _whole_turn(robot: RobotSpec) -> int:
+    return round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
 
 
 def _followed(paths: Paths, points: int, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
