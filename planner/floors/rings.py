@@ -60,7 +60,7 @@ def repaired(ring: FloatArray) -> tuple[list[shapely.Polygon], bool]:
 
 def polygons_of(region: Region) -> list[shapely.Polygon]:
     """Return the polygons of any geometry, without slivers, lines and points."""
-    parts = shapely.get_parts(shapely.get_parts(region))
+    parts = [region] if isinstance(region, shapely.Polygon) else shapely.get_parts(shapely.get_parts(region))
     return [part for part in parts if isinstance(part, shapely.Polygon) and part.area > SLIVER]
 
 
@@ -95,30 +95,33 @@ def to_shapely(polygon: Polygon) -> shapely.Polygon:
 
 def distinct(polygons: Sequence[shapely.Polygon]) -> list[int]:
     """For each polygon the index of the first that draws the same within `SNAP`, or its own."""
-    tree = shapely.STRtree(polygons)
     first = list(range(len(polygons)))
-    for index, polygon in enumerate(polygons):
-        for other in sorted(tree.query(polygon)):
-            if other < index and first[other] == other and _same(polygons[other], polygon):
-                first[index] = int(other)
-                break
+    shapes = np.array(polygons, dtype=object)
+    index, other = shapely.STRtree(shapes).query(shapes)
+    boxes = shapely.bounds(shapes)
+    near = (other < index) & (np.abs(boxes[index] - boxes[other]) <= SNAP).all(axis=1)
+    for k, earlier in sorted(zip(index[near].tolist(), other[near].tolist(), strict=True)):
+        if first[k] == k and first[earlier] == earlier and _same(shapes[earlier], shapes[k]):
+            first[k] = earlier
     return first
 
 
 def _same(one: shapely.Polygon, other: shapely.Polygon) -> bool:
-    if any(abs(a - b) > SNAP for a, b in zip(one.bounds, other.bounds, strict=True)):
-        return False
-    return one.symmetric_difference(other).area <= SNAP * max(one.length, other.length) / 2
+    return bool(one.symmetric_difference(other).area <= SNAP * max(one.length, other.length) / 2)
 
 
 def parents(polygons: Sequence[shapely.Polygon]) -> list[int | None]:
     """For each polygon the smallest larger one that contains it (within `SNAP`), or None."""
-    tree = shapely.STRtree(polygons)
-    found: list[int | None] = []
-    for index, polygon in enumerate(polygons):
-        around = [int(i) for i in tree.query(polygon) if i != index and polygons[i].area > polygon.area]
-        holding = [i for i in around if _holds(polygons[i], polygon)]
-        found.append(min(holding, key=lambda i: (polygons[i].area, i)) if holding else None)
+    shapes = np.array(polygons, dtype=object)
+    area = shapely.area(shapes)
+    found: list[int | None] = [None] * len(shapes)
+    inner, outer = shapely.STRtree(shapes).query(shapes)
+    larger = area[outer] > area[inner]
+    inner, outer = inner[larger], outer[larger]
+    order = np.lexsort((outer, area[outer], inner))
+    for k, around in zip(inner[order].tolist(), outer[order].tolist(), strict=True):
+        if found[k] is None and _holds(shapes[around], shapes[k]):
+            found[k] = around
     return found
 
 
