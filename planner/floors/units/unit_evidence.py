@@ -29,7 +29,7 @@ _HOUSE = 30.0
 """Curves are cut as if the drawing had this size in metres."""
 _MOST = 3000
 """Walls' lines that are compared with one another: the longest."""
-_BLOCK = 64
+_BLOCK = 16
 """Lines that are compared with all others at a time."""
 _SLIM = 25.0
 """Walls' faces are nearer to each other than this fraction of the drawing; lines of rooms are not."""
