@@ -12,7 +12,7 @@ from stopgo.mission.stages import RoomSpace
 from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
 from stopgo.planner.space.ground import Ground
-from stopgo.planner.space.opening_joins import part_near, threshold
+from stopgo.planner.space.opening_joins import threshold
 
 LEAST_UNNAMED = 0.5
 """Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""
@@ -34,7 +34,7 @@ def room_spaces(
             room=index,
             name=name,
             area=to_polygons(shape, ground.origin),
-            stop_area=to_polygons(shape.intersection(part_near(allowed, shape)), ground.origin),
+            stop_area=to_polygons(shape.intersection(allowed.around(shape.bounds)), ground.origin),
         )
         for index, name, shape in planned
     )
@@ -50,10 +50,14 @@ def _without_inner(
 
 
 def stop_area_of(ground: Ground, settings: Settings) -> BaseGeometry:
-    """The area where stops may be, for pictures only: it is approximate."""
+    """The area where stops may be, for pictures only: it is approximate.
+
+    Obstacles are widened each by itself: the time for all together grows with the square of their number.
+    """
     keep = max(settings.d_sec, settings.radius)
     edges = shapely.boundary(to_shape(ground.floor.outline, ground.origin))
-    near = (roughly_widened(ground.obstacles, keep), roughly_widened(edges, settings.edge))
+    solid = [roughly_widened(part, keep) for part in polygon_parts(ground.obstacles)]
+    near = (shapely.union_all(solid), roughly_widened(edges, settings.edge))
     return ground.outline.difference(near[0]).difference(near[1])
 
 
