@@ -47,12 +47,12 @@ class Ground:
     """Openings not driven through (k, 2, 2)."""
 
     @classmethod
-    def of(cls, floor: FloorPlan, settings: Settings) -> Ground:
+    def of(cls, floor: FloorPlan, settings: Settings, *, forked: bool = False) -> Ground:
         origin = local_origin(floor)
         solids = [solid_of(item, origin, HAIRLINE) for item in floor.elements if item.obstacle]
         obstacles = union(solids)  # not snapped: clearances are decided on it
         rings = RingIndex(obstacles)
-        crossings = crossings_of(floor, rings, settings)
+        crossings = crossings_of(floor, rings, settings, forked=forked)
         inner = [threshold(item) for item in crossings if not item.closed_because]
         slab = to_shape(floor.outline, origin)
         holes = [shapely.Polygon(ring) for part in polygon_parts(slab) for ring in part.interiors]

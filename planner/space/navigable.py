@@ -42,10 +42,11 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
-    with _SideWorks(forked=_is_large(floor)) as works:
+    large = _is_large(floor)
+    with _SideWorks(forked=large) as works:
         scanned = partial(_occluders_and_targets, floor, settings)
         scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
-        ground = Ground.of(floor, settings)
+        ground = Ground.of(floor, settings, forked=large)
         scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
         clearing = works.begun(partial(_cleared, ground, settings), after=scanning)
         drive_area, gaps = drivable(ground, settings)
@@ -55,7 +56,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         _check_targets(floor, targets)
         (obstacles, obstacle_shape), areas = clearing.result()
         dividing = works.begun(partial(_rooms, ground, drive_area, areas, targets))
-        states, findings = opening_states(ground, parts, settings)
+        states, findings = opening_states(ground, parts, settings, forked=large)
         rooms, faced = dividing.result()
     space = NavigableSpace(
         floor=floor,
