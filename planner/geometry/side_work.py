@@ -25,7 +25,7 @@ from stopgo.mission.console.running_step import TICKING
 from stopgo.mission.geometry import frozen
 
 T = TypeVar("T")
-Item = TypeVar("Item")
+Argument = TypeVar("Argument")
 PR_SET_PDEATHSIG = 1
 """Option of Linux's prctl: the signal that a process gets when its parent ends."""
 
@@ -123,7 +123,7 @@ class SideWork(Generic[T]):
         self._process, self._answer = 0, -1
 
 
-def in_halves(work: Callable[[Sequence[Item]], list[T]], items: Sequence[Item], *, forked: bool) -> list[T]:
+def in_halves(work: Callable[[Sequence[Argument]], list[T]], items: Sequence[Argument], *, forked: bool) -> list[T]:
     """Return the results of items, in their order; another process finds those of the second half."""
     middle = len(items) // 2 if forked else len(items)
     with SideWork(lambda: work(items[middle:]), forked=forked) as rest:
