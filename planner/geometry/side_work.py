@@ -123,7 +123,9 @@ class SideWork(Generic[T]):
         self._process, self._answer = 0, -1
 
 
-def in_halves(work: Callable[[Sequence[Argument]], list[T]], items: Sequence[Argument], *, forked: bool) -> list[T]:
+def in_halves(
+    work: Callable[[Sequence[Argument]], list[T]], items: Sequence[Argument], *, forked: bool
+) -> list[T]:
     """Return the results of items, in their order; another process finds those of the second half."""
     middle = len(items) // 2 if forked else len(items)
     with SideWork(lambda: work(items[middle:]), forked=forked) as rest:
