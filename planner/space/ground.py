@@ -40,6 +40,8 @@ class Ground:
     origin: FloatArray
     outline: BaseGeometry
     """The floor layer and the floor under inner openings."""
+    solids: list[BaseGeometry]
+    """Each obstacle by itself, in the floor's order."""
     obstacles: BaseGeometry
     obstacle_rings: RingIndex
     crossings: tuple[Crossing, ...]
@@ -61,7 +63,7 @@ class Ground:
             raise InputError(f"{floor.name}: the floor has no area; check layer FLOOR")
         lines = [barrier(item, origin, rings) for item in crossings if item.closed_because]
         barriers = np.array(lines).reshape(-1, 2, 2)
-        return cls(floor, origin, outline, obstacles, rings, crossings, barriers)
+        return cls(floor, origin, outline, solids, obstacles, rings, crossings, barriers)
 
     def walls(self, settings: Settings) -> Walls:
         """Everything that a robot's centre keeps clear of: obstacles, barriers, and floor edges."""
