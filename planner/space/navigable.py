@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -34,6 +34,7 @@ MANY_CORNERS = 8000
 """The same for the corners of elements: round columns have many."""
 NOTHING = np.empty((0, 2, 2))
 T = TypeVar("T")
+_Kept: TypeAlias = tuple[tuple[Polygon, ...], BaseGeometry]
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
@@ -47,14 +48,14 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
         ground = Ground.of(floor, settings, forked=large)
         scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
-        clearing = works.begun(partial(_stop_area_and_outside, ground, settings), after=scanning)
+        clearing = works.begun(partial(_cleared, ground, settings), after=scanning)
         drive_area, gaps = drivable(ground, settings)
         (drive_polygons, drive_shape), gaps = _kept(drive_area, origin), frozen(gaps + origin)
         parts = parts_of(drive_shape, gaps - origin)
-        obstacles, obstacle_shape = _kept(ground.obstacles, origin)
         occluders, targets = scanning.result()
         _check_targets(floor, targets)
-        dividing = works.begun(partial(_rooms, ground, drive_area, clearing.result(), targets))
+        (obstacles, obstacle_shape), areas = clearing.result()
+        dividing = works.begun(partial(_rooms, ground, drive_area, areas, targets))
         states, findings = opening_states(ground, parts, settings, forked=large)
         rooms, faced = dividing.result()
     space = NavigableSpace(
@@ -102,8 +103,9 @@ def _occluders_and_targets(
     return occluders, targets_of(floor, occluders, d_dis=settings.d_dis)
 
 
-def _stop_area_and_outside(ground: Ground, settings: Settings) -> tuple[BaseGeometry, BaseGeometry]:
-    return stop_area_of(ground, settings), floor_outside(ground)
+def _cleared(ground: Ground, settings: Settings) -> tuple[_Kept, tuple[BaseGeometry, BaseGeometry]]:
+    """The obstacles, the area where stops may be, and the floor outside every room."""
+    return _kept(ground.obstacles, ground.origin), (stop_area_of(ground, settings), floor_outside(ground))
 
 
 def _rooms(
@@ -114,7 +116,7 @@ def _rooms(
     return rooms, faced_rooms(targets, rooms, ground)
 
 
-def _kept(shape: BaseGeometry, origin: FloatArray) -> tuple[tuple[Polygon, ...], BaseGeometry]:
+def _kept(shape: BaseGeometry, origin: FloatArray) -> _Kept:
     """A shape as polygons in the drawing's coordinates, and the shape that these are in the local frame."""
     polygons = to_polygons(shape, origin)
     return polygons, to_shape(polygons, origin)
