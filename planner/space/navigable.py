@@ -56,7 +56,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         _check_targets(floor, targets)
         (obstacles, obstacle_shape), areas = clearing.result()
         dividing = works.begun(partial(_rooms, ground, drive_area, areas, targets))
-        states, findings = opening_states(ground, parts, settings, forked=large)
+        states, findings = opening_states(ground, parts, settings)
         rooms, faced = dividing.result()
     space = NavigableSpace(
         floor=floor,

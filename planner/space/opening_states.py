@@ -25,7 +25,6 @@ from stopgo.planner.geometry.shapes import (
     to_shape,
     widened,
 )
-from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.space.connected_parts import Parts
 from stopgo.planner.space.gaps import Gap, Walls, gaps_between
 from stopgo.planner.space.ground import Ground
@@ -40,27 +39,19 @@ REACHED_AREA = 0.5
 
 
 def opening_states(
-    ground: Ground, parts: Parts, settings: Settings, *, forked: bool = False
+    ground: Ground, parts: Parts, settings: Settings
 ) -> tuple[tuple[OpeningState, ...], tuple[Finding, ...]]:
-    """Return the state of each opening for the robot, and a finding for each inner one it cannot pass.
-
-    Two processes look for what blocks them if `forked`.
-    """
+    """Return the state of each opening for the robot, and a finding for each inner one it cannot pass."""
 
     @cache
     def side_of(room: int | None) -> OpeningSide:
         return _opening_side(room, parts, ground)
 
     around = Surroundings(ground, settings)
-
-    def reason(crossing: Crossing) -> str:
-        if crossing.closed_because:
-            return crossing.closed_because
-        return _not_reached(crossing, parts, [side_of(room) for room in crossing.rooms], around)
-
-    reasons = in_halves(lambda some: list(map(reason, some)), ground.crossings, forked=forked)
     states, findings = [], []
-    for crossing, why in zip(ground.crossings, reasons, strict=True):
+    for crossing in ground.crossings:
+        sides = [] if crossing.closed_because else [side_of(room) for room in crossing.rooms]
+        why = crossing.closed_because or _not_reached(crossing, parts, sides, around)
         states.append(_state(crossing, why, ground.origin))
         if why and not why.startswith("exterior"):
             findings.append(_opening_finding(crossing, why, ground))
