@@ -66,7 +66,7 @@ def _from_strategy(feasibility: StopFeasibility) -> Proposals:
 
     def reasons(rows: Sequence[int]) -> list[int]:
         some = np.array(rows, dtype=np.int64)
-        return list(feasibility.reasons(xy[some], room[some]))
+        return feasibility.reasons(xy[some], room[some]).tolist()
 
     reason = np.array(in_halves(reasons, range(len(xy)), forked=len(xy) >= MANY), dtype=np.int64)
     return Proposals.of(xy, room, reason if early is None else np.where(early == KEPT, reason, early))
