@@ -5,17 +5,18 @@ Everything is in metres. Results do not depend on the order, direction or starti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.geometry import FloatArray, Polygon, frozen, ring_area
+from stopgo.mission.geometry import FloatArray, IntArray, Polygon, frozen, ring_area
 from stopgo.planner.geometry.shapes import QUARTER, boundary_lines, widened
 
 SNAP = 1e-3
@@ -24,6 +25,8 @@ GAP = 0.05
 """The widest gap, in metres, that is closed in an outline."""
 _GRID = 1e-4
 """Open lines are noded on a grid of this width in metres, so that an end on another line meets it."""
+_AT_ONCE = 100
+"""Shapes that are compared with all others at a time."""
 SLIVER = 1e-6
 """Least area in m² of a solid."""
 
@@ -97,13 +100,21 @@ def distinct(polygons: Sequence[shapely.Polygon]) -> list[int]:
     """For each polygon the index of the first that draws the same within `SNAP`, or its own."""
     first = list(range(len(polygons)))
     shapes = np.array(polygons, dtype=object)
-    index, other = shapely.STRtree(shapes).query(shapes)
     boxes = shapely.bounds(shapes)
-    near = (other < index) & (np.abs(boxes[index] - boxes[other]) <= SNAP).all(axis=1)
-    for k, earlier in sorted(zip(index[near].tolist(), other[near].tolist(), strict=True)):
-        if first[k] == k and first[earlier] == earlier and _same(shapes[earlier], shapes[k]):
-            first[k] = earlier
+    for index, other in _pairs(shapes):
+        near = (other < index) & (np.abs(boxes[index] - boxes[other]) <= SNAP).all(axis=1)
+        for k, earlier in sorted(zip(index[near].tolist(), other[near].tolist(), strict=True)):
+            if first[k] == k and first[earlier] == earlier and _same(shapes[earlier], shapes[k]):
+                first[k] = earlier
     return first
+
+
+def _pairs(shapes: NDArray[np.object_]) -> Iterator[tuple[IntArray, IntArray]]:
+    """Pairs of shapes whose boxes meet, of some shapes at a time: those of many nested ones take memory."""
+    tree = shapely.STRtree(shapes)
+    for begin in range(0, len(shapes), _AT_ONCE):
+        index, other = tree.query(shapes[begin : begin + _AT_ONCE])
+        yield index + begin, other
 
 
 def _same(one: shapely.Polygon, other: shapely.Polygon) -> bool:
@@ -115,13 +126,12 @@ def parents(polygons: Sequence[shapely.Polygon]) -> list[int | None]:
     shapes = np.array(polygons, dtype=object)
     area = shapely.area(shapes)
     found: list[int | None] = [None] * len(shapes)
-    inner, outer = shapely.STRtree(shapes).query(shapes)
-    larger = area[outer] > area[inner]
-    inner, outer = inner[larger], outer[larger]
-    order = np.lexsort((outer, area[outer], inner))
-    for k, around in zip(inner[order].tolist(), outer[order].tolist(), strict=True):
-        if found[k] is None and _holds(shapes[around], shapes[k]):
-            found[k] = around
+    for inner, outer in _pairs(shapes):
+        larger = np.flatnonzero(area[outer] > area[inner])
+        order = larger[np.lexsort((outer[larger], area[outer[larger]], inner[larger]))]
+        for k, around in zip(inner[order].tolist(), outer[order].tolist(), strict=True):
+            if found[k] is None and _holds(shapes[around], shapes[k]):
+                found[k] = around
     return found
 
 
