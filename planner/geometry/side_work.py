@@ -15,7 +15,7 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
@@ -25,6 +25,7 @@ from stopgo.mission.console.running_step import TICKING
 from stopgo.mission.geometry import frozen
 
 T = TypeVar("T")
+Argument = TypeVar("Argument")
 PR_SET_PDEATHSIG = 1
 """Option of Linux's prctl: the signal that a process gets when its parent ends."""
 
@@ -120,6 +121,15 @@ class SideWork(Generic[T]):
             with contextlib.suppress(ChildProcessError):  # where SIGCHLD is ignored it has gone by itself
                 os.waitpid(self._process, 0)
         self._process, self._answer = 0, -1
+
+
+def in_halves(
+    work: Callable[[Sequence[Argument]], list[T]], items: Sequence[Argument], *, forked: bool
+) -> list[T]:
+    """Return the results of items, in their order; another process finds those of the second half."""
+    middle = len(items) // 2 if forked else len(items)
+    with SideWork(lambda: work(items[middle:]), forked=forked) as rest:
+        return [*work(items[:middle]), *rest.result()]
 
 
 class _ResultPickler(pickle.Pickler):
