@@ -47,10 +47,10 @@ def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
     """The components needed to meet every demand, as few as are found.
 
     The smallest superfluous ones are dropped first. Where many remain, a search for the fewest often leaves
-    half of them.
+    half of them. Where none is superfluous, each is needed.
     """
     dropped = _without_superfluous(cover, components)
-    fewest = _fewest(cover, components) if len(dropped) > FEW else dropped
+    fewest = _fewest(cover, components) if FEW < len(dropped) < len(components) else dropped
     return fewest if len(fewest) < len(dropped) else dropped
 
 
