@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +17,7 @@ from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
 from stopgo.planner import plan
+from stopgo.planner.geometry.instance_cache import forget_all
 from stopgo.planner.geometry.side_work import SideWork
 from stopgo.recording_process import recording_process
 from stopgo.result_files import is_missing, report_missing_rerun, result_folder
@@ -152,9 +153,11 @@ def _write_part(
         del files["recording"]
     watch = writing.watch
     contents = _PartContents(part, plan, writing.options, _today(), _seen_from(part, watch))
+    if number == len(plan.parts) - 1:
+        _forget_derived(part)
     unwanted = [files.pop("picture")] if plan.divided and number else []
     with SideWork(contents.printed, forked=len(part.mission.stops) >= MANY) as printing:
-        data = {key: getattr(contents, key)() for key in ("coverage", "picture", "mission") if key in files}
+        data = contents.of(key for key in ("coverage", "picture", "mission") if key in files)
         data |= contents.sheets(files["sheets"], printing)
     unwanted += [] if "sheets" in data else [files.pop("sheets")]
     keys = [key for key in WRITTEN if key in files]
@@ -213,6 +216,13 @@ def _seen_from(part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
     return found
 
 
+def _forget_derived(part: PartPlan) -> None:
+    """Forget what the stages derived from one another, which no file needs: half of the memory."""
+    for result in (part.visibility, part.candidates, part.space):
+        forget_all(result)
+    give_back()
+
+
 @dataclass(frozen=True, eq=False)
 class _PartContents:
     """Contents of the files of one part of a plan."""
@@ -223,14 +233,24 @@ class _PartContents:
     date: str
     surface: SeenSurface | None = None
 
+    def of(self, keys: Iterable[str]) -> dict[str, bytes]:
+        """The contents of these files, which are made from many short words."""
+        found = {}
+        for key in keys:
+            found[key] = getattr(self, key)()
+            give_back()
+        return found
+
     def printed(self) -> bytes | None:
         """The set of sheets, if it is wanted."""
-        from stopgo.mission.files.plan_sheets import needs_sheets, plan_pdf
+        from stopgo.mission.files.plan_sheets import needs_sheets, plan_pdf, sheets_of
 
-        part, wanted = self.part, self.options.sheets
+        part, wanted, rings = self.part, self.options.sheets, self.options.rings
         if wanted is False or not (wanted or needs_sheets(part.route, part.mission)):
             return None
-        return plan_pdf(part.route, part.mission, part.figures, date=self.date, with_range=self.options.rings)
+        sheets = sheets_of(part.route, part.mission, part.figures, date=self.date, with_range=rings)
+        give_back()
+        return plan_pdf(part.mission, *sheets)
 
     def sheets(self, path: Path, printing: SideWork[bytes | None]) -> dict[str, bytes]:
         """The set of sheets; without one nothing, and a line on stderr if reportlab is not installed."""

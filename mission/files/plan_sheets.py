@@ -7,7 +7,7 @@ once and shown through the window of each sheet.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,21 +62,18 @@ def needs_sheets(made: Route, mission: Mission) -> bool:
     return whole_sheet(made, mission).scale > READABLE
 
 
-def plan_pdf(
-    made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
-) -> bytes:
-    """The whole set; equal inputs give equal bytes.
-
-    `with_range` adds a ring of the scanner's range about each stop.
-    """
-    pages, shared = sheets_of(made, mission, figures, date=date, with_range=with_range)
+def plan_pdf(mission: Mission, pages: Sequence[PdfPage], shared: Mapping[str, str]) -> bytes:
+    """The whole set, of what `sheets_of` returns; equal inputs give equal bytes."""
     return pdf_of(pages, title=f"{mission.name}: scan plan {mission.id[:12]}", shared=shared)
 
 
 def sheets_of(
     made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
 ) -> tuple[list[PdfPage], dict[str, str]]:
-    """The sheets, and the drawings that several of them show."""
+    """The sheets, and the drawings that several of them show.
+
+    `with_range` adds a ring of the scanner's range about each stop.
+    """
     floor = made.floor
     content, whole = overview(made, mission, date=date, with_range=with_range, with_table=False)
     pages = [PdfPage(whole.width, whole.height, content, "Overview", whole.drawing)]
