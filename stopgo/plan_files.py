@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stopgo.freed_memory import give_back, looking_seldom
+from stopgo.mission.console.freed_memory import give_back, looking_seldom
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.files.atomic import must_be_writable, replacing
