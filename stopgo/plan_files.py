@@ -247,14 +247,12 @@ class _PartContents:
 
     def printed(self) -> bytes | None:
         """The set of sheets, if it is wanted."""
-        from stopgo.mission.files.plan_sheets import needs_sheets, plan_pdf, sheets_of
+        from stopgo.mission.files.plan_sheets import needs_sheets, plan_pdf
 
-        part, wanted, rings = self.part, self.options.sheets, self.options.rings
+        part, wanted = self.part, self.options.sheets
         if wanted is False or not (wanted or needs_sheets(part.route, part.mission)):
             return None
-        sheets = sheets_of(part.route, part.mission, part.figures, date=self.date, with_range=rings)
-        give_back()
-        return plan_pdf(part.mission, *sheets)
+        return plan_pdf(part.route, part.mission, part.figures, date=self.date, with_range=self.options.rings)
 
     def sheets(self, path: Path, printing: SideWork[bytes | None]) -> dict[str, bytes]:
         """The set of sheets; without one nothing, and a line on stderr if reportlab is not installed."""

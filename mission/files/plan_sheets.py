@@ -7,11 +7,12 @@ once and shown through the window of each sheet.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stopgo.mission.console.freed_memory import give_back
 from stopgo.mission.document import Mission
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import outline
@@ -62,26 +63,31 @@ def needs_sheets(made: Route, mission: Mission) -> bool:
     return whole_sheet(made, mission).scale > READABLE
 
 
-def plan_pdf(mission: Mission, pages: Sequence[PdfPage], shared: Mapping[str, str]) -> bytes:
-    """The whole set, of what `sheets_of` returns; equal inputs give equal bytes."""
+def plan_pdf(
+    made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
+) -> bytes:
+    """The whole set; equal inputs give equal bytes.
+
+    `with_range` adds a ring of the scanner's range about each stop.
+    """
+    pages, shared = sheets_of(made, mission, figures, date=date, with_range=with_range)
     return pdf_of(pages, title=f"{mission.name}: scan plan {mission.id[:12]}", shared=shared)
 
 
 def sheets_of(
     made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
 ) -> tuple[list[PdfPage], dict[str, str]]:
-    """The sheets, and the drawings that several of them show.
-
-    `with_range` adds a ring of the scanner's range about each stop.
-    """
+    """The sheets, and the drawings that several of them show."""
     floor = made.floor
     content, whole = overview(made, mission, date=date, with_range=with_range, with_table=False)
     pages = [PdfPage(whole.width, whole.height, content, "Overview", whole.drawing)]
+    give_back()  # a drawing is made from many short words
     tiles = tiles_of(made, mission) if whole.scale > READABLE else []
     shared: dict[str, str] = {}
     if tiles:
         site = _site_sheet(whole.centre)
         shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range))
+        give_back()
         shared["key"] = _key(tiles, floor)
         shared["legend"] = _tile_legend(made, mission, tiles[0])
         pages += [_tile_page(tile, tiles, site, mission, date) for tile in tiles]
