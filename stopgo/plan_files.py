@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -160,9 +160,7 @@ def _write_part(
         _forget_derived(part)
     unwanted = [files.pop("picture")] if plan.divided and number else []
     forked = len(part.mission.stops) >= MANY and not writing.recorder.is_running
-    with SideWork(contents.printed, forked=forked) as printing:
-        data = contents.of(key for key in ("coverage", "picture", "mission") if key in files)
-        data |= contents.sheets(files["sheets"], printing)
+    data = contents.made(files, forked=forked)
     unwanted += [] if "sheets" in data else [files.pop("sheets")]
     keys = [key for key in WRITTEN if key in files]
     with replacing(*(files[key] for key in keys)) as paths:
@@ -237,13 +235,15 @@ class _PartContents:
     date: str
     surface: SeenSurface | None = None
 
-    def of(self, keys: Iterable[str]) -> dict[str, bytes]:
-        """The contents of these files, which are made from many short words."""
+    def made(self, files: Mapping[str, Path], *, forked: bool) -> dict[str, bytes]:
+        """The contents of these files; they are made from many short words, whose memory is given back."""
         found = {}
-        for key in keys:
-            found[key] = getattr(self, key)()
-            give_back()
-        return found
+        with SideWork(self.printed, forked=forked) as printing:
+            for key in ("coverage", "picture", "mission"):
+                if key in files:
+                    found[key] = getattr(self, key)()
+                    give_back()
+            return found | self.sheets(files["sheets"], printing)
 
     def printed(self) -> bytes | None:
         """The set of sheets, if it is wanted."""
