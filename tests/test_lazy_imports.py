@@ -22,7 +22,7 @@ REASONS = {
     "stopgo.site.kept_variants": "Windows has no fcntl; variants are temporary there",
     "stopgo.bridge.link.admission": "Windows has no resource; robots on it use zenoh alone",
     "stopgo.bridge.robot.journal_file": "Windows has no fcntl; everything else of the bridge runs there",
-    "stopgo.freed_memory": "Windows has no resource; its processes give memory back by themselves",
+    "stopgo.mission.console.freed_memory": "Windows has no resource; it needs no call for this",
     "stopgo.mission": "the version is looked up when it is asked for",
     "stopgo.mission.plan": "a plan is drawn where a notebook shows it",
     "stopgo.planner.candidates.triangulation": "scipy.spatial takes 0.4 s, and few plans triangulate",

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stopgo.mission.console.freed_memory import give_back
 from stopgo.mission.document import Mission
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import outline
@@ -85,14 +86,15 @@ def sheets_of(
     floor = made.floor
     content, whole = overview(made, mission, date=date, with_range=with_range, with_table=False)
     pages = [PdfPage(whole.width, whole.height, content, "Overview", whole.drawing)]
+    give_back()  # a drawing is made from many short words
     every = tiles_of(made, mission) if whole.scale > READABLE else []
     tiles = _driven(every, mission) if mission.share else every
     shared: dict[str, str] = {}
     if tiles:
         site = _site_sheet(whole.centre)
         rooms = [room for room in floor.rooms if room.polygons and any(tile.shows(room) for tile in tiles)]
-        drawn = drawing_of(made, mission, site, with_range=with_range, rooms=rooms)
-        shared["site"] = "\n".join(drawn)
+        shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range, rooms=rooms))
+        give_back()
         shared["key"] = _key(every, floor)
         shared["legend"] = _tile_legend(made, mission, tiles[0])
         pages += [_tile_page(tile, every, site, mission, date) for tile in tiles]

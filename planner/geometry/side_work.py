@@ -21,6 +21,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from stopgo.mission.console.freed_memory import give_back
 from stopgo.mission.console.running_step import TICKING
 from stopgo.mission.geometry import frozen
 
@@ -81,6 +82,7 @@ class SideWork(Generic[T]):
     def _fork(self) -> None:
         self._answer, end = os.pipe()
         process, parent = 0, os.getpid()
+        give_back()  # what is free would be used, and so copied, by both
         with contextlib.suppress(OSError):  # too many processes, or too little memory
             process = os.fork()
             if not process:
