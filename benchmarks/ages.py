@@ -29,8 +29,11 @@ BY_COMMAND = {
     "bridge": ("stopgo.bridge.commands.spawn", "stopgo.bridge.robot", "stopgo.bridge.station"),
     "mavlink": ("stopgo.bridge.mavlink",),
     "site": ("stopgo.site.web_server",),
+    "verdicts": ("stopgo.commands.replay_command", "stopgo.commands.review_command"),
 }
 """Modules that a benchmark starts in processes of their own, so that no import shows them."""
+LEFT_OUT = ("stopgo", "benchmarks.table")
+"""Modules that belong to no benchmark's code: one imports everything, the other writes tables."""
 MODULE_OF = {"ways": "tours", "former": "whole_plans"}
 """The benchmark that makes a table, where it has another name."""
 
@@ -59,7 +62,7 @@ def _imported(begin: list[str]) -> set[str]:
     left = list(begin)
     while left:
         module = left.pop()
-        if module not in {*found, "stopgo"} and _path(module) is not None:  # that imports everything
+        if module not in {*found, *LEFT_OUT} and _path(module) is not None:
             found.add(module)
             left += [module.rpartition(".")[0], *_names(module)]
     return found
@@ -81,12 +84,11 @@ def _path(module: str) -> Path | None:
 
 def _names(module: str) -> Iterator[str]:
     """Imports of a module, and names of modules in its texts: those of readers and processes."""
-    if module == "benchmarks.ages":  # it names modules of every benchmark
-        return
     for node in _statements(_source(module)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
     yield from re.findall(r"stopgo(?:\.\w+)+", _told(_source(module)))
 
