@@ -34,8 +34,8 @@ ALL: dict[str, tuple[str, ...]] = {
         (),
     ),
     **dict.fromkeys(("least_time", "sharing", "overlap", "all_places", "drawings", "recordings"), ()),
-    **dict.fromkeys(("logs", "proofs", "verdicts", "campus", "bridge", "fleet", "site"), ()),
-    "mavlink": ("--seeds", "2", "--peer-seeds", "1"),
+    **dict.fromkeys(("logs", "proofs", "campus", "bridge", "fleet"), ()),
+    "verdicts": ("--every", "2"),
 }
 """Options of each benchmark, those of the planner first."""
 

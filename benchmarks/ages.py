@@ -27,7 +27,6 @@ BY_COMMAND = {
     "whole-plans": ("stopgo.commands.plan_command",),
     "recordings": ("stopgo.commands.plan_command", "stopgo.recordings.runs.field"),
     "bridge": ("stopgo.bridge.commands.spawn", "stopgo.bridge.robot", "stopgo.bridge.station"),
-    "mavlink": ("stopgo.bridge.mavlink",),
     "site": ("stopgo.site.web_server",),
     "verdicts": ("stopgo.commands.replay_command", "stopgo.commands.review_command"),
 }

@@ -58,7 +58,7 @@ def listen(endpoint: str, seconds: float) -> None:
         heard[report.robot].append(report.seq)
 
     with connecting(endpoint) as link:
-        link.hear(KeyExpressions("*").pose, take)
+        link.hear(KeyExpressions.of_every_robot(None).pose, take)
         time.sleep(2.0)
         for seqs in heard.values():
             seqs.clear()

@@ -86,26 +86,34 @@ class Run:
         return round(floor["area_m2"])
 
 
+MEASURED = """
+import json, os, sys
+process = os.posix_spawn(sys.executable, [sys.executable, *sys.argv[2:]], os.environ)
+_, status, used = os.wait4(process, 0)
+figures = os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
+open(sys.argv[1], "w").write(json.dumps(figures))
+"""
+"""A small process that starts the command: the memory of the one that starts it counts as the command's."""
+
+
 def planned(tree: Path, plan: Plan, out: Path, **environment: str) -> Run:
     """Plan by the version in a tree."""
-    command = [sys.executable, "-m", "stopgo", "plan", str(plan.floor), "-o", str(out), "--json"]
-    with tempfile.TemporaryFile() as answer:
+    command = ["-m", "stopgo", "plan", str(plan.floor), "-o", str(out), "--json", *plan.options]
+    with tempfile.NamedTemporaryFile() as figures:
         begin = time.monotonic()
-        process = subprocess.Popen(
-            [*command, *plan.options],
+        done = subprocess.run(
+            [sys.executable, "-S", "-c", MEASURED, figures.name, *command],
             cwd=tree,
             env={**os.environ, "PYTHONPATH": str(tree), **environment},
-            stdout=answer,
+            stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            check=True,
         )
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
         wall = time.monotonic() - begin
-        answer.seek(0)
-        told = answer.read()
-    if process.returncode:
-        raise SystemExit(f"{plan.name} {' '.join(plan.options)}: {tree} ended with {process.returncode}")
-    return Run(wall, used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3, json.loads(told))
+        code, cpu, megabytes = json.load(figures)
+    if code:
+        raise SystemExit(f"{plan.name} {' '.join(plan.options)}: {tree} ended with {code}")
+    return Run(wall, cpu, megabytes, json.loads(done.stdout))
 
 
 def same(former: Path, present: Path) -> str:
