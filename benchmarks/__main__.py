@@ -19,10 +19,23 @@ from benchmarks.table import table
 
 ROOT = Path(__file__).parents[1]
 ALL: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("growth", "paper", "tours", "visibility", "models", "shares", "quality"), ()),
+    **dict.fromkeys(
+        (
+            "whole_plans",
+            "selections",
+            "growth",
+            "paper",
+            "tours",
+            "visibility",
+            "models",
+            "shares",
+            "quality",
+        ),
+        (),
+    ),
     **dict.fromkeys(("least_time", "sharing", "overlap", "all_places", "drawings", "recordings"), ()),
-    **dict.fromkeys(("logs", "proofs", "verdicts", "campus", "bridge", "fleet", "site"), ()),
-    "mavlink": ("--seeds", "2", "--peer-seeds", "1"),
+    **dict.fromkeys(("logs", "proofs", "campus", "bridge", "fleet"), ()),
+    "verdicts": ("--every", "2"),
 }
 """Options of each benchmark, those of the planner first."""
 

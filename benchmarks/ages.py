@@ -23,14 +23,17 @@ FOLDERS = ("mission", "planner", "bridge", "recordings")
 BY_COMMAND = {
     "campus": ("stopgo.commands.batch_command",),
     "former": ("stopgo.commands.plan_command",),
-    "growth": ("stopgo.commands.plan_command", "benchmarks.floors"),
+    "growth": ("benchmarks.floors",),
+    "whole-plans": ("stopgo.commands.plan_command",),
     "recordings": ("stopgo.commands.plan_command", "stopgo.recordings.runs.field"),
     "bridge": ("stopgo.bridge.commands.spawn", "stopgo.bridge.robot", "stopgo.bridge.station"),
-    "mavlink": ("stopgo.bridge.mavlink",),
     "site": ("stopgo.site.web_server",),
+    "verdicts": ("stopgo.commands.replay_command", "stopgo.commands.review_command"),
 }
 """Modules that a benchmark starts in processes of their own, so that no import shows them."""
-MODULE_OF = {"ways": "tours", "all-places": "all_places", "least-time": "least_time"}
+LEFT_OUT = ("stopgo", "benchmarks.table")
+"""Modules that belong to no benchmark's code: one imports everything, the other writes tables."""
+MODULE_OF = {"ways": "tours", "former": "whole_plans"}
 """The benchmark that makes a table, where it has another name."""
 
 CURRENT = re.compile(r"^Measured (?P<day>[\d-]+), code (?P<code>[0-9a-f]{12}) \((?P<name>[\w-]+)\)\.$", re.M)
@@ -45,7 +48,7 @@ def stamp(name: str, day: str = "") -> str:
 @cache
 def digest(name: str) -> str:
     """Digest of the code that a benchmark measures, and of the benchmark itself."""
-    own = f"benchmarks.{MODULE_OF.get(name, name.replace('-', '_'))}"
+    own = f"benchmarks.{MODULE_OF.get(name, name).replace('-', '_')}"
     whole = hashlib.sha256()
     for module in sorted(_imported([own, *BY_COMMAND.get(name, ())])):
         whole.update(f"{module}\n{_meaning(module)}\n".encode())
@@ -58,7 +61,7 @@ def _imported(begin: list[str]) -> set[str]:
     left = list(begin)
     while left:
         module = left.pop()
-        if module not in {*found, "stopgo"} and _path(module) is not None:  # that imports everything
+        if module not in {*found, *LEFT_OUT} and _path(module) is not None:
             found.add(module)
             left += [module.rpartition(".")[0], *_names(module)]
     return found
@@ -80,12 +83,11 @@ def _path(module: str) -> Path | None:
 
 def _names(module: str) -> Iterator[str]:
     """Imports of a module, and names of modules in its texts: those of readers and processes."""
-    if module == "benchmarks.ages":  # it names modules of every benchmark
-        return
     for node in _statements(_source(module)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
     yield from re.findall(r"stopgo(?:\.\w+)+", _told(_source(module)))
 
@@ -140,33 +142,33 @@ def _told(source: str) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the README that holds a table."""
+    """A block of the README that a benchmark writes."""
 
-    heading: str
+    name: str
     text: str
 
     @property
     def problem(self) -> str:
-        """Problem of the ages; empty if every table is current, or marked as older."""
+        """Problem of its age; empty if every table is current, or marked as older."""
         stamps = list(CURRENT.finditer(self.text))
         if not stamps and not OLDER.search(self.text):
-            return f"{self.heading}: no table of it says with what code it was measured"
+            return f"{self.name}: does not say with what code it was measured"
         old = [found["name"] for found in stamps if found["code"] != digest(found["name"])]
         if not old:
             return ""
-        return f"{self.heading}: older than its code ({', '.join(old)}); measure it, or run benchmarks.ages"
+        return f"{self.name}: older than its code ({', '.join(old)}); measure it, or run benchmarks.ages"
 
 
 BLOCK = re.compile(r"<!-- ([\w-]+): begin -->(.*?)<!-- \1: end -->", re.S)
-"""What a benchmark writes: its section of the README, with headings of its own."""
+"""What a benchmark writes between its markers."""
+TABLE = re.compile(r"^\| ?:?---", re.M)
 
 
 def sections(text: str) -> list[Section]:
-    """The blocks of a README that benchmarks write, and its other sections that hold tables."""
+    """The blocks of a README that benchmarks write, and one for all tables that no benchmark writes."""
     blocks = [Section(found[1], found[2]) for found in BLOCK.finditer(text)]
-    parts = re.split(r"^##+ (.+)$", BLOCK.sub("", text), flags=re.M)
-    others = [Section(*pair) for pair in zip(parts[1::2], parts[2::2], strict=True)]
-    return [section for section in (*blocks, *others) if re.search(r"^\| ?:?---", section.text, re.M)]
+    rest = BLOCK.sub("", text)
+    return [*blocks, *([Section("a table outside of all blocks", "")] if TABLE.search(rest) else [])]
 
 
 def marked(text: str) -> str:

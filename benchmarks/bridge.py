@@ -24,6 +24,7 @@ from pathlib import Path
 
 import msgspec
 
+from benchmarks.table import lines_put
 from stopgo.bridge.commands.spawn import end_robot, robot_process, start_robot
 from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import now_utc
@@ -67,7 +68,8 @@ def main() -> None:
         elif given.far:
             far(Path(folder))
         else:
-            measure(Path(folder), with_keys=given.keys)
+            with lines_put("bridge"):
+                measure(Path(folder), with_keys=given.keys)
 
 
 def measure(folder: Path, *, with_keys: bool) -> None:
@@ -155,7 +157,7 @@ def one_by_one() -> Iterator[None]:
 
 
 def far(folder: Path) -> None:
-    """Rows of the table in benchmarks/README.md."""
+    """Rows of the table in benchmarks/SURVEYS.md."""
     revisions = count(2)
     print("| document | under way | pieces s | of the line | pause: n | median ms | p99 ms | greatest ms |")
     print("|---|---|---|---|---|---|---|---|")
@@ -203,7 +205,7 @@ def far_push(station: Station, stops: int, revision: int, under_way: str) -> Non
 
 
 def stops(folder: Path, former: Path | None) -> None:
-    """Rows of another table in benchmarks/README.md: the former version and this one, in turn."""
+    """Rows of another table in benchmarks/SURVEYS.md: the former version and this one, in turn."""
     print("| version | line | beside | order | n | median ms | p99 ms | greatest ms |", flush=True)
     print("|---|---|---|---|---|---|---|---|", flush=True)
     for name, checkout in (("former", former), ("present", Path.cwd())):

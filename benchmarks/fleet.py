@@ -15,6 +15,7 @@ from pathlib import Path
 
 import msgspec
 
+from benchmarks.table import lines_put
 from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.zenoh_link import connecting
@@ -37,6 +38,7 @@ def main() -> None:
             booted = pool.map(lambda n: robot(folder, endpoint, n), range(given.robots))
             for process in booted:
                 stack.callback(end_robot, process)
+        stack.enter_context(lines_put("fleet"))
         print(f"{sum(member.state is not None for member in fleet(endpoint))} robots tell their state")
         listen(endpoint, given.seconds)
 
@@ -56,7 +58,7 @@ def listen(endpoint: str, seconds: float) -> None:
         heard[report.robot].append(report.seq)
 
     with connecting(endpoint) as link:
-        link.hear(KeyExpressions("*").pose, take)
+        link.hear(KeyExpressions.of_every_robot(None).pose, take)
         time.sleep(2.0)
         for seqs in heard.values():
             seqs.clear()

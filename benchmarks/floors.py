@@ -19,6 +19,9 @@ CORRIDOR = 2.2
 DEPTH = 6.0
 """Depth of a room from its corridor, m."""
 
+COLUMN_SIDES = 50
+"""Corners of a round column."""
+
 
 def office(width: float, height: float, *, seed: int) -> FloorPlan:
     """A floor of about width × height metres; bands of rooms, corridor, rooms, joined by a spine."""
@@ -112,10 +115,31 @@ def _outer(width: float, height: float, elements) -> None:
         _add_wall(elements, box)
 
 
+def hall(side: float = 150.0, columns: int = 17) -> FloorPlan:
+    """A square hall with rows of round columns, 0.8 m wide."""
+    elements: list[Element] = []
+    _outer(side, side, elements)
+    turn = np.arange(COLUMN_SIDES) * (2 * np.pi / COLUMN_SIDES)
+    ring = 0.4 * np.column_stack([np.cos(turn), np.sin(turn)])
+    middles = (np.arange(columns) + 0.5) * side / columns
+    for x in middles:
+        for y in middles:
+            _add(elements, "columns", Polygon.of(ring + np.array([x, y])))
+    return FloorPlan(
+        name=f"hall of {columns**2} columns",
+        source=FloorSource("hall.dxf", "0" * 64),
+        outline=(_box(0, 0, side, side),),
+        rooms=(Room("room-0", "HALL", (_box(0, 0, side, side),)),),
+        openings=(),
+        elements=tuple(elements),
+    )
+
+
 def copies(floor: FloorPlan, count: int) -> FloorPlan:
     """A floor `count` times in a square, joined by corridors west of and below the copies.
 
-    The floor needs a door in its west side, such as layered/office-l1.
+    The floor needs a door in its west side, such as layered/office-l1. A copy has names, and no GlobalIds,
+    of its own.
     """
     low_x, low_y, high_x, high_y = bounds([part.exterior for part in floor.outline])
     pitch = np.array([high_x - low_x + CORRIDOR, high_y - low_y + CORRIDOR])
@@ -133,12 +157,18 @@ def copies(floor: FloorPlan, count: int) -> FloorPlan:
             _box(low_x - CORRIDOR, low_y - CORRIDOR, west[-1], low_y),
         ),
         rooms=tuple(
-            replace(room, id=f"{k}-{room.id}", polygons=_moved(room.polygons, shift))
+            replace(
+                room,
+                id=f"{k}-{room.id}",
+                name=f"{room.name}-{k}",
+                polygons=_moved(room.polygons, shift),
+                global_id=None,
+            )
             for k, shift in enumerate(shifts)
             for room in floor.rooms
         ),
         openings=tuple(
-            replace(opening, id=f"{k}-{opening.id}", line=frozen(opening.line + shift))
+            replace(opening, id=f"{k}-{opening.id}", line=frozen(opening.line + shift), global_id=None)
             for k, shift in enumerate(shifts)
             for opening in floor.openings
         ),
@@ -156,6 +186,7 @@ def _copy(element: Element, k: int, shift: FloatArray) -> Element:
         id=f"{k}-{element.id}",
         solids=_moved(element.solids, shift),
         lines=tuple(frozen(line + shift) for line in element.lines),
+        global_id=None,
     )
 
 

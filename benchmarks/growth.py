@@ -1,17 +1,13 @@
 """Growth of a plan's cost with the floor's area: `python -m benchmarks.growth`.
 
-Synthetic offices by seed, each planned in a process of its own, so that memory is counted apart; and
-one paper case as the whole command, recording included.
+Synthetic offices by seed, each planned in a process of its own, so that memory is counted apart.
 """
 
 from __future__ import annotations
 
 import json
-import statistics
 import subprocess
 import sys
-import tempfile
-import time
 from pathlib import Path
 
 from benchmarks.table import put, table, versions
@@ -75,18 +71,6 @@ def exponents(rows: list[list[object]]) -> str:
     return f"Exponents of the area from {small[0]} to {large[0]} m²: {', '.join(each)}."
 
 
-def whole_command(floor: Path, *, runs: int = 5) -> float:
-    """Median seconds of `stopgo plan` as a process, files included, after one run not counted."""
-    times = []
-    with tempfile.TemporaryDirectory() as folder:
-        for _ in range(runs + 1):
-            begin = time.perf_counter()
-            command = [sys.executable, "-m", "stopgo", "plan", str(floor), "-o", folder]
-            subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
-            times.append(time.perf_counter() - begin)
-    return statistics.median(times[1:])
-
-
 def plot(rows: list[list[object]]) -> str:
     """Seconds over m², both logarithmic, as an SVG."""
     from math import log10
@@ -120,20 +104,12 @@ def main() -> None:
     """Measure, print, and write the table and the plot into their files."""
     rows = [measured(*size) for size in SIZES]
     parts = [
-        "## Growth",
         "Synthetic offices (seed 1), default settings, one process each, seconds. "
         + versions("numpy", "scipy", "shapely"),
         table(["m²", "rooms", "stops", *STAGES, "total", "peak MB"], rows),
         exponents(rows),
         "![Seconds to plan a floor, by its area](../docs/images/growth.svg)",
     ]
-    case = ROOT.parent / "shared" / "data" / "paper" / "synthetic_case1_structural.dxf"
-    for floor in (case, ROOT / "recordings" / "samples" / "office.dxf"):
-        if floor.exists():
-            spent = whole_command(floor)
-            parts.append(
-                f"`stopgo plan {floor.name}` as a whole process, recording included, warm: {spent:.1f} s."
-            )
     text = "\n\n".join(parts)
     print(text)
     PLOT.write_text(plot(rows), encoding="utf-8")

@@ -50,9 +50,7 @@ def main() -> None:
 
 NOTE = (
     "Plans with `--no-register`; walls nominally 2.7 m. Claims: units of all stops together. Not met: what the "
-    "proof names; a "
-    "column's side met at 89° is in sight and gets no points. Seconds: proof without files, on one thread of a "
-    "shared core."
+    "proof names; a column's side met at 89° is in sight and gets no points. Seconds: proof without files."
 )
 JOINED_NOTE = (
     "Default plans. Promised pairs are those of the mission's network; worst: of the promised pairs, "

@@ -1,17 +1,19 @@
-"""Markdown tables and their markers in benchmarks/README.md."""
+"""Markdown tables, and their markers in README.md and SURVEYS.md."""
 
 from __future__ import annotations
 
+import io
 import platform
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from benchmarks.ages import stamp
+from benchmarks.ages import README, stamp
 
-README = Path(__file__).with_name("README.md")
+SURVEYS = Path(__file__).with_name("SURVEYS.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -47,12 +49,20 @@ def median_seconds(action: Callable[[], object], *, runs: int = 5) -> float:
 
 
 def put(section: str, text: str) -> None:
-    """Replace what stands between the section's markers in the README, and stamp it with the code measured."""
+    """Replace what stands between the section's markers on its page, and stamp it with the code measured."""
     begin, end = f"<!-- {section}: begin -->", f"<!-- {section}: end -->"
-    whole = README.read_text(encoding="utf-8")
-    if begin not in whole:
-        whole += f"\n{begin}\n{end}\n"
-    before, _, rest = whole.partition(begin)
-    README.write_text(
+    page = next(page for page in (README, SURVEYS) if begin in page.read_text(encoding="utf-8"))
+    before, _, rest = page.read_text(encoding="utf-8").partition(begin)
+    page.write_text(
         f"{before}{begin}\n{text}\n\n{stamp(section)}\n{end}{rest.partition(end)[2]}", encoding="utf-8"
     )
+
+
+@contextmanager
+def lines_put(section: str) -> Iterator[None]:
+    """Print as before, and put the lines that are printed meanwhile into a section, as a list."""
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        yield
+    print(printed.getvalue(), end="")
+    put(section, "".join(f"- {line}\n" for line in printed.getvalue().splitlines()).rstrip())

@@ -106,7 +106,6 @@ def main() -> None:
     """Measure, print, and put the tables into the README."""
     text = "\n\n".join(
         [
-            "## Visibility",
             "Whole matrix of candidates × units, medians of five runs on one thread, in ms. `shapely` asks "
             "prepared geometry for each pair in range, from a sample of 20 000 pairs. "
             + versions("numpy", "cython", "shapely"),

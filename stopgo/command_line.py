@@ -80,7 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
     have_output()
     have_plain_output(escaped=not {"--json", "--print-config"}.isdisjoint(sys.argv))
     if sys.argv[1:2] == ["plan"]:
-        from stopgo.freed_memory import look_seldom
+        from stopgo.mission.console.freed_memory import look_seldom
 
         look_seldom()  # also in the last moments: what it would find then is freed with the process
     code = _with_signals(sys.argv[1:], whole_process=True)

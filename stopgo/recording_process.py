@@ -22,7 +22,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import IO, TYPE_CHECKING, Any
 
-from stopgo.freed_memory import looking_seldom
+from stopgo.mission.console.freed_memory import give_back, looking_seldom
 from stopgo.mission.console.process import ending_signals
 from stopgo.mission.errors import InputError
 from stopgo.planner.geometry.side_work import can_fork
@@ -224,6 +224,7 @@ def serve(asked: IO[bytes], answers: IO[bytes]) -> None:
 def _serve_one(asked: IO[bytes], answers: IO[bytes]) -> None:
     recording = _recording_of(*pickle.load(asked))
     recording.draw()
+    give_back()
     problem = None
     try:
         recording.write(pickle.load(asked))

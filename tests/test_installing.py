@@ -14,6 +14,7 @@ import ezdxf
 import pytest
 
 import stopgo
+from stopgo.mission import __version__
 from stopgo.mission.errors import InputError
 from tests.faults.sizes import FULL
 from tests.sources import MODULES
@@ -228,6 +229,10 @@ def test_the_workflow_runs_make_test_on_every_promised_system_and_version() -> N
     named = [item.rpartition(" ")[2] for item in PROJECT["project"]["classifiers"] if ":: 3." in item]
     assert f"python: {named}".replace("'", '"') in workflow
     assert "run: make test" in workflow
+
+
+def test_the_version_in_the_code_is_that_of_the_package() -> None:
+    assert __version__ == PROJECT["project"]["version"]
 
 
 def test_the_next_release_in_the_changelog_is_newer_than_the_version() -> None:

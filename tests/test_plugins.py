@@ -221,7 +221,7 @@ def entry(monkeypatch: pytest.MonkeyPatch, group: str, name: str, value: str) ->
         mine = [metadata.EntryPoint(name, value, group)] if asked.get("group") == group else []
         return [*there(**asked), *mine]
 
-    monkeypatch.setattr("stopgo.mission.console.plugins.entry_points", with_ours)
+    monkeypatch.setattr(metadata, "entry_points", with_ours)
 
 
 def test_an_installed_package_brings_variants_by_name(module: Write, monkeypatch: pytest.MonkeyPatch) -> None:

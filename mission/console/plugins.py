@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from traceback import walk_tb
 from types import FrameType
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stopgo.mission.errors import InputError, StopgoError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
 
@@ -108,7 +110,7 @@ def variant(stage: str, name: str, known: Mapping[str, T], *, said: str = "") ->
     said = said or f"--{stage} {name}"
     if name in known:
         return Variant(said, name, known[name])
-    points = {point.name: point for point in entry_points(group=f"stopgo.{stage}")}
+    points = {point.name: point for point in _installed(stage)}
     if name not in points and ":" not in name:
         there = ", ".join([*known, *sorted(points)])
         raise InputError(f"{said}: no such {stage}; known: {there}, or module:function")
@@ -123,7 +125,14 @@ def loader(reference: str) -> Callable[[], Any]:
 
 def installed(stage: str) -> tuple[str, ...]:
     """Return the names of the variants that installed packages provide for a stage."""
-    return tuple(sorted({point.name for point in entry_points(group=f"stopgo.{stage}")}))
+    return tuple(sorted({point.name for point in _installed(stage)}))
+
+
+def _installed(stage: str) -> Iterable[EntryPoint]:
+    """The entry points of a stage's variants in all installed packages."""
+    from importlib import metadata
+
+    return metadata.entry_points(group=f"stopgo.{stage}")
 
 
 def _loaded(said: str, name: str, point: EntryPoint | None) -> Any:

@@ -12,16 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stopgo.mission.console.freed_memory import give_back
 from stopgo.mission.document import Mission
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import outline
 from stopgo.mission.files.pdf import PdfPage, pdf_of
-from stopgo.mission.files.plan_svg import drawing_of, extent_of, overview, whole_sheet
-from stopgo.mission.files.room_labels import inside
+from stopgo.mission.files.plan_svg import drawing_of, extent_of, legs_of, overview, whole_sheet
+from stopgo.mission.files.room_labels import inside, points_along
 from stopgo.mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, PaperSheet
 from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import group, line, rect, shortened, text, use
-from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor import FloorPlan, Room
 from stopgo.mission.geometry import FloatArray, bounds
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures
@@ -56,6 +57,11 @@ class Tile:
     def holds(self, x: float, y: float) -> bool:
         return self.low[0] <= x <= self.high[0] and self.low[1] <= y <= self.high[1]
 
+    def shows(self, room: Room) -> bool:
+        """True if a part of the room may lie in this window."""
+        x0, y0, x1, y1 = bounds(part.exterior for part in room.polygons)
+        return x0 <= self.high[0] and self.low[0] <= x1 and y0 <= self.high[1] and self.low[1] <= y1
+
 
 def needs_sheets(made: Route, mission: Mission) -> bool:
     """Return True if one sheet shows the floor too small to read."""
@@ -80,14 +86,18 @@ def sheets_of(
     floor = made.floor
     content, whole = overview(made, mission, date=date, with_range=with_range, with_table=False)
     pages = [PdfPage(whole.width, whole.height, content, "Overview", whole.drawing)]
-    tiles = tiles_of(made, mission) if whole.scale > READABLE else []
+    give_back()  # a drawing is made from many short words
+    every = tiles_of(made, mission) if whole.scale > READABLE else []
+    tiles = _driven(every, mission) if mission.share else every
     shared: dict[str, str] = {}
     if tiles:
         site = _site_sheet(whole.centre)
-        shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range))
-        shared["key"] = _key(tiles, floor)
+        rooms = [room for room in floor.rooms if room.polygons and any(tile.shows(room) for tile in tiles)]
+        shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range, rooms=rooms))
+        give_back()
+        shared["key"] = _key(every, floor)
         shared["legend"] = _tile_legend(made, mission, tiles[0])
-        pages += [_tile_page(tile, tiles, site, mission, date) for tile in tiles]
+        pages += [_tile_page(tile, every, site, mission, date) for tile in tiles]
     pages += _lists(mission, floor, figures, tiles, date)
     return [_numbered(page, number, len(pages)) for number, page in enumerate(pages, 1)], shared
 
@@ -128,17 +138,20 @@ def tiles_of(made: Route, mission: Mission) -> list[Tile]:
     return found
 
 
+def _driven(tiles: Sequence[Tile], mission: Mission) -> list[Tile]:
+    """The windows through which a mission's route leads: other places belong to other missions."""
+    way = points_along(legs_of(mission), spacing=1.0).tolist()
+    return [tile for tile in tiles if any(tile.holds(x, y) for x, y in way)]
+
+
 def _letters(row: int) -> str:
     return (_letters(row // 26 - 1) if row >= 26 else "") + chr(ord("A") + row % 26)
 
 
 def _places(made: Route, mission: Mission) -> FloatArray:
     """Return the points (n, 2) that the sheets must show: targets, stops and the route."""
-    legs = [
-        np.array(leg).reshape(-1, 2)
-        for leg in (*(stop.approach for stop in mission.stops), mission.return_ or ())
-    ]
-    return np.concatenate([made.visibility.targets.unit_xy, *legs, [(mission.start.x, mission.start.y)]])
+    start = [(mission.start.x, mission.start.y)]
+    return np.concatenate([made.visibility.targets.unit_xy, *legs_of(mission), start])
 
 
 def _site_sheet(centre: tuple[float, float]) -> PaperSheet:

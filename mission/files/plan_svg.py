@@ -17,7 +17,7 @@ from stopgo.mission.files.shared_drawing import shared_routes, shared_stops
 from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit, sheet_with
 from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
-from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor import FloorPlan, Room
 from stopgo.mission.geometry import FloatArray, bounds, closed
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures
@@ -108,10 +108,17 @@ def _contents(
 
 
 def drawing_of(
-    made: Route, mission: Mission, sheet: PaperSheet, shared: Sequence[Mission] = (), *, with_range: bool
+    made: Route,
+    mission: Mission,
+    sheet: PaperSheet,
+    shared: Sequence[Mission] = (),
+    *,
+    with_range: bool,
+    rooms: Sequence[Room] | None = None,
 ) -> tuple[str, ...]:
-    """Yield everything to scale, from the floor up to the numbers."""
+    """Return everything to scale, from the floor up to the numbers; the names of `rooms`, else of all."""
     missions = shared or (mission,)
+    named = made.floor.rooms if rooms is None else rooms
     space = made.space
     parts = chain(
         building(space, sheet),
@@ -119,7 +126,7 @@ def drawing_of(
         [rings(item, sheet) for item in missions] if with_range else [],
         shared_routes(shared, sheet) if shared else route(mission, sheet),
         network(mission, sheet),
-        [room_labels(space.floor.rooms, sheet, avoid=_busy(missions, space.floor, sheet))],
+        [room_labels(named, sheet, avoid=_busy(missions, space.floor, sheet))],
         [errors(mission, sheet)],
         shared_stops(shared, sheet) if shared else stops(mission, sheet),
     )
@@ -146,7 +153,12 @@ def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> B
 
 
 def _legs(missions: Sequence[Mission]) -> list[FloatArray]:
-    legs = [leg for item in missions for leg in (*(s.approach for s in item.stops), item.return_ or ())]
+    return [leg for item in missions for leg in legs_of(item)]
+
+
+def legs_of(mission: Mission) -> list[FloatArray]:
+    """Polylines (n, 2) of a mission's legs, in metres."""
+    legs = (*(stop.approach for stop in mission.stops), mission.return_ or ())
     return [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs]
 
 

@@ -108,7 +108,7 @@ class Label:
 _ALL_OVER = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 4)), axis=-1).reshape(-1, 2)
 
 
-def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> str:
+def room_labels(rooms: Sequence[Room], sheet: PaperSheet, *, avoid: Busy) -> str:
     """Return name and area of each room, away from `avoid` and each other.
 
     Without space for both, the name is alone, then only its first word; a room without space even for that

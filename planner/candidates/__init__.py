@@ -6,7 +6,7 @@ of each one's room in `space.rooms`; or `(xy, room, reason)` where it drops some
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -32,10 +32,13 @@ from stopgo.planner.candidates.grid import grid
 from stopgo.planner.candidates.proposals import Proposals, in_order, joined
 from stopgo.planner.candidates.triangulation import triangulation
 from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.space.reach import Reach, reach_of
 from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]
+MANY = 10_000
+"""Proposals from which two processes look at them."""
 STRATEGIES: dict[str, Strategy] = {"grid": grid, "triangulation": triangulation}
 
 
@@ -60,7 +63,12 @@ def judged(space: NavigableSpace, xy: FloatArray, room: IntArray, *, part: int) 
 
 def _from_strategy(feasibility: StopFeasibility) -> Proposals:
     xy, room, early = _generated(feasibility.space)
-    reason = feasibility.reasons(xy, room)
+
+    def reasons(rows: Sequence[int]) -> list[int]:
+        some = np.array(rows, dtype=np.int64)
+        return feasibility.reasons(xy[some], room[some]).tolist()
+
+    reason = np.array(in_halves(reasons, range(len(xy)), forked=len(xy) >= MANY), dtype=np.int64)
     return Proposals.of(xy, room, reason if early is None else np.where(early == KEPT, reason, early))
 
 
@@ -79,7 +87,12 @@ def _for_empty_rooms(feasibility: StopFeasibility, found: Proposals) -> Proposal
     """Propose the best point of every room for which the strategy found no candidate."""
     kept = set(found.room[found.reason == KEPT].tolist())
     empty = [k for k in range(len(feasibility.space.rooms)) if k not in kept]
-    best = [(k, point) for k in empty if (point := best_point(feasibility, k)) is not None]
+
+    def best_points(rooms: Sequence[int]) -> list[FloatArray | None]:
+        return [best_point(feasibility, k) for k in rooms]
+
+    points = in_halves(best_points, empty, forked=len(found.xy) >= MANY)
+    best = [(k, point) for k, point in zip(empty, points, strict=True) if point is not None]
     return Proposals.of([point for _, point in best], [k for k, _ in best])
 
 

@@ -46,13 +46,13 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Route, Visibility
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements
-from stopgo.planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
 from stopgo.planner.covering_tour.search import LineTask
 from stopgo.planner.covering_tour.time_graph import complete_graph, time_graph
 from stopgo.planner.covering_tour.timed_line import LineTimes, PointLine
 from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
+from stopgo.planner.routing.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.selection import METHODS, cover_problem, offered_for_follow_up, remaining_cover
 from stopgo.planner.selection.bound import lower_bound

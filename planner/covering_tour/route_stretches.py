@@ -15,11 +15,11 @@ import numpy as np
 from stopgo.mission.console.plugins import variant
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
-from stopgo.planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
 from stopgo.planner.covering_tour.problem import TourProblem, nearest_rows, of_rows
 from stopgo.planner.covering_tour.search import LineTask, shorter_line
 from stopgo.planner.covering_tour.timed_line import LineTimes
 from stopgo.planner.routing import GRAPHS, rank_at_door
+from stopgo.planner.routing.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.paths import shortest_paths
 from stopgo.planner.routing.roadmap import graph_of

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stopgo.mission.geometry import IntArray
-from stopgo.planner.covering_tour.leg_table import NO_HEADING, LegTable
+from stopgo.planner.routing.leg_table import NO_HEADING, LegTable
 
 MOST_KEPT = 4000
 """Legs whose insertions are cached."""

@@ -127,7 +127,7 @@ def _ellipse(entity: Ellipse, fineness: Fineness) -> Iterator[Curve]:
 
 
 def _lwpolyline(entity: LWPolyline, fineness: Fineness) -> Iterator[Curve]:
-    vertices = np.array(list(entity), dtype=np.float64).reshape(-1, 5)  # with two widths before the bulge
+    vertices = np.asarray(entity.lwpoints.values)  # with two widths before the bulge
     points = _bulged(vertices[:, :2], vertices[:, 4], closed=bool(entity.closed), fineness=fineness)
     level = np.full((len(points), 1), float(entity.dxf.elevation))
     yield Curve(_in_world(entity.ocs(), np.hstack((points, level))), closed=entity.closed)

@@ -149,7 +149,8 @@ def _closed_key(shape: Closed) -> tuple:
 
 def region_key(region: Region) -> tuple:
     """Sort key of regions: by position and then by every coordinate."""
-    rings = [canonical_ring(part.exterior).tolist() for part in shapely.get_parts(region)]
+    parts = [region] if isinstance(region, shapely.Polygon) else shapely.get_parts(region)
+    rings = [canonical_ring(part.exterior).tolist() for part in parts]
     return (*np.round(region.bounds, 6).tolist(), rings)
 
 

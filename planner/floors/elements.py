@@ -51,7 +51,7 @@ class _Spaces:
         area, half = region.area, self._area / 2
         if area > half and region.intersection(self.outline).area > half:
             return True
-        return any(
+        return area * 1.05 >= _ROOM and any(
             _ROOM <= room.area <= area * 1.05 and region.intersection(room).area > 0.95 * room.area
             for room in (self.rooms[k] for k in self._tree.query(region, predicate="intersects"))
         )

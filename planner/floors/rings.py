@@ -5,17 +5,18 @@ Everything is in metres. Results do not depend on the order, direction or starti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.geometry import FloatArray, Polygon, frozen, ring_area
+from stopgo.mission.geometry import FloatArray, IntArray, Polygon, frozen, ring_area
 from stopgo.planner.geometry.shapes import QUARTER, boundary_lines, widened
 
 SNAP = 1e-3
@@ -24,6 +25,8 @@ GAP = 0.05
 """The widest gap, in metres, that is closed in an outline."""
 _GRID = 1e-4
 """Open lines are noded on a grid of this width in metres, so that an end on another line meets it."""
+_AT_ONCE = 100
+"""Shapes that are compared with all others at a time."""
 SLIVER = 1e-6
 """Least area in m² of a solid."""
 
@@ -60,7 +63,7 @@ def repaired(ring: FloatArray) -> tuple[list[shapely.Polygon], bool]:
 
 def polygons_of(region: Region) -> list[shapely.Polygon]:
     """Return the polygons of any geometry, without slivers, lines and points."""
-    parts = shapely.get_parts(shapely.get_parts(region))
+    parts = [region] if isinstance(region, shapely.Polygon) else shapely.get_parts(shapely.get_parts(region))
     return [part for part in parts if isinstance(part, shapely.Polygon) and part.area > SLIVER]
 
 
@@ -95,30 +98,40 @@ def to_shapely(polygon: Polygon) -> shapely.Polygon:
 
 def distinct(polygons: Sequence[shapely.Polygon]) -> list[int]:
     """For each polygon the index of the first that draws the same within `SNAP`, or its own."""
-    tree = shapely.STRtree(polygons)
     first = list(range(len(polygons)))
-    for index, polygon in enumerate(polygons):
-        for other in sorted(tree.query(polygon)):
-            if other < index and first[other] == other and _same(polygons[other], polygon):
-                first[index] = int(other)
-                break
+    shapes = np.array(polygons, dtype=object)
+    boxes = shapely.bounds(shapes)
+    for index, other in _pairs(shapes):
+        near = (other < index) & (np.abs(boxes[index] - boxes[other]) <= SNAP).all(axis=1)
+        for k, earlier in sorted(zip(index[near].tolist(), other[near].tolist(), strict=True)):
+            if first[k] == k and first[earlier] == earlier and _same(shapes[earlier], shapes[k]):
+                first[k] = earlier
     return first
 
 
+def _pairs(shapes: NDArray[np.object_]) -> Iterator[tuple[IntArray, IntArray]]:
+    """Pairs of shapes whose boxes meet, of some shapes at a time: those of many nested ones take memory."""
+    tree = shapely.STRtree(shapes)
+    for begin in range(0, len(shapes), _AT_ONCE):
+        index, other = tree.query(shapes[begin : begin + _AT_ONCE])
+        yield index + begin, other
+
+
 def _same(one: shapely.Polygon, other: shapely.Polygon) -> bool:
-    if any(abs(a - b) > SNAP for a, b in zip(one.bounds, other.bounds, strict=True)):
-        return False
-    return one.symmetric_difference(other).area <= SNAP * max(one.length, other.length) / 2
+    return bool(one.symmetric_difference(other).area <= SNAP * max(one.length, other.length) / 2)
 
 
 def parents(polygons: Sequence[shapely.Polygon]) -> list[int | None]:
     """For each polygon the smallest larger one that contains it (within `SNAP`), or None."""
-    tree = shapely.STRtree(polygons)
-    found: list[int | None] = []
-    for index, polygon in enumerate(polygons):
-        around = [int(i) for i in tree.query(polygon) if i != index and polygons[i].area > polygon.area]
-        holding = [i for i in around if _holds(polygons[i], polygon)]
-        found.append(min(holding, key=lambda i: (polygons[i].area, i)) if holding else None)
+    shapes = np.array(polygons, dtype=object)
+    area = shapely.area(shapes)
+    found: list[int | None] = [None] * len(shapes)
+    for inner, outer in _pairs(shapes):
+        larger = np.flatnonzero(area[outer] > area[inner])
+        order = larger[np.lexsort((outer[larger], area[outer[larger]], inner[larger]))]
+        for k, around in zip(inner[order].tolist(), outer[order].tolist(), strict=True):
+            if found[k] is None and _holds(shapes[around], shapes[k]):
+                found[k] = around
     return found
 
 

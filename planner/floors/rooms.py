@@ -145,6 +145,7 @@ def _corner(region: Region) -> tuple[float, float]:
 def _numbered(rooms: Sequence[_Room], *, outline: Region) -> tuple[tuple[Room, ...], list[Finding]]:
     numbered: list[Room] = []
     findings: list[Finding] = []
+    shapely.prepare(outline)
     for room in sorted(rooms, key=lambda item: region_key(item.region)):
         if not polygons_of(room.region):
             findings.append(
@@ -158,6 +159,8 @@ def _numbered(rooms: Sequence[_Room], *, outline: Region) -> tuple[tuple[Room, .
 
 
 def _outside(region: Region, outline: Region) -> tuple[Anomaly, ...]:
+    if outline.covers(region):
+        return ()
     off = region.area - region.intersection(outline).area
     if off <= region.area / 2:
         return ()

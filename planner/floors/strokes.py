@@ -132,7 +132,7 @@ def _placed(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:
 def _is_straight(shape: Shape) -> bool:
     """True if no point depends on the fineness of curves."""
     if isinstance(shape.entity, LWPolyline):
-        return not shape.entity.has_arc
+        return not np.any(shape.entity.lwpoints.values[:, 4])  # its bulges
     return shape.kind in ("LINE", "SOLID", "3DFACE")
 
 

@@ -9,6 +9,8 @@ from typing import Any, TypeVar, cast
 
 Instance = TypeVar("Instance")
 T = TypeVar("T")
+PREFIX = "_cached_"
+"""Begin of the names under which results are stored."""
 
 
 def instance_cached(compute: Callable[[Instance], T]) -> Callable[[Instance], T]:
@@ -47,6 +49,12 @@ def forget(cached: Callable[[Instance], T], instance: Instance) -> None:
     vars(instance).pop(_name_of(cached), None)
 
 
+def forget_all(instance: object) -> None:
+    """Forget the results of all `instance_cached` functions of an instance."""
+    for name in [name for name in vars(instance) if name.startswith(PREFIX)]:
+        del vars(instance)[name]
+
+
 def changed_copy(instance: Instance, **changes: Any) -> Instance:
     """A copy of a dataclass instance, with changes on which nothing depends that was derived from it."""
     made = dataclasses.replace(cast(Any, instance), **changes)
@@ -55,4 +63,4 @@ def changed_copy(instance: Instance, **changes: Any) -> Instance:
 
 
 def _name_of(function: Callable[[Instance], T]) -> str:
-    return f"_cached_{function.__module__}.{function.__qualname__}"
+    return f"{PREFIX}{function.__module__}.{function.__qualname__}"

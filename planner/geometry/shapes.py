@@ -70,8 +70,13 @@ def _farthest(drawn: Mapping[str, Sequence[FloatArray]]) -> str:
 
 
 def to_shape(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
-    """The union of `polygons` as one shapely geometry in the local frame."""
-    return union([one_shape(polygon, origin) for polygon in polygons])
+    """The union of `polygons` as one shapely geometry in the local frame; polygons that lie apart are it."""
+    shapes = [one_shape(polygon, origin) for polygon in polygons]
+    if len(shapes) > 1 and all(isinstance(shape, shapely.Polygon) for shape in shapes):
+        whole = shapely.MultiPolygon(shapes)
+        if whole.is_valid and not any(shape.is_empty for shape in shapes):
+            return shapely.normalize(shapely.remove_repeated_points(whole))
+    return union(shapes)
 
 
 def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:

@@ -15,16 +15,18 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from stopgo.mission.console.freed_memory import give_back
 from stopgo.mission.console.running_step import TICKING
 from stopgo.mission.geometry import frozen
 
 T = TypeVar("T")
+Argument = TypeVar("Argument")
 PR_SET_PDEATHSIG = 1
 """Option of Linux's prctl: the signal that a process gets when its parent ends."""
 
@@ -80,6 +82,7 @@ class SideWork(Generic[T]):
     def _fork(self) -> None:
         self._answer, end = os.pipe()
         process, parent = 0, os.getpid()
+        give_back()  # what is free would be used, and so copied, by both
         with contextlib.suppress(OSError):  # too many processes, or too little memory
             process = os.fork()
             if not process:
@@ -120,6 +123,15 @@ class SideWork(Generic[T]):
             with contextlib.suppress(ChildProcessError):  # where SIGCHLD is ignored it has gone by itself
                 os.waitpid(self._process, 0)
         self._process, self._answer = 0, -1
+
+
+def in_halves(
+    work: Callable[[Sequence[Argument]], list[T]], items: Sequence[Argument], *, forked: bool
+) -> list[T]:
+    """Return the results of items, in their order; another process finds those of the second half."""
+    middle = len(items) // 2 if forked else len(items)
+    with SideWork(lambda: work(items[middle:]), forked=forked) as rest:
+        return [*work(items[:middle]), *rest.result()]
 
 
 class _ResultPickler(pickle.Pickler):

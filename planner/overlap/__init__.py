@@ -58,6 +58,8 @@ def links_of(candidates: Candidates) -> csr_array:
     settings, rows = candidates.settings, np.arange(len(candidates.kept))
     overlaps = Overlaps(shown(candidates, rows, only_wide=settings.least_overlap == 0))  # large, so not kept
     half, end = overlaps.rows // 2, overlaps.rows
+    if end >= MANY:
+        overlaps = overlaps.with_tables()
     with SideWork(lambda: _links(overlaps, settings, range(half, end)), forked=end >= MANY) as others:
         pairs = _links(overlaps, settings, range(half)) + others.result()
     ends = tuple(np.concatenate([np.empty(0, np.int32), *ends]) for ends in zip(*pairs, strict=True))

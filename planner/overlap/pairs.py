@@ -13,8 +13,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.geometry.compiling import compiled
@@ -54,6 +56,7 @@ class Overlaps:
     def __init__(self, seen: ShownBoundary) -> None:
         self._seen = seen
         self._by_row: dict[int, Pairs] = {}
+        self._tables: tuple[NDArray[Any], ...] = ()
         self._row = np.repeat(np.arange(len(seen.xy)), np.diff(seen.pointer))
         self._order = np.lexsort((seen.begin, self._row, seen.surface))
         self._place = seen.surface[self._order] * self.rows + self._row[self._order]
@@ -91,16 +94,9 @@ class Overlaps:
 
         They are those of some of the rows, or of all.
         """
-        seen, rows = self._seen, self.rows
-        first = np.searchsorted(seen.surface[self._order], np.arange(len(seen.boundary.first) + 1))
-        row_on, begin, end = self._row[self._order], seen.begin[self._order], seen.end[self._order]
-        sums = _sums_before(seen.boundary, first, begin, end)
-        place = np.empty_like(self._order)
-        place[self._order] = np.arange(len(place))
+        rows = self.rows
         scratch = np.zeros(rows), np.zeros(6 * rows), np.zeros(rows, np.int64)
-        xy = np.ascontiguousarray(seen.xy).ravel()
-        shown = (seen.pointer, place, seen.surface, first, row_on, begin, end)
-        data = (*shown, seen.boundary.around, *sums, xy, *scratch)
+        data = (*(self._tables or self._for_kernel()), *scratch)
         some = range(rows) if some is None else some
         for low in some[::BLOCK]:
             high = min(low + BLOCK, some.stop)
@@ -108,6 +104,22 @@ class Overlaps:
             row, other, common = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size)
             many = kernel(low, high, WIDER_M, least_m, hold_m, LEVER_M, *data, row, other, common)
             yield row[:many].copy(), other[:many].copy(), common[:many].copy()
+
+    def with_tables(self) -> Overlaps:
+        """Itself, with the tables that `firm` needs: processes that are forked then share them."""
+        self._tables = self._for_kernel()
+        return self
+
+    def _for_kernel(self) -> tuple[NDArray[Any], ...]:
+        """The stretches by surfaces, and the sums of normal matrices before their ends."""
+        seen = self._seen
+        first = np.searchsorted(seen.surface[self._order], np.arange(len(seen.boundary.first) + 1))
+        row_on, begin, end = self._row[self._order], seen.begin[self._order], seen.end[self._order]
+        sums = _sums_before(seen.boundary, first, begin, end)
+        place = np.empty_like(self._order)
+        place[self._order] = np.arange(len(place))
+        shown = (seen.pointer, place, seen.surface, first, row_on, begin, end)
+        return (*shown, seen.boundary.around, *sums, np.ascontiguousarray(seen.xy).ravel())
 
     def middle_of_common(self, row: int, other: int) -> FloatArray:
         """The middle of the longest stretch of boundary that two rows see, local metres (2,)."""

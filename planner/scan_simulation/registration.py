@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations, groupby
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.spatial import cKDTree
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import ScanPair, Simulation, within_tolerance
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.scan_simulation.near_kernel import ALONG_X, ALONG_Y, SHIFT, mark_near
 
 VOXEL_M = 0.075
@@ -48,6 +50,8 @@ HEADING_FEW = 3
 """One of so many points of upright surfaces compares the headings."""
 LEVEL_FEW = 10
 """One of so many points of level surfaces is kept: they hold height and tilt only."""
+MANY = 8
+"""Pairs of near scans from which a second process registers half of them."""
 LEAST_POINTS = 100
 """Fewest shared points on upright surfaces for a pair, about 0.5 m²."""
 FEW = 10
@@ -189,15 +193,29 @@ class Registered:
 def registered(
     names: Sequence[str], positions: FloatArray, surfaces: Sequence[OrientedCloud], simulation: Simulation
 ) -> Iterator[Registered]:
-    """Register every pair of scans with shared surfaces; `positions` (n, 3) are the scanner's."""
-    for i in range(len(names)):
-        one = replace(surfaces[i])  # what is looked up in it goes with it
-        for j in range(i + 1, len(names)):
-            if math.dist(positions[i], positions[j]) < 2 * simulation.joining_m:
+    """Register every pair of scans with shared surfaces; `positions` (n, 3) are the scanner's.
+
+    A second process registers the later pairs, if there are many.
+    """
+    near = [
+        (i, j)
+        for i, j in combinations(range(len(names)), 2)
+        if math.dist(positions[i], positions[j]) < 2 * simulation.joining_m
+    ]
+    middle = next((k for k, pair in enumerate(near) if pair[0] >= near[len(near) // 2][0]), 0)
+
+    def those(pairs: Sequence[tuple[int, int]]) -> Iterator[Registered]:
+        for i, several in groupby(pairs, key=lambda pair: pair[0]):
+            one = replace(surfaces[i])  # what is looked up in it goes with it
+            for _, j in several:
                 two = _CloudPair(one, surfaces[j], _shift(positions[j] - positions[i]))
                 if two.meets and two.shared_points >= LEAST_POINTS:
                     starts = _starts(two, simulation, (i, j))
                     yield _registered((names[i], names[j]), two, starts, simulation)
+
+    with SideWork(lambda: list(those(near[middle:])), forked=len(near) >= MANY) as later:
+        yield from those(near[:middle])
+        yield from later.result() if later.is_apart else those(near[middle:])
 
 
 @dataclass(frozen=True, eq=False)

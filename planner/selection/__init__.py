@@ -170,7 +170,9 @@ def _connected(
     else:
         rows, bound = connected(task, lambda cover, *_: _solved(method, cover, settings), rounds=1)
     if method.ours and bound < len(rows):
-        bound = max(bound, bound_of(task.problem, found=len(rows)))
+        problem = task.problem
+        del task, cover  # before another process is forked for the bound: the links are large
+        bound = max(bound, bound_of(problem, found=len(rows)))
     problem = whole.after(fixed)
     others = in_greedy_order(problem, np.setdiff1d(rows, fixed))
     return np.concatenate([fixed, others]).astype(np.int64), bound

@@ -47,10 +47,10 @@ def regions_of(cover: Cover, components: list[IntArray]) -> list[IntArray]:
     """The components needed to meet every demand, as few as are found.
 
     The smallest superfluous ones are dropped first. Where many remain, a search for the fewest often leaves
-    half of them.
+    half of them. Where none is superfluous, each is needed.
     """
     dropped = _without_superfluous(cover, components)
-    fewest = _fewest(cover, components) if len(dropped) > FEW else dropped
+    fewest = _fewest(cover, components) if FEW < len(dropped) < len(components) else dropped
     return fewest if len(fewest) < len(dropped) else dropped
 
 
@@ -102,6 +102,7 @@ class SeparatorSearch:
         self._region_of[every] = np.repeat(np.arange(len(regions)), [len(region) for region in regions])
         self._every, self._elsewhere = RunningCoverage(cover, every), RunningCoverage(cover, every)
         self._left_out = np.empty(0, np.int64)
+        self._weight = cover.paid_to(cover.weight.astype(float))
         self._is_near, self._is_chosen = (np.zeros(cover.rows, dtype=bool) for _ in range(2))
 
     def separators(self, rows: IntArray) -> Iterator[IntArray]:
@@ -128,7 +129,8 @@ class SeparatorSearch:
 
     def _enough(self, separator: NodeSeparator) -> tuple[bool, bool]:
         """True for the side of the component, and for the one beyond, if it meets every demand."""
-        near = self._elsewhere.enough_with(separator.near)
+        most = self._elsewhere.reached[0] + self._weight[separator.near].sum()
+        near = most >= self._cover.needed[0] and self._elsewhere.enough_with(separator.near)
         far = self._every.enough_without(np.concatenate([separator.near, separator.between]))
         return (near, far) if separator.is_here else (far, near)
 
@@ -180,7 +182,7 @@ class SeparatorSearch:
         if len(parts.last) and np.count_nonzero(self._is_chosen[known]) < chosen:
             rest = inside.copy()
             rest[known] = 0
-            here = np.setdiff1d(known, between[-1])
+            here = known[~np.isin(known, between[-1], kind="table")]
             separator = NodeSeparator(between[-1], here, is_here=True)
             found.append((len(known) - size, int(np.argmax(rest)), separator))
         return (separator for *_, separator in sorted(found, key=lambda one: one[:2]))

@@ -40,6 +40,8 @@ class Ground:
     origin: FloatArray
     outline: BaseGeometry
     """The floor layer and the floor under inner openings."""
+    solids: list[BaseGeometry]
+    """Each obstacle by itself, in the floor's order."""
     obstacles: BaseGeometry
     obstacle_rings: RingIndex
     crossings: tuple[Crossing, ...]
@@ -47,12 +49,12 @@ class Ground:
     """Openings not driven through (k, 2, 2)."""
 
     @classmethod
-    def of(cls, floor: FloorPlan, settings: Settings) -> Ground:
+    def of(cls, floor: FloorPlan, settings: Settings, *, forked: bool = False) -> Ground:
         origin = local_origin(floor)
         solids = [solid_of(item, origin, HAIRLINE) for item in floor.elements if item.obstacle]
         obstacles = union(solids)  # not snapped: clearances are decided on it
         rings = RingIndex(obstacles)
-        crossings = crossings_of(floor, rings, settings)
+        crossings = crossings_of(floor, rings, settings, forked=forked)
         inner = [threshold(item) for item in crossings if not item.closed_because]
         slab = to_shape(floor.outline, origin)
         holes = [shapely.Polygon(ring) for part in polygon_parts(slab) for ring in part.interiors]
@@ -61,7 +63,7 @@ class Ground:
             raise InputError(f"{floor.name}: the floor has no area; check layer FLOOR")
         lines = [barrier(item, origin, rings) for item in crossings if item.closed_because]
         barriers = np.array(lines).reshape(-1, 2, 2)
-        return cls(floor, origin, outline, obstacles, rings, crossings, barriers)
+        return cls(floor, origin, outline, solids, obstacles, rings, crossings, barriers)
 
     def walls(self, settings: Settings) -> Walls:
         """Everything that a robot's centre keeps clear of: obstacles, barriers, and floor edges."""

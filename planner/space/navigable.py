@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -13,9 +13,9 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.frames.geodesy import out_of_reach
-from stopgo.mission.geometry import FloatArray, Polygon, frozen
+from stopgo.mission.geometry import FloatArray, IntArray, Polygon, frozen
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import NavigableSpace, Targets
+from stopgo.mission.stages import NavigableSpace, RoomSpace, Targets
 from stopgo.planner.geometry.instance_cache import store
 from stopgo.planner.geometry.shapes import local_origin, to_polygons, to_shape
 from stopgo.planner.geometry.side_work import SideWork
@@ -25,7 +25,7 @@ from stopgo.planner.space.ground import Ground, drivable
 from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of, obstacles_of
 from stopgo.planner.space.opening_joins import barrier
 from stopgo.planner.space.opening_states import opening_states
-from stopgo.planner.space.room_spaces import room_spaces, stop_area_of
+from stopgo.planner.space.room_spaces import floor_outside, room_spaces, stop_area_of
 from stopgo.planner.space.targets import occluders_of, targets_of
 
 MANY = 1000
@@ -34,6 +34,7 @@ MANY_CORNERS = 8000
 """The same for the corners of elements: round columns have many."""
 NOTHING = np.empty((0, 2, 2))
 T = TypeVar("T")
+_Kept: TypeAlias = tuple[tuple[Polygon, ...], BaseGeometry]
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
@@ -41,20 +42,22 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
-    with _SideWorks(forked=_is_large(floor)) as works:
+    large = _is_large(floor)
+    with _SideWorks(forked=large) as works:
         scanned = partial(_occluders_and_targets, floor, settings)
         scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
-        ground = Ground.of(floor, settings)
+        ground = Ground.of(floor, settings, forked=large)
         scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
-        clearing = works.begun(partial(_stop_area_and_obstacles, ground, settings), after=scanning)
+        clearing = works.begun(partial(_cleared, ground, settings), after=scanning)
         drive_area, gaps = drivable(ground, settings)
         (drive_polygons, drive_shape), gaps = _kept(drive_area, origin), frozen(gaps + origin)
         parts = parts_of(drive_shape, gaps - origin)
-        stop_area, obstacles, obstacle_shape = clearing.result()
-        dividing = works.begun(partial(room_spaces, floor, ground, drive_area, stop_area))
+        occluders, targets = scanning.result()
+        _check_targets(floor, targets)
+        (obstacles, obstacle_shape), areas = clearing.result()
+        dividing = works.begun(partial(_rooms, ground, drive_area, areas, targets))
         states, findings = opening_states(ground, parts, settings)
-        rooms, (occluders, targets) = dividing.result(), scanning.result()
-    _check_targets(floor, targets)
+        rooms, faced = dividing.result()
     space = NavigableSpace(
         floor=floor,
         settings=settings,
@@ -66,7 +69,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         drive_area=drive_polygons,
         gaps=gaps,
         targets=targets,
-        unit_room=faced_rooms(targets, rooms, ground),
+        unit_room=faced,
         ground=to_polygons(ground.outline, origin),
         findings=(*floor.findings, *findings),
     )
@@ -100,13 +103,20 @@ def _occluders_and_targets(
     return occluders, targets_of(floor, occluders, d_dis=settings.d_dis)
 
 
-def _stop_area_and_obstacles(
-    ground: Ground, settings: Settings
-) -> tuple[BaseGeometry, tuple[Polygon, ...], BaseGeometry]:
-    return stop_area_of(ground, settings), *_kept(ground.obstacles, ground.origin)
+def _cleared(ground: Ground, settings: Settings) -> tuple[_Kept, tuple[BaseGeometry, BaseGeometry]]:
+    """The obstacles, the area where stops may be, and the floor outside every room."""
+    return _kept(ground.obstacles, ground.origin), (stop_area_of(ground, settings), floor_outside(ground))
 
 
-def _kept(shape: BaseGeometry, origin: FloatArray) -> tuple[tuple[Polygon, ...], BaseGeometry]:
+def _rooms(
+    ground: Ground, drive_area: BaseGeometry, areas: tuple[BaseGeometry, BaseGeometry], targets: Targets
+) -> tuple[tuple[RoomSpace, ...], IntArray]:
+    """The rooms, and the room that each unit faces."""
+    rooms = room_spaces(ground, drive_area, *areas)
+    return rooms, faced_rooms(targets, rooms, ground)
+
+
+def _kept(shape: BaseGeometry, origin: FloatArray) -> _Kept:
     """A shape as polygons in the drawing's coordinates, and the shape that these are in the local frame."""
     polygons = to_polygons(shape, origin)
     return polygons, to_shape(polygons, origin)

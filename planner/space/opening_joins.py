@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
 from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape, widened
+from stopgo.planner.geometry.side_work import in_halves
 
 PROBES = (0.15, 0.25, 0.4, 0.6)
 """Distances in metres from an opening's line at which its rooms are searched."""
@@ -40,13 +42,19 @@ class Crossing:
         return float(self.clear.length)
 
 
-def crossings_of(floor: FloorPlan, obstacles: RingIndex, settings: Settings) -> tuple[Crossing, ...]:
-    """Every opening with its clear width and the rooms on its sides."""
+def crossings_of(
+    floor: FloorPlan, obstacles: RingIndex, settings: Settings, *, forked: bool = False
+) -> tuple[Crossing, ...]:
+    """Every opening with its clear width and the rooms on its sides; in two processes if `forked`."""
     origin = local_origin(floor)
     rooms = shapely.STRtree([to_shape(room.polygons, origin) for room in floor.rooms])
     outline = to_shape(floor.outline, origin)
     shapely.prepare(outline)
-    return tuple(_crossing(item, origin, obstacles, rooms, outline, settings) for item in floor.openings)
+
+    def found(openings: Sequence[Opening]) -> list[Crossing]:
+        return [_crossing(item, origin, obstacles, rooms, outline, settings) for item in openings]
+
+    return tuple(in_halves(found, floor.openings, forked=forked))
 
 
 def _crossing(

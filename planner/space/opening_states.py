@@ -18,7 +18,6 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
 from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import (
-    HAIRLINE,
     LINE_WALL,
     SLACK,
     boundary_lines,
@@ -30,7 +29,6 @@ from stopgo.planner.space.connected_parts import Parts
 from stopgo.planner.space.gaps import Gap, Walls, gaps_between
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import Crossing, middle_and_normal
-from stopgo.planner.space.targets import solid_of
 
 NEAR_OPENING = 1.6
 """Distance from an opening (m) within which the obstacle that blocks it is searched."""
@@ -113,9 +111,8 @@ class Surroundings:
     @cached_property
     def _obstacles(self) -> tuple[list[str], shapely.STRtree]:
         """Names and solids of the obstacles, in the floor's order."""
-        items = [item for item in self.ground.floor.elements if item.obstacle]
-        solids = [solid_of(item, self.ground.origin, HAIRLINE) for item in items]
-        return [item.id for item in items], shapely.STRtree(solids)
+        names = [item.id for item in self.ground.floor.elements if item.obstacle]
+        return names, shapely.STRtree(self.ground.solids)
 
     def owner(self, segment: FloatArray) -> str:
         """The first obstacle that a wall segment (2, 2) belongs to, in words."""

@@ -55,9 +55,8 @@ class Reach:
 
     def _well_inside(self, xy: FloatArray) -> BoolArray:
         inside: BoolArray = self.parts.part_at(xy) >= 0
-        if len(self._rim) and len(xy):
-            points = shapely.points(xy)
-            inside &= shapely.distance(points, self._rim[self._rim_tree.nearest(points)]) > INSIDE
+        near, _ = self._rim_tree.query(shapely.points(xy), predicate="dwithin", distance=INSIDE)
+        inside[near] = False
         return inside
 
     def _on_crossing(self, point: FloatArray) -> bool:

@@ -6,35 +6,34 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import RoomSpace
 from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
 from stopgo.planner.space.ground import Ground
-from stopgo.planner.space.opening_joins import part_near, threshold
+from stopgo.planner.space.opening_joins import threshold
 
 LEAST_UNNAMED = 0.5
 """Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""
 
 
 def room_spaces(
-    floor: FloorPlan, ground: Ground, drive_area: BaseGeometry, stop_area: BaseGeometry
+    ground: Ground, drive_area: BaseGeometry, stop_area: BaseGeometry, outside: BaseGeometry
 ) -> tuple[RoomSpace, ...]:
-    """The rooms as planned: inner rooms subtracted from outer ones, and floor outside every room."""
-    shapes = [to_shape(room.polygons, ground.origin) for room in floor.rooms]
+    """The rooms as planned: inner rooms subtracted from outer ones, and floor `outside` every room."""
+    floor, shapes = ground.floor, _room_shapes(ground)
     inside = shapely.STRtree([shape.representative_point() for shape in shapes])
     planned: list[tuple[int | None, str, BaseGeometry]] = [
         (k, floor.rooms[k].label, _without_inner(shape, shapes, k, inside)) for k, shape in enumerate(shapes)
     ]
-    planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, shapes))
+    planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, outside))
     allowed = RingIndex(stop_area)
     return tuple(
         RoomSpace(
             room=index,
             name=name,
             area=to_polygons(shape, ground.origin),
-            stop_area=to_polygons(shape.intersection(part_near(allowed, shape)), ground.origin),
+            stop_area=to_polygons(shape.intersection(allowed.around(shape.bounds)), ground.origin),
         )
         for index, name, shape in planned
     )
@@ -50,23 +49,35 @@ def _without_inner(
 
 
 def stop_area_of(ground: Ground, settings: Settings) -> BaseGeometry:
-    """The area where stops may be, for pictures only: it is approximate."""
+    """The area where stops may be, for pictures only: it is approximate.
+
+    Obstacles are widened each by itself: the time for all together grows with the square of their number.
+    """
     keep = max(settings.d_sec, settings.radius)
     edges = shapely.boundary(to_shape(ground.floor.outline, ground.origin))
-    near = (roughly_widened(ground.obstacles, keep), roughly_widened(edges, settings.edge))
+    solid = [roughly_widened(part, keep) for part in polygon_parts(ground.obstacles)]
+    near = (shapely.union_all(solid), roughly_widened(edges, settings.edge))
     return ground.outline.difference(near[0]).difference(near[1])
 
 
+def floor_outside(ground: Ground) -> BaseGeometry:
+    """Floor outside every room, up to walls and thresholds."""
+    doors = [threshold(item) for item in ground.crossings if not item.clear.is_empty]
+    return ground.outline.difference(union([*_room_shapes(ground), *doors])).difference(ground.obstacles)
+
+
+def _room_shapes(ground: Ground) -> list[BaseGeometry]:
+    return [to_shape(room.polygons, ground.origin) for room in ground.floor.rooms]
+
+
 def _unnamed(
-    ground: Ground, drive_area: BaseGeometry, rooms: list[BaseGeometry]
+    ground: Ground, drive_area: BaseGeometry, outside: BaseGeometry
 ) -> list[tuple[str, BaseGeometry]]:
-    """Floor outside every room, up to walls and thresholds; without any room, each part of the floor."""
-    if not rooms:
+    """The parts of the floor outside every room; without any room, each part of the floor."""
+    if not ground.floor.rooms:
         parts = sorted(polygon_parts(to_shape(ground.floor.outline, ground.origin)), key=lambda p: p.bounds)
         names = ["floor"] if len(parts) == 1 else [f"floor {k + 1}" for k in range(len(parts))]
         return list(zip(names, parts, strict=True))
-    doors = [threshold(item) for item in ground.crossings if not item.clear.is_empty]
-    outside = ground.outline.difference(union([*rooms, *doors])).difference(ground.obstacles)
     drive_rings = RingIndex(drive_area)
     parts = [p for p in polygon_parts(outside) if _is_room(p, drive_rings)]
     ordered = sorted(parts, key=lambda part: part.bounds)

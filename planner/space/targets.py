@@ -14,6 +14,7 @@ from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from stopgo.mission.stages import Targets
 from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.geometry.near_shapes import labels_of
 from stopgo.planner.geometry.shapes import (
     GRID,
     LINE_WALL,
@@ -30,6 +31,8 @@ from stopgo.planner.geometry.shapes import (
 
 CRACK = 2e-4
 """Solids at most this far apart (m) touch."""
+MITRE = 100.0
+"""Where solids are widened to close cracks, corners reach at most this many times as far."""
 NOISE = GRID / 100
 """Width in metres up to which closing cracks widens a face by rounding only."""
 STRAIGHT = 1.5
@@ -66,15 +69,24 @@ def without_cracks(shape: BaseGeometry) -> BaseGeometry:
 
     Else the laser would pass through the gap, and its faces would be targets that are never visible.
     """
-    wide = shape.buffer(CRACK / 2, join_style="mitre", mitre_limit=100.0)
-    closed = mended(wide.buffer(-CRACK / 2, join_style="mitre", mitre_limit=100.0))
-    cracks = polygon_parts(shapely.difference(closed, shape, grid_size=NOISE))
+    parts = np.array(polygon_parts(shape), dtype=object)
+    cracks = _cracks(parts)
     if not cracks:
         return shape
-    parts = np.array(polygon_parts(shape), dtype=object)
     near = np.unique(shapely.STRtree(parts).query(cracks, predicate="dwithin", distance=CRACK)[1])
     filled = shapely.union_all([*parts[near], *cracks], grid_size=NOISE)
     return snapped(shapely.MultiPolygon([*np.delete(parts, near), *polygon_parts(filled)]))
+
+
+def _cracks(parts: NDArray[np.object_]) -> list[shapely.Polygon]:
+    """The hairline gaps in polygons and between them; GEOS takes long for all that lie apart at once."""
+    group = labels_of(parts.tolist(), within=2 * MITRE * CRACK)
+    order = np.argsort(group, kind="stable")
+    shapes = shapely.multipolygons(parts[order], indices=group[order])
+    wide = shapely.buffer(shapes, CRACK / 2, join_style="mitre", mitre_limit=MITRE)
+    closed = [mended(one) for one in shapely.buffer(wide, -CRACK / 2, join_style="mitre", mitre_limit=MITRE)]
+    found = shapely.difference(closed, shapes, grid_size=NOISE)
+    return [part for one in found for part in polygon_parts(one)]
 
 
 def solid_of(element: Element, origin: FloatArray, thickness: float) -> BaseGeometry:

@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.stages import NavigableSpace, Selection
 from stopgo.planner.routing import ALL_PAIRS_UP_TO, legs_between
+from stopgo.planner.routing.leg_table import MICROSECONDS, LegTable, leg_table
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.roadmap import nearby_paths_between
@@ -28,26 +28,12 @@ from stopgo.planner.task_allocation.turn_shares import turn_shares
 Tour = tuple[int, ...]
 """Stops in the order of driving."""
 
-MICROSECONDS = 1e6
-"""Per second."""
 NEAR = 150
 """Nearest points of each point to which corners of paths are counted in advance."""
 ROWS = 256
 """Points whose paths are timed as straight ones at a time."""
 DETOURS_UP_TO = 500
 """Points up to which lower bounds allow for detours; this takes time with the cube of their number."""
-
-
-class _LegTimes(NamedTuple):
-    """Microseconds and headings of legs (n, n), -1 if a leg is not timed yet, and if it has no length."""
-
-    spent: IntArray
-    leaving: IntArray
-    arriving: IntArray
-
-    @classmethod
-    def unknown(cls, points: int) -> _LegTimes:
-        return cls(*(np.full((points, points), -1, dtype=np.int64) for _ in range(3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +57,11 @@ class TourTimes:
     closed: bool
 
     @cached_property
-    def _table(self) -> _LegTimes:
-        """The legs timed so far."""
-        return _LegTimes.unknown(len(self.points))
+    def _table(self) -> LegTable:
+        """The legs; of many points those timed so far."""
+        if isinstance(self.legs, Legs):
+            return leg_table(self.legs, self.robot)
+        return LegTable.empty(len(self.points), self.robot)
 
     @cached_property
     def lengths(self) -> FloatArray:
@@ -103,33 +91,19 @@ class TourTimes:
     def _turned(self, a: IntArray, b: IntArray, start: int) -> IntArray:
         """Microseconds (tours,) of turning into legs and to the headings of scans."""
         leaving, arriving = self._table.leaving[a, b], self._table.arriving[a, b]
-        first = np.full((len(a), 1), self._heading_of(self.start_heading[start]))
+        first = np.full((len(a), 1), self._table.heading(self.start_heading[start]))
         if not len(self.heading):
             before = _last_known(np.concatenate([first, arriving[:, :-1]], axis=1))
-            return self._turns(before, leaving).sum(axis=1)
+            return self._table.turns(before, leaving).sum(axis=1)
         before = np.concatenate([first, self._scanned[a[:, 1:]]], axis=1)
         come = np.where(arriving < 0, before, arriving)
-        scanned = self._turns(come, self._scanned[np.minimum(b, self.stops - 1)]) * (b < self.stops)
-        return self._turns(before, leaving).sum(axis=1) + scanned.sum(axis=1)
-
-    def _turns(self, a: IntArray, b: IntArray) -> IntArray:
-        """Microseconds between headings the short way round, 0 to none."""
-        apart = np.abs(a - b)
-        turned: IntArray = np.where(b < 0, 0, np.minimum(apart, self._whole_turn - apart))
-        return turned
+        scanned = self._table.turns(come, self._scanned[np.minimum(b, self.stops - 1)]) * (b < self.stops)
+        return self._table.turns(before, leaving).sum(axis=1) + scanned.sum(axis=1)
 
     @cached_property
     def _scanned(self) -> IntArray:
         """Heading of the scan at each stop, counted as others are."""
-        return np.array([self._heading_of(heading) for heading in self.heading.tolist()], dtype=np.int64)
-
-    @cached_property
-    def _whole_turn(self) -> int:
-        """Microseconds of a full turn."""
-        return round(math.tau / self.robot.turn_rate * MICROSECONDS)
-
-    def _heading_of(self, radians: float) -> int:
-        return round(radians / math.tau * self._whole_turn) % self._whole_turn
+        return np.array([self._table.heading(heading) for heading in self.heading.tolist()], dtype=np.int64)
 
     def _time_legs(self, a: IntArray, b: IntArray) -> None:
         """Time the legs from `a` to `b` that were not timed before."""
@@ -145,15 +119,16 @@ class TourTimes:
         line = self.line(a, b)
         steps = np.diff(line, axis=0)
         steps = steps[np.any(steps != 0, axis=1)]
-        spent, leaving, arriving = self._table
+        table = self._table
+        spent, leaving, arriving = table.spent, table.leaving, table.arriving
         if not len(steps):
             spent[a, b] = spent[b, a] = 0
             return
         first, last = (math.atan2(y, x) for x, y in (steps[0], steps[-1]))
         drive, turn, _ = leg_times([(x, y) for x, y in line.tolist()], heading=first, robot=self.robot)
         spent[a, b] = spent[b, a] = round((drive + turn) * MICROSECONDS)
-        leaving[a, b], arriving[a, b] = self._heading_of(first), self._heading_of(last)
-        leaving[b, a], arriving[b, a] = self._heading_of(last + math.pi), self._heading_of(first + math.pi)
+        leaving[a, b], arriving[a, b] = table.heading(first), table.heading(last)
+        leaving[b, a], arriving[b, a] = table.heading(last + math.pi), table.heading(first + math.pi)
 
     def line(self, a: int, b: int) -> FloatArray:
         """The polyline (n, 2) from point a to point b: the same in both directions."""
@@ -175,7 +150,7 @@ class TourTimes:
 
     @cached_property
     def likely(self) -> FloatArray:
-        """About the seconds (n, n) of every path, for a search: those of few points, else upper bounds."""
+        """About the seconds (n, n) of every path, for a search; of many points upper bounds for far ones."""
         if isinstance(self.legs, Legs):
             return self.least
         times = self._straight_s(self.legs.at_most())
@@ -239,7 +214,8 @@ class TourTimes:
     def estimate(self, turning: float) -> FloatArray:
         """Seconds (n, n) of every path, and of a fraction of half a turn before it."""
         turn = turning * math.pi / self.robot.turn_rate
-        return frozen(np.where(self.lengths > 0, self._driven_s + turn, 0.0))
+        times = self._driven_s if isinstance(self.legs, Legs) else self.likely
+        return frozen(np.where(self.lengths > 0, times + turn, 0.0))
 
     @cached_property
     def _counted(self) -> BoolArray:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.floors.rings import Region, polygons_of
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.rings import polygons_of
+from stopgo.planner.geometry.near_shapes import labels_of
 
 _FILLED = 0.5
 """If lines enclose less than this fraction of their hull, each line is a separate object."""
@@ -28,16 +26,6 @@ def groups_of(lines: Sequence[FloatArray], *, within: float) -> list[list[FloatA
     for line, group in zip(drawn, label.tolist(), strict=True):
         groups[group].append(line)
     return groups
-
-
-def labels_of(shapes: Sequence[Region], within: float) -> IntArray:
-    """The number of the group that each shape is in (n,), counted in the order of the shapes."""
-    if not shapes:
-        return np.empty(0, dtype=np.int64)
-    pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=within)
-    links = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(len(shapes), len(shapes)))
-    _, label = connected_components(links, directed=False)
-    return label.astype(np.int64)
 
 
 def outlines_of(lines: Sequence[FloatArray], *, within: float) -> list[shapely.Polygon]:

@@ -138,6 +138,8 @@ def _runs_around(one: Swing, other: Swing) -> bool:
 
 
 def _in_line(line: FloatArray, *, width: tuple[float, float]) -> Iterator[Swing]:
+    if len(line) < 4:
+        return
     steps = np.diff(line, axis=0)
     lengths = np.hypot(*steps.T)
     steps, lengths = steps[lengths > 0], lengths[lengths > 0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import shapely
@@ -24,17 +25,20 @@ from stopgo.planner.floors.units.known_sizes import furniture_in, going_of
 from stopgo.planner.floors.units.room_texts import RoomSides, areas_in, sides_of
 from stopgo.planner.floors.written_measures import length_in
 from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.geometry.side_work import SideWork
 
 _HOUSE = 30.0
 """Curves are cut as if the drawing had this size in metres."""
 _MOST = 3000
 """Walls' lines that are compared with one another: the longest."""
-_BLOCK = 64
+_BLOCK = 16
 """Lines that are compared with all others at a time."""
 _SLIM = 25.0
 """Walls' faces are nearer to each other than this fraction of the drawing; lines of rooms are not."""
 _NAMES = 3
 """Fewer names of rooms tell no usual distance."""
+_LARGE = 5000
+"""Shapes from which walls are compared in a process of their own."""
 _LINEAR = (0, 1, 6)
 """Types of dimensions that measure a length: linear, aligned, ordinate."""
 
@@ -88,20 +92,22 @@ def evidence_in(drawing: Drawing, shapes: Sequence[Shape], *, outlined: bool) ->
     written = [*(shape for shape in shapes if shape.is_text or shape.is_note), *_left_out(drawing, shapes)]
     extent = extent_of(shapes, "floor" if outlined else "walls")
     size = np.ptp(extent, axis=0) if len(extent) else np.zeros(2)
-    return UnitEvidence(
-        size=(float(size[0]), float(size[1])),
-        bulk=_bulk(extent),
-        leaves=tuple(_leaves(drawing, shapes)),
-        across=tuple(_across(shapes)) if outlined else (),
-        thickness=_thickness(shapes, _bulk(extent)),
-        text_height=_text_height(written),
-        dimensions=tuple(_dimensions(written)),
-        names_apart=_names_apart(written),
-        areas=tuple(areas_in(shapes, written)),
-        sides=tuple(sides_of(shapes, written)),
-        furniture=tuple(furniture_in(drawing)),
-        going=going_of(sketch(shape for shape in shapes if shape.role == "stairs" and not shape.is_text)),
-    )
+    walls = partial(_thickness, shapes, _bulk(extent))
+    with SideWork(walls, forked=len(shapes) >= _LARGE) as thickness:
+        return UnitEvidence(
+            size=(float(size[0]), float(size[1])),
+            bulk=_bulk(extent),
+            leaves=tuple(_leaves(drawing, shapes)),
+            across=tuple(_across(shapes)) if outlined else (),
+            text_height=_text_height(written),
+            dimensions=tuple(_dimensions(written)),
+            names_apart=_names_apart(written),
+            areas=tuple(areas_in(shapes, written)),
+            sides=tuple(sides_of(shapes, written)),
+            furniture=tuple(furniture_in(drawing)),
+            going=going_of(sketch(shape for shape in shapes if shape.role == "stairs" and not shape.is_text)),
+            thickness=thickness.result(),
+        )
 
 
 def _left_out(drawing: Drawing, shapes: Sequence[Shape]) -> Iterator[Shape]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import shapely
@@ -25,6 +26,10 @@ class Mesh:
     """Vertices of each triangle (t, 3)."""
     neighbour: IntArray
     """Triangle across the edge from corner k to corner k + 1, or -1 at the region's boundary (t, 3)."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the tree, which is made again in less time than it takes to pickle."""
+        return {name: held for name, held in vars(self).items() if name != "tree"}
 
     @property
     def triangles(self) -> int:

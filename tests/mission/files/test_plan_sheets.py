@@ -8,10 +8,14 @@ import zlib
 
 import numpy as np
 import pytest
+from msgspec import UNSET
+from msgspec.structs import replace as changed
 
+from stopgo.mission.document import MissionAllocation
 from stopgo.mission.files import plan_sheets
 from stopgo.mission.files.pdf import PdfPage, pdf_of
 from stopgo.mission.files.plan_sheets import plan_pdf, rooms_of, sheets_of, tiles_of
+from stopgo.mission.files.plan_svg import legs_of
 from stopgo.mission.files.svg import SMALLEST_TEXT
 from stopgo.mission.stages.figures import Figures, GroupCoverage, Unreached
 from tests.mission.worlds import room_mission, room_route
@@ -62,6 +66,16 @@ def test_every_place_of_the_plan_is_on_a_sheet() -> None:
     assert len({tile.name for tile in tiles}) == len(tiles)
     places = [*route.visibility.targets.unit_xy.tolist(), *((s.x, s.y) for s in mission.stops)]
     assert all(any(tile.holds(x, y) for tile in tiles) for x, y in places)
+
+
+def test_one_mission_of_several_has_the_sheets_that_its_route_leads_through() -> None:
+    route, mission = room_route(), room_mission()
+    first = changed(mission, stops=mission.stops[:1], return_=UNSET, share=MissionAllocation("tour", 1, 2))
+    tiles, way = tiles_of(route, mission), legs_of(first)
+    pages, _ = sheets_of(route, first, FIGURES, date=DATE)
+    kept = [page.name.removeprefix("Sheet ") for page in pages if page.name.startswith("Sheet ")]
+    assert 0 < len(kept) < len(tiles)
+    assert all(any(tile.holds(x, y) for tile in tiles if tile.name in kept) for leg in way for x, y in leg)
 
 
 def test_neighbouring_sheets_share_a_strip() -> None:

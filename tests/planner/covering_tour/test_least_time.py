@@ -19,7 +19,6 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements, _Relaxation, least_time
-from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import TourProblem, problem_of
 from stopgo.planner.covering_tour.search import shorter_line
 from stopgo.planner.covering_tour.time_graph import TimeGraph
@@ -27,9 +26,12 @@ from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
 from stopgo.planner.routing.assemble import assemble
+from stopgo.planner.routing.leg_kernel import follow
+from stopgo.planner.routing.leg_table import MICROSECONDS, leg_table
 from stopgo.planner.selection import cover_problem
 from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size, some
+from tests.planner.kernels import interpret, machine_code
 from tests.planner.worlds import box, column, door, floor_of, hall, planned, room, shell, two_rooms, wall
 
 BASIS: dict[str, Any] = {"d_dis": 0.2, "refine": False, "register": False}
@@ -254,6 +256,18 @@ def test_the_times_of_the_search_are_those_of_the_schedule(world: str, case: int
     line = [order[0] if problem.begin is not None else problem.line[0], *order, problem.line[-1]]
     del line[: int(problem.begin is not None)]
     assert problem.times.total(line) / MICROSECONDS == pytest.approx(found.time.seconds, abs=1e-3)
+
+
+def test_paths_take_the_same_time_at_both_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = problem_of(two_step("corridor"))
+    assert machine_code(follow)
+    robot = robot_of(problem.settings)
+    fast = leg_table(problem.legs, robot)
+    interpret(monkeypatch)
+    slow = leg_table(problem.legs, robot)
+    assert fast.spent.any()
+    for name in ("spent", "leaving", "arriving"):
+        assert np.array_equal(getattr(fast, name), getattr(slow, name))
 
 
 @pytest.mark.parametrize("world", WORLDS)

@@ -8,9 +8,9 @@ import pytest
 from stopgo.planner import covering_tour
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour import route_stretches as stretches
-from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import problem_of
 from stopgo.planner.overlap import links_of
+from stopgo.planner.routing.leg_table import MICROSECONDS
 from stopgo.planner.selection import cover_problem
 from stopgo.planner.selection.separators import components_of
 from tests.planner.covering_tour.test_least_time import WORLDS, seconds_of, two_step

@@ -9,7 +9,7 @@ from dataclasses import replace
 import shapely
 
 from stopgo.mission.settings import Settings
-from stopgo.planner.geometry.instance_cache import taken
+from stopgo.planner.geometry.instance_cache import forget_all, taken
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.local_shapes import drive_area_of, drive_parts_of
 from stopgo.planner.space.navigable import navigable
@@ -56,3 +56,11 @@ def test_what_is_taken_is_forgotten() -> None:
     kept = drive_area_of(space)
     assert taken(drive_area_of, space) is kept
     assert drive_area_of(space) is not kept
+
+
+def test_all_is_forgotten_that_was_derived_from_an_instance_and_nothing_else() -> None:
+    space = navigable(two_rooms(0.9), Settings())
+    kept, rooms = reach_of(space), space.rooms
+    forget_all(space)
+    assert space.rooms is rooms
+    assert reach_of(space) is not kept

@@ -14,7 +14,7 @@ import pytest
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import Settings
 from stopgo.planner import pipeline
-from stopgo.planner.geometry.side_work import SideWork
+from stopgo.planner.geometry.side_work import SideWork, in_halves
 from stopgo.planner.space import navigable
 from tests.planner.worlds import two_rooms
 from tests.waiting import wait_until
@@ -169,3 +169,10 @@ def _runs(process: int) -> bool:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+@pytest.mark.parametrize("forked", [False, True])
+def test_halves_keep_the_order_of_items(forked: bool) -> None:
+    found = in_halves(lambda some: [(item, os.getpid()) for item in some], range(5), forked=forked)
+    assert [item for item, _ in found] == [0, 1, 2, 3, 4]
+    assert len({process for _, process in found}) == 1 + (forked and sys.platform == "linux")

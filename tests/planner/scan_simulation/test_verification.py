@@ -223,6 +223,18 @@ def test_a_cloud_has_all_rays_where_few_would_lie_too_far_apart(model: bool) -> 
         assert (np.diff(ray) == step).all()
 
 
+def test_pairs_are_the_same_with_and_without_a_second_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    places, simulation = [(1.5, 1.0), (4.5, 3.0), (4.5, 1.0)], replace(COARSEST, step_deg=0.8)
+    surfaces = [surface_of(cloud, simulation) for cloud in clouds_of(hall(6, 4), places, simulation)]
+    found = []
+    for many in (0, 100):
+        monkeypatch.setattr(registration, "MANY", many)
+        positions = np.array([(*place, 1.3) for place in places])
+        found.append([item.pair for item in registered("abc", positions, surfaces, simulation)])
+    assert [(pair.a, pair.b) for pair in found[0]] == [("a", "b"), ("a", "c"), ("b", "c")]
+    assert found[0] == found[1]
+
+
 @cache
 def pair_in_a_room():
     (pair,) = pair_of(hall(6, 4, column("c", 2, 2)), (1.5, 1.0), (4.5, 3.0), replace(COARSEST, step_deg=0.8))

@@ -13,8 +13,10 @@ import numpy as np
 from stopgo.mission.document import RobotSpec
 from stopgo.mission.document.schedule import turn_time
 from stopgo.mission.document.straight_times import straight_times
-from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.shapes import SLACK
+from stopgo.planner.routing.leg_kernel import follow
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.paths import Paths
 
@@ -26,6 +28,8 @@ NO_WAY_S = 1e9
 """Seconds between points without a path."""
 SOURCES = 128
 """Points whose paths are traced at a time."""
+MANY = 300
+"""Points from which tracing takes long without a compiled kernel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,12 @@ class LegTable:
     """Heading at the end of a path."""
     whole_turn: int
     """Microseconds of a full turn."""
+
+    @classmethod
+    def empty(cls, points: int, robot: RobotSpec) -> LegTable:
+        """A table without legs; what is negative is not known yet."""
+        none = (np.full((points, points), NO_HEADING, dtype=np.int64) for _ in range(3))
+        return cls(*none, whole_turn=_whole_turn(robot))
 
     def turns(self, a: IntArray, b: IntArray) -> IntArray:
         """Microseconds to turn between headings in the shorter direction; 0 where either is none."""
@@ -57,9 +67,9 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
 
     The paths of a third-party graph count as straight, because only their lengths are known.
     """
-    whole_turn = round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
+    whole_turn = _whole_turn(robot)
     if legs.graph.ours:
-        seconds, leaving, arriving = _followed(legs.paths, np.isfinite(legs.lengths), robot)
+        seconds, leaving, arriving = _followed(legs.paths, len(legs.points), robot)
     else:
         step = legs.points[None, :, :] - legs.points[:, None, :]
         seconds = straight_times(legs.lengths, speed=robot.speed, acceleration=robot.acceleration)
@@ -77,50 +87,23 @@ def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
     )
 
 
-def _followed(paths: Paths, found: BoolArray, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Seconds (n, n) of the paths found between points, and headings at their beginnings and ends."""
-    count = len(found)
-    seconds, leaving, arriving = (np.zeros((count, count)) for _ in range(3))
-    for first in range(0, count, SOURCES):
-        source = np.arange(first, min(count, first + SOURCES))
-        before = paths.before(source)
-        start, end = np.nonzero((source[:, None] < np.arange(count)[None, :]) & found[source])
-        followed = _back(paths.xy, before, source, start, end, robot)
-        for table, values in zip((seconds, leaving, arriving), followed, strict=True):
-            table[source[start], end] = values
+def _whole_turn(robot: RobotSpec) -> int:
+    return round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
+
+
+def _followed(paths: Paths, points: int, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Seconds (points, points) of the paths between points, and headings at their beginnings and ends."""
+    kernel = compiled(follow, large=points > MANY) or follow
+    seconds, leaving, arriving = tables = tuple(np.zeros((points, points)) for _ in range(3))
+    x, y = np.ascontiguousarray(paths.xy.T)
+    for first in range(0, points, SOURCES):
+        sources = np.arange(first, min(points, first + SOURCES))
+        for source, before in zip(sources.tolist(), paths.before(sources), strict=True):
+            kernel(
+                source, points, x, y, np.ascontiguousarray(before, np.int32), robot.speed, robot.acceleration,
+                robot.turn_rate, SLACK, *(table[source] for table in tables),
+            )  # fmt: skip
     for table, other in ((seconds, seconds), (leaving, arriving), (arriving, leaving)):
-        low = np.tril_indices(count, -1)
+        low = np.tril_indices(points, -1)
         table[low] = other.T[low] + (0.0 if table is seconds else math.pi)
     return seconds, leaving, arriving
-
-
-def _back(
-    xy: FloatArray, before: IntArray, source: IntArray, start: IntArray, end: IntArray, robot: RobotSpec
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Seconds, first and last heading of paths (k,) from `source[start]` to `end`, traced from their ends.
-
-    Collinear pieces count as one, as they are driven.
-    """
-    count = len(start)
-    seconds, run, heading, last = (np.zeros(count) for _ in range(4))
-    here, going = end.copy(), np.arange(count)
-    first_piece = True
-    while len(going):
-        there = before[start[going], here[going]]
-        step = xy[here[going]] - xy[np.maximum(there, 0)]
-        length, angle = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
-        length[there < 0] = 0.0
-        if first_piece:
-            last[going], heading[going] = angle, angle
-            first_piece = False
-        turn = np.abs(np.remainder(heading[going] - angle + math.pi, math.tau) - math.pi)
-        bends = turn * np.minimum(length, run[going]) > SLACK
-        bent = going[bends]
-        seconds[bent] += straight_times(run[bent], speed=robot.speed, acceleration=robot.acceleration)
-        seconds[bent] += turn[bends] / robot.turn_rate
-        run[going] = np.where(bends, 0.0, run[going]) + length
-        heading[going] = np.where(bends, angle, heading[going])
-        here[going] = there
-        going = going[(there >= 0) & (there != source[start[going]])]
-    seconds += straight_times(run, speed=robot.speed, acceleration=robot.acceleration)
-    return seconds, heading, last

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from stopgo import freed_memory
+from stopgo.mission.console import freed_memory
 
 given: list[int] = []
 
