@@ -370,9 +370,9 @@ class Agent:
 
     def _publish_poses(self) -> None:
         while not self._closing.wait(self._pose_pause_s):
+            run, _ = self._runner.snapshot()  # before the pose: a run that begins now gets no earlier one
             position = self._runner.position()
             if position is not None:
-                run, _ = self._runner.snapshot()
                 report = self._poses.add(position, run, self._runner.boot_id)
                 if self._recorder is not None:
                     self._recorder.pose(report, began_ns=run.started_ns, over=run.over)
