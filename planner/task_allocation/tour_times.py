@@ -19,7 +19,7 @@ from stopgo.mission.document.straight_times import straight_times
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.stages import NavigableSpace, Selection
 from stopgo.planner.routing import ALL_PAIRS_UP_TO, legs_between
-from stopgo.planner.routing.leg_table import MICROSECONDS, LegTable, leg_table
+from stopgo.planner.routing.leg_table import MICROSECONDS, LegTable
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.roadmap import nearby_paths_between
@@ -58,9 +58,7 @@ class TourTimes:
 
     @cached_property
     def _table(self) -> LegTable:
-        """The legs; of many points those timed so far."""
-        if isinstance(self.legs, Legs):
-            return leg_table(self.legs, self.robot)
+        """The legs timed so far, as they are driven: of equally short paths another may have other corners."""
         return LegTable.empty(len(self.points), self.robot)
 
     @cached_property
