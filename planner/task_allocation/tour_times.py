@@ -58,7 +58,7 @@ class TourTimes:
 
     @cached_property
     def _table(self) -> LegTable:
-        """The legs timed so far, as they are driven: of equally short paths another may have other corners."""
+        """The legs timed so far, as they are driven: another path, as short, may have other corners."""
         return LegTable.empty(len(self.points), self.robot)
 
     @cached_property
