@@ -150,13 +150,13 @@ def _write_part(
     from stopgo.planner.commands.plan_report import PlanReport
 
     files = names(folder, number)
-    part = _revised(plan.parts[number], files["mission"])
-    recording = _recording(part, writing.recorder)
+    part, is_last = _revised(plan.parts[number], files["mission"]), number == len(plan.parts) - 1
+    recording = _recording(part, plan, writing.recorder, more=plan.divided is not None and not is_last)
     if recording is None:
         del files["recording"]
     watch = writing.watch
     contents = _PartContents(part, plan, writing.options, _today(), _seen_from(part, watch))
-    if number == len(plan.parts) - 1:
+    if is_last:
         _forget_derived(part)
     unwanted = [files.pop("picture")] if plan.divided and number else []
     forked = len(part.mission.stops) >= MANY and not writing.recorder.is_running
@@ -193,7 +193,7 @@ def _revised(part: PartPlan, path: Path) -> PartPlan:
     return replace(part, mission=with_digest(changed(part.mission, revision=revision)))
 
 
-def _recording(part: PartPlan, recorder: RecordingProcess) -> PlanDrawing | None:
+def _recording(part: PartPlan, plan: Plan, recorder: RecordingProcess, *, more: bool) -> PlanDrawing | None:
     """The recording of a part, while it is drawn; None, and a line on stderr, if Rerun is not installed."""
     if not recorder.is_running:
         try:
@@ -205,8 +205,9 @@ def _recording(part: PartPlan, recorder: RecordingProcess) -> PlanDrawing | None
     from stopgo.mission.stages.sight import sight_of
 
     mission = part.mission
-    sight = sight_of(part.route, mission, part.figures)
-    return recorder.draw(mission.id, (*part.stage_results(), mission, schedule(mission), sight))
+    totals = None if plan.divided is None else plan.whole.totals
+    sight = sight_of(part.route, mission, part.figures, totals)
+    return recorder.draw(mission.id, (*part.stage_results(), mission, schedule(mission), sight), more=more)
 
 
 def _seen_from(part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
