@@ -47,7 +47,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Route, Visibility
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements
 from stopgo.planner.covering_tour.search import LineTask
-from stopgo.planner.covering_tour.time_graph import complete_graph, time_graph
+from stopgo.planner.covering_tour.time_graph import straight_graph, time_graph
 from stopgo.planner.covering_tour.timed_line import LineTimes, PointLine
 from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
@@ -208,12 +208,8 @@ class TourProblem:
         xy = np.concatenate([self.candidates.xy[self.candidates.kept[all_rows]], given])
         required = np.searchsorted(all_rows, self.stays)
         zones = Zones.of(cover, xy[:points], required)
-        if settings.graph == "exact":
-            graph = time_graph(self.route.space, xy, robot)
-        elif points == len(self.rows):
-            graph = complete_graph(self.times.table.spent[: len(xy), : len(xy)] / MICROSECONDS)
-        else:
-            graph, zones = complete_graph(np.zeros((1, 1))), Zones([], np.empty(0), required[:0], points)
+        exact = settings.graph == "exact"
+        graph = time_graph(self.route.space, xy, robot) if exact else straight_graph(xy, robot)
         start = points if settings.start is not None else None
         end = points + (start is not None) if settings.end is not None else None
         stops = np.searchsorted(all_rows, rows).tolist()

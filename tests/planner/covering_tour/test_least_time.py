@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 
 import stopgo.planner.covering_tour.least_time_bound
 import stopgo.planner.covering_tour.problem
+import stopgo.planner.covering_tour.time_graph
 from stopgo.mission.document.schedule import leg_times, schedule, turn_time
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.settings import Settings
@@ -359,6 +360,31 @@ def test_no_leg_takes_less_than_its_pieces_by_the_time_graph(world: str, case: i
     spent = problem.times.table.spent[:count, :count] / MICROSECONDS
     assert (least <= spent + 1e-4).all()
     assert np.median(least[spent > 0] / spent[spent > 0]) > 0.9
+
+
+SLOW = {"graph": "grid", "grid": 2.6, "turn_rate": 720.0, "acceleration": 0.05, "scan_time": 1.0}
+DRIVEN_ON_GRIDS: list[tuple[str, dict[str, Any]]] = [
+    ("corridor", {**SLOW, "start": (4.5, 3.3, 0.0), "tour": "open"}),
+    ("hall", {**SLOW, "start": (2.7, 2.0, 0.0)}),
+]
+
+
+@pytest.mark.parametrize(("world", "more"), DRIVEN_ON_GRIDS)
+def test_no_mission_on_a_grid_takes_less_than_the_bound(world: str, more: dict[str, Any]) -> None:
+    """The grid through fewer stops may be coarser, and its paths longer with fewer corners."""
+    driven = two_step(world, **more)
+    asked = replace(asked_of(problem_of(driven)), known_s=math.inf)
+    assert 0.5 * seconds_of(driven) < least_time(asked) <= seconds_of(driven)
+
+
+def test_on_a_grid_the_bound_over_very_many_candidates_is_that_of_the_stops(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(stopgo.planner.covering_tour.time_graph, "MOST_POINTS", 8)
+    for case in (0, 4):
+        driven = two_step("rooms", case, graph="grid")
+        asked = asked_of(problem_of(driven))
+        assert asked.pause_s * asked.stops - 0.01 <= least_time(asked) <= seconds_of(driven)
 
 
 def test_pieces_share_no_more_than_the_turn_between_them() -> None:
