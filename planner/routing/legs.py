@@ -13,6 +13,8 @@ from stopgo.planner.routing.paths import Paths
 
 TOLERANCE = 1e-6
 """Largest error in metres of a path's ends and of its length."""
+ROUNDING = 1e-9
+"""Fraction and metres by which a path may be longer in one direction, because its pieces are added up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Legs:
         finite = self.graph.array(np.where(np.isposinf(lengths), 0.0, lengths), "lengths", (count, count))
         if (finite < 0).any() or np.diag(finite).any():
             raise self.graph.wrong("lengths are not all positive, and 0 from a point to itself")
-        if not np.array_equal(lengths, lengths.T):
+        if not np.allclose(lengths, lengths.T, rtol=ROUNDING, atol=ROUNDING):
             raise self.graph.wrong("lengths differ by direction")
 
     @property
