@@ -53,7 +53,7 @@ from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
-from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.legs import Legs, SomeLegs
 from stopgo.planner.selection import METHODS, cover_problem, offered_for_follow_up, remaining_cover
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover
@@ -142,6 +142,13 @@ class TourProblem:
     @cached_property
     def legs(self) -> Legs:
         return legs_between(self.route.space, np.concatenate([self._xy, self._ends]), trees=True)
+
+    def legs_of(self, rows: IntArray) -> SomeLegs:
+        """The paths between the stops at some rows, the start and the end, in this order."""
+        ends = len(self._ends) - (self.begin is not None)
+        return SomeLegs(
+            self.legs, np.append(np.searchsorted(self.rows, rows), len(self.rows) + np.arange(ends))
+        )
 
     @cached_property
     def line(self) -> PointLine:

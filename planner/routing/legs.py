@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.console.plugins import Variant
-from stopgo.mission.geometry import FloatArray, frozen, polyline_length
+from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from stopgo.planner.routing.paths import Paths
 
 TOLERANCE = 1e-6
@@ -42,8 +42,15 @@ class Legs:
         """(n, n) in metres; infinite where there is no path."""
         return np.asarray(self.paths.lengths, dtype=np.float64)
 
+    @property
+    def are_over_pieces(self) -> bool:
+        """True if `path` is that of `Paths`, over pieces that are known."""
+        return type(self.paths).path is Paths.path
+
     def path(self, start: int, end: int) -> FloatArray:
-        """The polyline (n, 2) from one point to another, both included."""
+        """The polyline (n, 2) from one point to another, both included: the same in both directions."""
+        if start > end:
+            return frozen(self.path(end, start)[::-1])
         if self.graph.ours:
             return self.paths.path(start, end)
         with self.graph.named_errors():
@@ -56,3 +63,21 @@ class Legs:
         if abs(polyline_length(line) - stated) > TOLERANCE * max(1.0, stated):
             raise self.graph.wrong(f"a path of {stated:.6f} m is {polyline_length(line):.6f} m long")
         return line
+
+
+@dataclass(frozen=True, eq=False)
+class SomeLegs:
+    """Paths between some of the points of others."""
+
+    legs: Legs
+    which: IntArray
+    """Indices of these points."""
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(n, n) in metres."""
+        return self.legs.lengths[np.ix_(self.which, self.which)]
+
+    def path(self, start: int, end: int) -> FloatArray:
+        """The polyline (n, 2) from one of these points to another."""
+        return self.legs.path(int(self.which[start]), int(self.which[end]))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.routing.dijkstra_kernel import reach
@@ -155,7 +155,9 @@ class NearbyPaths:
         return lengths
 
     def path(self, start: int, end: int) -> FloatArray:
-        """The polyline (n, 2) from one point to another, both included."""
+        """The polyline (n, 2) from one point to another, both included: the same in both directions."""
+        if start > end:
+            return frozen(self.path(end, start)[::-1])
         return straightened(self._xy[self._search.nodes(start, end)])
 
     def keep_paths_to(self, point: int) -> None:

@@ -16,8 +16,9 @@ import stopgo.planner.covering_tour.problem
 import stopgo.planner.covering_tour.time_graph
 from stopgo.mission.document.schedule import leg_times, schedule, turn_time
 from stopgo.mission.document.specs import robot_of
+from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import Route
+from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements, _Relaxation, least_time
 from stopgo.planner.covering_tour.problem import TourProblem, problem_of
@@ -27,8 +28,10 @@ from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
 from stopgo.planner.routing.assemble import assemble
+from stopgo.planner.routing.grid_graph import grid_paths
 from stopgo.planner.routing.leg_kernel import follow
 from stopgo.planner.routing.leg_table import MICROSECONDS, leg_table
+from stopgo.planner.routing.paths import Paths
 from stopgo.planner.selection import cover_problem
 from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size, some
@@ -257,6 +260,21 @@ def test_the_times_of_the_search_are_those_of_the_schedule(world: str, case: int
     line = [order[0] if problem.begin is not None else problem.line[0], *order, problem.line[-1]]
     del line[: int(problem.begin is not None)]
     assert problem.times.total(line) / MICROSECONDS == pytest.approx(found.time.seconds, abs=1e-3)
+
+
+def third_party(space: NavigableSpace, points: FloatArray) -> Paths:
+    return grid_paths(space, points)
+
+
+@pytest.mark.parametrize("graph", ["grid", f"{__name__}:third_party"])
+@pytest.mark.parametrize("world", ["rooms", "corridor"])
+def test_on_any_graph_the_search_has_the_times_that_are_driven(world: str, graph: str) -> None:
+    driven = two_step(world, 3, graph=graph)
+    problem, made = problem_of(driven), least_time_route(driven)
+    assert made.time is not None and made.time.seconds < made.time.two_step_s
+    order = np.searchsorted(problem.rows, made.selection.chosen[made.order]).tolist()
+    total = problem.times.total([problem.line[0], *order, problem.line[-1]]) / MICROSECONDS
+    assert total == pytest.approx(made.time.seconds, abs=1e-3) == seconds_of(made)
 
 
 def test_paths_take_the_same_time_at_both_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
