@@ -9,13 +9,16 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.linear_programme import minimised
+from stopgo.planner.selection.knapsack_cuts import tightened
+from stopgo.planner.selection.linear_programme import LinearProgramme
 from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_up
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
 COARSE = 30_000
 """Entries of a coarse relaxation, about."""
+FINE = 100_000
+"""Entries of a relaxation, about: with more the bound is hardly better, and takes many times as long."""
 FEW = 30
 """Most rows of a selection that a bound often proves the fewest."""
 FIRST_STEPS = 100
@@ -83,13 +86,13 @@ def first_bound(cover: Cover, *, found: int) -> int:
 def relaxation_bound(cover: Cover) -> int:
     """Rounded-up optimum of: min Σ x_i, v_j y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 
-    Where columns need more than one view, x_i <= 1 too. The result does not depend on the solver's
-    tolerances: any prices u_j >= 0 of columns and p >= 0 of demands give the bound Σ needed_k p_k
-    - Σ_j max(0, Σ w_kj p_k - v_j u_j) - Σ_i max(0, Σ_j in i u_j - 1) by weak duality, and it is computed
-    from the solver's.
+    Where columns need more than one view, x_i <= 1 too. Knapsack cover inequalities Σ c_hi x_i >= 1 follow.
+    The result does not depend on the solver's tolerances: any prices u_j >= 0 of columns, p >= 0 of demands
+    and q >= 0 of inequalities give the bound Σ needed_k p_k + Σ q_h - Σ_j max(0, Σ w_kj p_k - v_j u_j)
+    - Σ_i max(0, Σ_j in i u_j + Σ c_hi q_h - 1) by weak duality, and it is computed from the solver's. Of a
+    large problem neighbouring columns are one, as in the coarse bound.
     """
-    prices = _relaxation_prices(cover) if cover.needed.any() else None
-    return 0 if prices is None else rounded_up(_dual_value(cover, *prices))
+    return _bound_of_groups(cover, FINE)
 
 
 @instance_cached
@@ -99,15 +102,24 @@ def coarse_bound(cover: Cover) -> int:
     A group may be seen in part, and its columns have prices by their weight. By weak duality these too
     prove a bound of the whole problem. It is a little weaker than the relaxation's, at a tenth of the time.
     """
-    fraction = _group_fractions(cover, -(-cover.sees.nnz // COARSE))
+    return _bound_of_groups(cover, COARSE)
+
+
+def _bound_of_groups(cover: Cover, entries: int) -> int:
+    """The bound at the prices of a relaxation of about so many entries, with knapsack cover inequalities."""
+    if not cover.needed.any():
+        return 0
+    fraction = _group_fractions(cover, -(-cover.sees.nnz // entries))
     of_group = csr_array((np.ones(cover.columns), fraction.indices, fraction.indptr), shape=fraction.shape)
     asks = np.zeros(fraction.shape[1], dtype=np.int64)
     asks[fraction.indices] = cover.asks
     coarse = Cover(csr_array(cover.sees @ fraction), csr_array(cover.worth @ of_group), cover.needed, asks)
-    prices = _relaxation_prices(coarse)
-    if prices is None:
+    programme, scale = _relaxation(coarse)
+    solution, cuts = tightened(programme, cover)
+    if solution is None:
         return 0
-    return rounded_up(_dual_value(cover, fraction @ prices[0], prices[1]))
+    column, demand, cut = np.split(solution.prices, [coarse.columns, coarse.columns + len(coarse.needed)])
+    return rounded_up(_dual_value(cover, fraction @ column, demand / scale, cuts.fractions, cut))
 
 
 def _group_fractions(cover: Cover, size: int) -> csr_array:
@@ -127,19 +139,19 @@ def _group_fractions(cover: Cover, size: int) -> csr_array:
     return csr_array((fraction, group, np.arange(cover.columns + 1)))
 
 
-def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:
-    """Dual prices of the columns (columns,) and of the demands; None if the solver fails."""
+def _relaxation(cover: Cover) -> tuple[LinearProgramme, float]:
+    """The relaxation's programme, of rows and columns; and the divisor of its demands."""
     rows, columns = cover.rows, cover.columns
     seen = hstack([cover.sees.T, diags_array(-cover.asks.astype(float))])
     worth, needed, scale = scaled(cover)
     demand = hstack([csr_array((len(needed), rows)), worth])
-    solution = minimised(
+    programme = LinearProgramme(
         np.concatenate([np.ones(rows), np.zeros(columns)]),
         vstack([seen, demand]),
         np.concatenate([np.zeros(columns), needed]),
         np.concatenate([np.full(rows, np.inf if cover.once else 1.0), np.ones(columns)]),
     )
-    return None if solution is None else (solution.prices[:columns], solution.prices[columns:] / scale)
+    return programme, scale
 
 
 def scaled(cover: Cover) -> tuple[csr_array, FloatArray, float]:
@@ -148,12 +160,14 @@ def scaled(cover: Cover) -> tuple[csr_array, FloatArray, float]:
     return (cover.worth / scale).tocsr(), cover.needed / scale, scale
 
 
-def _dual_value(cover: Cover, column_price: FloatArray, demand_price: FloatArray) -> float:
+def _dual_value(
+    cover: Cover, column_price: FloatArray, demand_price: FloatArray, cuts: csr_array, cut_price: FloatArray
+) -> float:
     """The bound at these prices; where one view suffices, the prices are first scaled to be feasible."""
-    paid_to = cover.sees @ column_price
+    paid_to = cover.sees @ column_price + cuts.T @ cut_price
     if cover.once:
         heaviest = max(1.0, float(paid_to.max(initial=0.0)))
-        column_price, paid_to = column_price / heaviest, np.zeros(0)
+        column_price, cut_price, paid_to = column_price / heaviest, cut_price / heaviest, np.zeros(0)
     paid = cover.worth.T @ demand_price
     beyond = np.maximum(0.0, paid - cover.asks * column_price).sum() + np.maximum(0.0, paid_to - 1.0).sum()
-    return float(cover.needed @ demand_price - beyond)
+    return float(cover.needed @ demand_price + cut_price.sum() - beyond)
