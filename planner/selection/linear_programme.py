@@ -52,6 +52,11 @@ class LinearProgramme:
         infinite = np.full(len(least), highspy.kHighsInf)
         self._solver.addRows(len(least), least, infinite, rows.nnz, first, to, rows.data.astype(float))
 
+    def forget(self, many: int) -> None:
+        """Take the last so many rows away."""
+        rows = self._solver.getNumRow()
+        self._solver.deleteRows(many, np.arange(rows - many, rows, dtype=np.int32))
+
     def solution(self) -> Solution | None:
         """Solve it; None if the solver fails."""
         import highspy
