@@ -9,8 +9,8 @@ from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
 from stopgo.planner.selection.branching_bound import branching_bound
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.cover_relaxation import CoverRelaxation
 from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_up
-from stopgo.planner.selection.relaxation import CoverRelaxation
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""

@@ -14,9 +14,9 @@ import numpy as np
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.cover_relaxation import CoverRelaxation
 from stopgo.planner.selection.linear_programme import Solution
 from stopgo.planner.selection.multiplier_bound import rounded_up
-from stopgo.planner.selection.relaxation import CoverRelaxation
 
 ENTRIES = 30_000
 """Entries of the relaxation, about."""
@@ -49,11 +49,15 @@ class _Tree:
     found: int
     nodes: int = field(default=1)
 
-    def least(self, solution: Solution) -> float:
-        """The least bound of the branches at this solution."""
+    def least(self, solution: Solution, before: float = -math.inf) -> float:
+        """The least bound of the branches at this solution; that of the branch `before` it was lower."""
         value = self.relaxation.proved(solution)
         branched = self._branched(solution)
-        if rounded_up(value) >= self.found or branched is None or self.nodes + 2 > NODES:
+        if (
+            rounded_up(value) >= self.found
+            or branched is None
+            or not self._is_promising(value - before, value)
+        ):
             return value
         rows, number = branched
         self.nodes += 2
@@ -61,6 +65,10 @@ class _Tree:
         if rounded_up(fewer) < self.found:
             return max(value, fewer)
         return max(value, min(fewer, self._with(rows, math.ceil(number), value)))
+
+    def _is_promising(self, gain: float, value: float) -> bool:
+        """True if branches that gain as much as the last one did may reach the end before the last node."""
+        return (self.found - 1 - value) <= gain * math.log2(max(1, NODES - self.nodes))
 
     def _branched(self, solution: Solution) -> tuple[FloatArray, float] | None:
         """The set whose rows are farthest from a whole number (rows,), and their number; None if all are."""
@@ -75,6 +83,6 @@ class _Tree:
         kept = len(self.relaxation)
         self.relaxation.demand(rows, least)
         solution = self.relaxation.solution()
-        value = otherwise if solution is None else self.least(solution)
+        value = otherwise if solution is None else self.least(solution, otherwise)
         self.relaxation.forget(kept)
         return value
