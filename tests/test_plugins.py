@@ -197,6 +197,16 @@ def test_what_a_plug_in_sees_may_be_lists(module: Write) -> None:
     assert np.array_equal(one.selection.xy, other.selection.xy)
 
 
+def test_paths_of_a_plug_in_may_be_rounded_otherwise_in_each_direction(module: Write) -> None:
+    module(
+        "lab",
+        "from stopgo.planner.routing.grid_graph import grid_paths\n"
+        "def f(space, points): return grid_paths(space, points)",
+    )
+    one, other = (plan(FLOOR, Settings(graph=name, range=2.0, **QUICK)).first for name in ("lab:f", "grid"))  # type: ignore[arg-type]
+    assert [leg.tolist() for leg in one.route.approaches] == [leg.tolist() for leg in other.route.approaches]
+
+
 def test_a_bound_of_a_plug_in_is_reported_as_its_own(module: Write) -> None:
     module("honest", NUMPY + "def f(cover, settings): return np.arange(cover.rows), cover.rows")
     made = plan(FLOOR, Settings(selector="honest:f", refine=False, register=False))

@@ -51,10 +51,14 @@ def with_known_time(two_step: Route, quicker: Route) -> Route:
 
 def _stops_in_order(problem: TourProblem) -> IntArray:
     """Rows of the stops that take least time, in their order."""
-    if len(problem.route.order) > WHOLE_UP_TO and problem.settings.graph == "exact":
+    if _has_stretches(problem):
         return by_stretches(problem)
     line = shorter_line(problem.times, problem.task, problem.line)
     return problem.rows[problem.stops_of(line)]
+
+
+def _has_stretches(problem: TourProblem) -> bool:
+    return len(problem.route.order) > WHOLE_UP_TO and problem.settings.graph == "exact"
 
 
 def _seconds(route: Route) -> float:
@@ -63,7 +67,7 @@ def _seconds(route: Route) -> float:
 
 
 def _driven(route: Route, problem: TourProblem, rows: IntArray) -> Route:
-    """The route that drives to the stops at rows in this order."""
+    """The route that drives to the stops at rows in this order, along the paths whose times were searched."""
     selection = _selected(route.selection, problem, rows)
     index = {int(row): k for k, row in enumerate(selection.chosen)}
     points, ends = points_and_ends(selection)
@@ -72,7 +76,8 @@ def _driven(route: Route, problem: TourProblem, rows: IntArray) -> Route:
     first = [ends.first] if ends.first is not None and ends.first >= len(order) else []
     last = [ends.last] if ends.last is not None else []
     sequence = [*first, *order, *last]
-    return route_along(selection, points, sequence, ends, METHOD)
+    legs = None if _has_stretches(problem) else problem.legs_of(selection.chosen)
+    return route_along(selection, points, sequence, ends, METHOD, legs)
 
 
 def _selected(before: Selection, problem: TourProblem, rows: IntArray) -> Selection:

@@ -47,13 +47,13 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Candidates, Route, Visibility
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements
 from stopgo.planner.covering_tour.search import LineTask
-from stopgo.planner.covering_tour.time_graph import complete_graph, time_graph
+from stopgo.planner.covering_tour.time_graph import straight_graph, time_graph
 from stopgo.planner.covering_tour.timed_line import LineTimes, PointLine
 from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
-from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.legs import Legs, SomeLegs
 from stopgo.planner.selection import METHODS, cover_problem, offered_for_follow_up, remaining_cover
 from stopgo.planner.selection.bound import lower_bound
 from stopgo.planner.selection.connected_selection import ConnectedCover
@@ -143,6 +143,13 @@ class TourProblem:
     def legs(self) -> Legs:
         return legs_between(self.route.space, np.concatenate([self._xy, self._ends]), trees=True)
 
+    def legs_of(self, rows: IntArray) -> SomeLegs:
+        """The paths between the stops at some rows, the start and the end, in this order."""
+        ends = len(self._ends) - (self.begin is not None)
+        return SomeLegs(
+            self.legs, np.append(np.searchsorted(self.rows, rows), len(self.rows) + np.arange(ends))
+        )
+
     @cached_property
     def line(self) -> PointLine:
         """The route as a line."""
@@ -208,12 +215,8 @@ class TourProblem:
         xy = np.concatenate([self.candidates.xy[self.candidates.kept[all_rows]], given])
         required = np.searchsorted(all_rows, self.stays)
         zones = Zones.of(cover, xy[:points], required)
-        if settings.graph == "exact":
-            graph = time_graph(self.route.space, xy, robot)
-        elif points == len(self.rows):
-            graph = complete_graph(self.times.table.spent[: len(xy), : len(xy)] / MICROSECONDS)
-        else:
-            graph, zones = complete_graph(np.zeros((1, 1))), Zones([], np.empty(0), required[:0], points)
+        exact = settings.graph == "exact"
+        graph = time_graph(self.route.space, xy, robot) if exact else straight_graph(xy, robot)
         start = points if settings.start is not None else None
         end = points + (start is not None) if settings.end is not None else None
         stops = np.searchsorted(all_rows, rows).tolist()

@@ -41,6 +41,8 @@ FARTHEST_S = 80.0
 """Seconds up to which ways between far nodes are found."""
 BLOCK = 128
 """Nodes from which ways are found at a time."""
+MOST_POINTS = 1500
+"""Points up to which there is a straight line between any two."""
 STRAIGHT = 0.05
 """Length of the sum of two unit vectors that are opposite."""
 
@@ -147,12 +149,21 @@ def time_graph(space: NavigableSpace, points: FloatArray, robot: RobotSpec) -> T
     return replace(graph, seconds=seconds).with_turns(direction)
 
 
-def complete_graph(seconds: FloatArray) -> TimeGraph:
-    """The graph of paths between all points, of which only the times (n, n) are known."""
-    edges = np.stack(np.triu_indices(len(seconds), 1), axis=1)
-    least = np.minimum(seconds, seconds.T)[edges[:, 0], edges[:, 1]]
-    nowhere = np.full((len(seconds), 2), np.nan)
-    return TimeGraph(nowhere, edges, least, np.full(edges.shape, np.nan), 0.0)
+def straight_graph(points: FloatArray, robot: RobotSpec) -> TimeGraph:
+    """The graph of straight lines between points (n, 2): no path takes less, whichever graph it is of.
+
+    Of very many points each is reached by way of one more node, in no time.
+    """
+    count = len(points)
+    if count <= MOST_POINTS:
+        edges = np.stack(np.triu_indices(count, 1), axis=1)
+        metres = np.hypot(*(points[edges[:, 0]] - points[edges[:, 1]]).T)
+    else:
+        edges, metres = np.stack([np.arange(count), np.full(count, count)], axis=1), np.zeros(count)
+    least = np.maximum(metres - 2 * ROUNDING_M, 0.0)  # once more for ends that a third-party path misses
+    seconds = straight_times(least, speed=robot.speed, acceleration=robot.acceleration)
+    nowhere = np.full((count + 1, 2), np.nan)
+    return TimeGraph(nowhere, edges, seconds, np.full(edges.shape, np.nan), 0.0)
 
 
 def between(a: FloatArray, b: FloatArray) -> FloatArray:

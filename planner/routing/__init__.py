@@ -20,7 +20,7 @@ from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing.colony import ant_colony
 from stopgo.planner.routing.grid_graph import grid_paths
-from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.legs import Legs, SomeLegs
 from stopgo.planner.routing.nearby_bound import nearby_bound
 from stopgo.planner.routing.nearby_paths import NearbyPaths
 from stopgo.planner.routing.paths import Paths
@@ -111,13 +111,21 @@ def _along_nearby(
 
 
 def route_along(
-    selection: Selection, points: FloatArray, sequence: list[int], ends: Ends, method: str
+    selection: Selection,
+    points: FloatArray,
+    sequence: list[int],
+    ends: Ends,
+    method: str,
+    legs: Legs | SomeLegs | None = None,
 ) -> Route:
-    """The route over points (stops first) in a given order, with a lower bound on all orders."""
-    if len(points) > ALL_PAIRS_UP_TO and selection.settings.graph == "exact":
+    """The route over points (stops first) in a given order, with a lower bound on all orders.
+
+    Its paths are `legs`, or else those of the graph through these points alone.
+    """
+    if legs is None and len(points) > ALL_PAIRS_UP_TO and selection.settings.graph == "exact":
         paths = nearby_paths_between(selection.space, points)
         return _along_nearby(selection, points, sequence, ends, method, paths)
-    legs = legs_between(selection.space, points)
+    legs = legs or legs_between(selection.space, points)
     bound = tour_bound(legs.lengths, sequence, ends)
     return assembled(selection, points, legs, sequence, ends, bound, method)
 
@@ -294,7 +302,7 @@ def _sequence(order: IntArray, ends: Ends, points: int) -> list[int]:
 def assembled(
     selection: Selection,
     points: FloatArray,
-    legs: Legs | NearbyPaths,
+    legs: Legs | SomeLegs | NearbyPaths,
     sequence: list[int],
     ends: Ends,
     bound: float,

@@ -20,24 +20,28 @@ def follow(
     """Trace the paths from a point to the points `source + 1` to `ends - 1`; those without a path stay.
 
     `x`, `y` are the nodes' positions, the points first; `before` is the node before each on its path from the
-    source, negative without one. Collinear pieces count as one, as they are driven: bends of `slack` metres
-    are none. `seconds`, `leaving` and `arriving` receive times from rest to rest, and headings in radians.
+    source, negative without one. Collinear pieces count as one, as they are driven: bends are none where the
+    straight line passes them within `slack` metres. `seconds`, `leaving` and `arriving` receive times from
+    rest to rest, and headings in radians.
     """
     for end in range(source + 1, ends):
         there = before[end]
         if there < 0:
             continue
-        here, spent, run, heading, last = end, 0.0, 0.0, 0.0, 0.0
+        here, begin, spent, run, heading, last = end, end, 0.0, 0.0, 0.0, 0.0
         while there >= 0:
             along, across = x[here] - x[there], y[here] - y[there]
             length, angle = math.hypot(along, across), math.atan2(across, along)
-            if here == end:
-                heading, last = angle, angle
             turn = bend(heading, angle)
-            if turn * min(length, run) > slack:
+            if turn * length * run > slack * (length + run):
                 spent += straight(run, speed, acceleration) + turn / turn_rate
-                run, heading = 0.0, angle
-            run += length
+                begin, run = here, 0.0
+            if begin != here:
+                along, across = x[begin] - x[there], y[begin] - y[there]
+                length, angle = math.hypot(along, across), math.atan2(across, along)
+            run, heading = length, angle
+            if begin == end:
+                last = heading
             here = there
             there = before[here] if here != source else -1
         seconds[end] = spent + straight(run, speed, acceleration)

@@ -7,7 +7,7 @@ ctypedef long long whole
 cdef double TURN
 
 @cython.locals(
-    across=double, along=double, angle=double, end=whole, heading=double, here=whole, last=double,
+    across=double, along=double, angle=double, begin=whole, end=whole, heading=double, here=whole, last=double,
     length=double, run=double, spent=double, there=whole, turn=double
 )
 cpdef void follow(

@@ -63,13 +63,15 @@ class LegTable:
 
 
 def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
-    """The table of all paths between the points of `legs`.
+    """The table of all paths between the points of `legs`, as `legs.path` has them.
 
-    The paths of a third-party graph count as straight, because only their lengths are known.
+    Paths that a third-party graph finds in a way of its own count as straight: to request each of a million
+    would take minutes.
     """
     whole_turn = _whole_turn(robot)
-    if legs.graph.ours:
-        seconds, leaving, arriving = _followed(legs.paths, len(legs.points), robot)
+    if legs.are_over_pieces:
+        with legs.graph.named_errors():
+            seconds, leaving, arriving = _followed(legs.paths, len(legs.points), robot)
     else:
         step = legs.points[None, :, :] - legs.points[:, None, :]
         seconds = straight_times(legs.lengths, speed=robot.speed, acceleration=robot.acceleration)
@@ -95,7 +97,7 @@ def _followed(paths: Paths, points: int, robot: RobotSpec) -> tuple[FloatArray, 
     """Seconds (points, points) of the paths between points, and headings at their beginnings and ends."""
     kernel = compiled(follow, large=points > MANY) or follow
     seconds, leaving, arriving = tables = tuple(np.zeros((points, points)) for _ in range(3))
-    x, y = np.ascontiguousarray(paths.xy.T)
+    x, y = np.ascontiguousarray(paths.xy.T, np.float64)
     for first in range(0, points, SOURCES):
         sources = np.arange(first, min(points, first + SOURCES))
         for source, before in zip(sources.tolist(), paths.before(sources), strict=True):

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.console.plugins import Variant
-from stopgo.mission.geometry import FloatArray, frozen, polyline_length
+from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from stopgo.planner.routing.paths import Paths
 
 TOLERANCE = 1e-6
 """Largest error in metres of a path's ends and of its length."""
+ROUNDING = 1e-9
+"""Fraction and metres by which a path may be longer in one direction, because its pieces are added up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Legs:
         finite = self.graph.array(np.where(np.isposinf(lengths), 0.0, lengths), "lengths", (count, count))
         if (finite < 0).any() or np.diag(finite).any():
             raise self.graph.wrong("lengths are not all positive, and 0 from a point to itself")
-        if not np.array_equal(lengths, lengths.T):
+        if not np.allclose(lengths, lengths.T, rtol=ROUNDING, atol=ROUNDING):
             raise self.graph.wrong("lengths differ by direction")
 
     @property
@@ -40,8 +42,15 @@ class Legs:
         """(n, n) in metres; infinite where there is no path."""
         return np.asarray(self.paths.lengths, dtype=np.float64)
 
+    @property
+    def are_over_pieces(self) -> bool:
+        """True if `path` is that of `Paths`, over pieces that are known."""
+        return type(self.paths).path is Paths.path
+
     def path(self, start: int, end: int) -> FloatArray:
-        """The polyline (n, 2) from one point to another, both included."""
+        """The polyline (n, 2) from one point to another, both included: the same in both directions."""
+        if start > end:
+            return frozen(self.path(end, start)[::-1])
         if self.graph.ours:
             return self.paths.path(start, end)
         with self.graph.named_errors():
@@ -54,3 +63,21 @@ class Legs:
         if abs(polyline_length(line) - stated) > TOLERANCE * max(1.0, stated):
             raise self.graph.wrong(f"a path of {stated:.6f} m is {polyline_length(line):.6f} m long")
         return line
+
+
+@dataclass(frozen=True, eq=False)
+class SomeLegs:
+    """Paths between some of the points of others."""
+
+    legs: Legs
+    which: IntArray
+    """Indices of these points."""
+
+    @property
+    def lengths(self) -> FloatArray:
+        """(n, n) in metres."""
+        return self.legs.lengths[np.ix_(self.which, self.which)]
+
+    def path(self, start: int, end: int) -> FloatArray:
+        """The polyline (n, 2) from one of these points to another."""
+        return self.legs.path(int(self.which[start]), int(self.which[end]))

@@ -9,14 +9,15 @@ Harrelson, "Computing the shortest path: A* search meets graph theory", SODA 200
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.compiling import compiled
-from stopgo.planner.geometry.side_work import SideWork
+from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.routing.dijkstra_kernel import reach
 from stopgo.planner.routing.paths import edge_lengths, straightened
 
@@ -69,12 +70,10 @@ class NearbyPaths:
     def _find_near(self, nearest: int) -> None:
         """Search from each point; half of many points are searched from in a process of its own."""
 
-        def found_from(points: range) -> list[tuple[IntArray, FloatArray]]:
+        def found_from(points: Sequence[int]) -> list[tuple[IntArray, FloatArray]]:
             return [self._search.nearest(point, nearest) for point in points]
 
-        half = self.points // 2
-        with SideWork(lambda: found_from(range(half, self.points)), forked=self.points >= MANY) as others:
-            found = found_from(range(half)) + others.result()
+        found = in_halves(found_from, range(self.points), forked=self.points >= MANY)
         self._others: IntArray = np.array([ends for ends, _ in found])
         self._nearest: FloatArray = np.array([away for _, away in found])
         """Nearest other points of each, and their distances (points, nearest)."""
@@ -155,7 +154,9 @@ class NearbyPaths:
         return lengths
 
     def path(self, start: int, end: int) -> FloatArray:
-        """The polyline (n, 2) from one point to another, both included."""
+        """The polyline (n, 2) from one point to another, both included: the same in both directions."""
+        if start > end:
+            return frozen(self.path(end, start)[::-1])
         return straightened(self._xy[self._search.nodes(start, end)])
 
     def keep_paths_to(self, point: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,7 +15,7 @@ from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import SLACK
-from stopgo.planner.geometry.side_work import SideWork
+from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.routing.dijkstra_kernel import find_lengths
 
 CHUNK = 256
@@ -123,19 +124,16 @@ def _lengths(graph: csr_array, points: int, limit: float) -> FloatArray:
     both = (graph + graph.T).tocsr()
     pieces = (both.indptr.astype(np.int64), both.indices.astype(np.int64), both.data)
 
-    def found_from(sources: range) -> FloatArray:
+    def found_from(sources: Sequence[int]) -> list[FloatArray]:
         lengths, away = np.empty((len(sources), points)), np.empty(graph.shape[0])
         queue, place = (np.zeros(len(away), dtype=np.int64) for _ in range(2))
         for k, source in enumerate(sources):
             away[:] = np.inf
             kernel(source, points, *pieces, away, queue, place)
             lengths[k] = away[:points]
-        return lengths
+        return [lengths]
 
-    half = points // 2
-    many = points * graph.nnz >= MANY
-    with SideWork(lambda: found_from(range(half, points)), forked=many) as others:
-        return np.concatenate([found_from(range(half)), others.result()])
+    return np.concatenate(in_halves(found_from, range(points), forked=points * graph.nnz >= MANY))
 
 
 def edge_lengths(xy: FloatArray, edges: IntArray) -> csr_array:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, hstack, vstack
 
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
+from stopgo.planner.selection.branching_bound import branching_bound
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.linear_programme import minimised
+from stopgo.planner.selection.cover_relaxation import CoverRelaxation
 from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_up
 
 LARGEST = 400_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
 COARSE = 30_000
 """Entries of a coarse relaxation, about."""
+FINE = 100_000
+"""Entries of a relaxation, about: with more the bound is hardly better, and takes many times as long."""
 FEW = 30
 """Most rows of a selection that a bound often proves the fewest."""
 FIRST_STEPS = 100
@@ -43,7 +45,8 @@ def lower_bound(cover: Cover, *, found: int) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
     Small problems use the linear relaxation, large ones that of one part after another, or the multiplier
-    bound where the range is long. A coarse relaxation comes first for few rows, and often proves them.
+    bound where the range is long. A coarse relaxation comes first for few rows, and often proves them; else
+    branches may.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
@@ -53,7 +56,9 @@ def lower_bound(cover: Cover, *, found: int) -> int:
             return max(simple, bound_by_parts(cover, found=found))
         return max(simple, multiplier_bound(cover, found=found, work=LONG_WORK))
     coarse = coarse_bound(cover) if found <= FEW and entries > COARSE else 0
-    return max(simple, coarse if coarse >= found else relaxation_bound(cover))
+    bound = max(simple, coarse if coarse >= found else relaxation_bound(cover))
+    is_near = bound == found - 1 and found <= FEW
+    return max(bound, branching_bound(cover, found=found)) if is_near else bound
 
 
 def early_bound(cover: Cover, *, found: int) -> int:
@@ -83,13 +88,13 @@ def first_bound(cover: Cover, *, found: int) -> int:
 def relaxation_bound(cover: Cover) -> int:
     """Rounded-up optimum of: min Σ x_i, v_j y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 
-    Where columns need more than one view, x_i <= 1 too. The result does not depend on the solver's
-    tolerances: any prices u_j >= 0 of columns and p >= 0 of demands give the bound Σ needed_k p_k
-    - Σ_j max(0, Σ w_kj p_k - v_j u_j) - Σ_i max(0, Σ_j in i u_j - 1) by weak duality, and it is computed
-    from the solver's.
+    Where columns need more than one view, x_i <= 1 too. Knapsack cover inequalities Σ c_hi x_i >= 1 follow.
+    The result does not depend on the solver's tolerances: any prices u_j >= 0 of columns, p >= 0 of demands
+    and q >= 0 of inequalities give the bound Σ needed_k p_k + Σ q_h - Σ_j max(0, Σ w_kj p_k - v_j u_j)
+    - Σ_i max(0, Σ_j in i u_j + Σ c_hi q_h - 1) by weak duality, and it is computed from the solver's. Of a
+    large problem neighbouring columns are one, as in the coarse bound.
     """
-    prices = _relaxation_prices(cover) if cover.needed.any() else None
-    return 0 if prices is None else rounded_up(_dual_value(cover, *prices))
+    return _bound_of_relaxation(cover, FINE)
 
 
 @instance_cached
@@ -99,61 +104,12 @@ def coarse_bound(cover: Cover) -> int:
     A group may be seen in part, and its columns have prices by their weight. By weak duality these too
     prove a bound of the whole problem. It is a little weaker than the relaxation's, at a tenth of the time.
     """
-    fraction = _group_fractions(cover, -(-cover.sees.nnz // COARSE))
-    of_group = csr_array((np.ones(cover.columns), fraction.indices, fraction.indptr), shape=fraction.shape)
-    asks = np.zeros(fraction.shape[1], dtype=np.int64)
-    asks[fraction.indices] = cover.asks
-    coarse = Cover(csr_array(cover.sees @ fraction), csr_array(cover.worth @ of_group), cover.needed, asks)
-    prices = _relaxation_prices(coarse)
-    if prices is None:
+    return _bound_of_relaxation(cover, COARSE)
+
+
+def _bound_of_relaxation(cover: Cover, entries: int) -> int:
+    if not cover.needed.any():
         return 0
-    return rounded_up(_dual_value(cover, fraction @ prices[0], prices[1]))
-
-
-def _group_fractions(cover: Cover, size: int) -> csr_array:
-    """Fraction of its group that each column is by weight (columns, groups).
-
-    Groups are up to `size` consecutive columns that add to the same demands and need as many views.
-    """
-    demands = np.split(cover.adds_to.indices, cover.adds_to.indptr[1:-1])
-    alike = [(*of.tolist(), -views) for of, views in zip(demands, cover.asks.tolist(), strict=True)]
-    group = np.zeros(cover.columns, dtype=np.int64)
-    members = 1
-    for k in range(1, cover.columns):
-        members = members + 1 if alike[k] == alike[k - 1] and members < size else 1
-        group[k] = group[k - 1] + (members == 1)
-    weight = np.maximum(cover.weight, 1).astype(float)
-    fraction = weight / np.bincount(group, weight)[group]
-    return csr_array((fraction, group, np.arange(cover.columns + 1)))
-
-
-def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:
-    """Dual prices of the columns (columns,) and of the demands; None if the solver fails."""
-    rows, columns = cover.rows, cover.columns
-    seen = hstack([cover.sees.T, diags_array(-cover.asks.astype(float))])
-    worth, needed, scale = scaled(cover)
-    demand = hstack([csr_array((len(needed), rows)), worth])
-    solution = minimised(
-        np.concatenate([np.ones(rows), np.zeros(columns)]),
-        vstack([seen, demand]),
-        np.concatenate([np.zeros(columns), needed]),
-        np.concatenate([np.full(rows, np.inf if cover.once else 1.0), np.ones(columns)]),
-    )
-    return None if solution is None else (solution.prices[:columns], solution.prices[columns:] / scale)
-
-
-def scaled(cover: Cover) -> tuple[csr_array, FloatArray, float]:
-    """Worth and needs scaled to about one per column for the solver; and the divisor."""
-    scale = max(1.0, float(cover.weight.mean())) if cover.columns else 1.0
-    return (cover.worth / scale).tocsr(), cover.needed / scale, scale
-
-
-def _dual_value(cover: Cover, column_price: FloatArray, demand_price: FloatArray) -> float:
-    """The bound at these prices; where one view suffices, the prices are first scaled to be feasible."""
-    paid_to = cover.sees @ column_price
-    if cover.once:
-        heaviest = max(1.0, float(paid_to.max(initial=0.0)))
-        column_price, paid_to = column_price / heaviest, np.zeros(0)
-    paid = cover.worth.T @ demand_price
-    beyond = np.maximum(0.0, paid - cover.asks * column_price).sum() + np.maximum(0.0, paid_to - 1.0).sum()
-    return float(cover.needed @ demand_price - beyond)
+    relaxation = CoverRelaxation(cover, entries)
+    solution = relaxation.solution()
+    return 0 if solution is None else rounded_up(relaxation.proved(solution))

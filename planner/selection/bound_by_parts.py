@@ -20,7 +20,8 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.linear_programme import Solution, minimised
+from stopgo.planner.selection.knapsack_cuts import KnapsackCuts, tightened
+from stopgo.planner.selection.linear_programme import LinearProgramme, Solution
 from stopgo.planner.selection.multiplier_bound import PricedCover, multiplier_prices, rounded_up
 
 SIZE = 60_000
@@ -55,8 +56,8 @@ def bound_by_parts(cover: Cover, *, found: int) -> int:
         for parts in _pairs(cover, list(_parts(cover))):
             asked = [ascent.programme(part) for part in parts]
             for programme, solution in zip(asked, threads.map(_Programme.solution, asked), strict=True):
-                ascent.take(programme, solution)
-    return rounded_up(max(best, problem.value(ascent.prices)[0]))
+                ascent.take(programme, *solution)
+    return rounded_up(max(best, ascent.value()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +69,17 @@ class _Programme:
     scale: FloatArray
     """What each demand's row is multiplied by (demands,)."""
     cost: FloatArray
-    rows: Any
+    matrix: Any
     least: FloatArray
     most: FloatArray
+    rows: IntArray
+    """Rows that see the part (rows,)."""
+    problem: Cover
+    """The covering problem of these rows, of the part, and of demands to which no other columns add."""
 
-    def solution(self) -> Solution | None:
-        """Solve it; None if the solver fails."""
-        return minimised(self.cost, self.rows, self.least, self.most)
+    def solution(self) -> tuple[Solution | None, KnapsackCuts]:
+        """Solve it, with knapsack cover inequalities; None if the solver fails."""
+        return tightened(LinearProgramme(self.cost, self.matrix, self.least, self.most), self.problem)
 
 
 class _Ascent:
@@ -90,11 +95,19 @@ class _Ascent:
         columns = (cover.worth > 0).astype(np.int64)
         self._is_wide: BoolArray = np.asarray(columns @ entries) > SIZE
         self._is_wide[0] = True
+        self._paid = np.zeros(cover.rows)
+        """Prices of the inequalities of all parts, paid to each row."""
+        self._for_cuts = 0.0
+        """Sum of their prices."""
 
     @property
     def prices(self) -> FloatArray:
         """Prices of columns, then of all demands but the whole."""
         return np.concatenate([self._column, self._demand[1:]])
+
+    def value(self) -> float:
+        """The bound at the prices."""
+        return self._problem.value(self.prices, self._paid)[0] + self._for_cuts
 
     def programme(self, part: IntArray) -> _Programme:
         """The programme of these columns, and of the demands to which only few columns add."""
@@ -121,20 +134,32 @@ class _Ascent:
             vstack([asked, hstack([csr_array((len(demands), len(rows))), added])]),
             np.concatenate([np.zeros(len(part)), self._problem.needed[demands] * scale]),
             most,
+            rows,
+            self._within(part, rows, demands),
         )
 
-    def take(self, programme: _Programme, solution: Solution | None) -> None:
+    def _within(self, part: IntArray, rows: IntArray, demands: IntArray) -> Cover:
+        """The problem of these demands to which only columns of the part add."""
+        cover = self._cover
+        worth = csr_array(cover.worth[demands][:, part])
+        alone = np.diff(worth.indptr) == np.diff(cover.worth.indptr)[demands]
+        sees = csr_array(cover.sees[rows][:, part])
+        return Cover(sees, worth[alone], cover.needed[demands[alone]], cover.asks[part])
+
+    def take(self, programme: _Programme, solution: Solution | None, cuts: KnapsackCuts) -> None:
         """Let the prices of a solution replace those that there were."""
         if solution is not None:
-            part = programme.part
-            self._column[part] = solution.prices[: len(part)]
-            self._demand[programme.demands] = solution.prices[len(part) :] * programme.scale
+            part, demands = programme.part, programme.demands
+            column, demand, cut = np.split(solution.prices, [len(part), len(part) + len(demands)])
+            self._column[part], self._demand[demands] = column, demand * programme.scale
+            self._paid[programme.rows] += cuts.fractions.T @ cut
+            self._for_cuts += float(cut.sum())
 
     def _spare(self, rows: IntArray, part: IntArray) -> FloatArray:
         """Rest of each row's cost, at the prices of all other columns (rows,)."""
         others = self._column.copy()
         others[part] = 0.0
-        spare = 1.0 - self._cover.sees[rows] @ others
+        spare = 1.0 - self._cover.sees[rows] @ others - self._paid[rows]
         return np.maximum(spare, 0.0) if self._cover.once else spare
 
     def _gains(self, part: IntArray, others: IntArray, demands: IntArray) -> tuple[FloatArray, FloatArray]:

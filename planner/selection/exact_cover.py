@@ -10,8 +10,8 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.settings import Settings
-from stopgo.planner.selection.bound import scaled
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.cover_relaxation import scaled
 from stopgo.planner.selection.separators import Conditions
 
 WHOLE = 1e-6

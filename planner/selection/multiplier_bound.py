@@ -90,11 +90,12 @@ class PricedCover:
     def first_prices(self) -> FloatArray:
         return np.concatenate([self.weight, np.zeros(len(self.needed) - 1)])
 
-    def value(self, prices: FloatArray) -> tuple[float, FloatArray]:
-        """The lower bound at these prices, and its subgradient."""
+    def value(self, prices: FloatArray, paid_besides: FloatArray | float = 0.0) -> tuple[float, FloatArray]:
+        """The lower bound at these prices, and its subgradient; rows are paid something besides (rows,)."""
         cover = self.cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
-        paid_to, paid, gained = cover.paid_to(column), cover.asks * column, self._rest_of_column @ demand
+        paid_to = cover.paid_to(column) + paid_besides
+        paid, gained = cover.asks * column, self._rest_of_column @ demand
         spare, cost = 1.0 - paid_to, paid - gained
         bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self.needed[1:])

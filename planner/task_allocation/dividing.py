@@ -221,9 +221,8 @@ def _route(
     whole: Route, selection: Selection, order: IntArray, clock: TourTimes, tour: Tour, start: int
 ) -> Route:
     line = [clock.stops + start, *tour]
-    approaches = [clock.line(a, b) for a, b in pairwise(line)]
-    back = clock.line(line[-1], line[0]) if clock.closed and len(clock.line(line[-1], line[0])) > 1 else None
-    legs = approaches if back is None else [*approaches, back]
+    legs = [clock.legs.path(a, b) for a, b in pairwise([*line, *line[: int(clock.closed)]])]
+    approaches, back = legs[: len(tour)], legs[-1] if clock.closed and len(legs[-1]) > 1 else None
     x, y = clock.points[clock.stops + start].tolist()
     lengths = clock.lengths[np.ix_(line, line)]
     least = tour_bound(lengths, list(range(len(line))), Ends(0, None, clock.closed, ""))

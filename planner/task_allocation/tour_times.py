@@ -114,7 +114,7 @@ class TourTimes:
 
     def _time_leg(self, a: int, b: int) -> None:
         """Time a leg from rest to rest, with its headings; in the other direction it takes as long."""
-        line = self.line(a, b)
+        line = self.legs.path(a, b)
         steps = np.diff(line, axis=0)
         steps = steps[np.any(steps != 0, axis=1)]
         table = self._table
@@ -127,11 +127,6 @@ class TourTimes:
         spent[a, b] = spent[b, a] = round((drive + turn) * MICROSECONDS)
         leaving[a, b], arriving[a, b] = table.heading(first), table.heading(last)
         leaving[b, a], arriving[b, a] = table.heading(last + math.pi), table.heading(first + math.pi)
-
-    def line(self, a: int, b: int) -> FloatArray:
-        """The polyline (n, 2) from point a to point b: the same in both directions."""
-        line = self.legs.path(min(a, b), max(a, b))
-        return line if a <= b else frozen(line[::-1])
 
     @cached_property
     def least(self) -> FloatArray:

@@ -13,10 +13,12 @@ from scipy.sparse.csgraph import dijkstra
 
 import stopgo.planner.covering_tour.least_time_bound
 import stopgo.planner.covering_tour.problem
+import stopgo.planner.covering_tour.time_graph
 from stopgo.mission.document.schedule import leg_times, schedule, turn_time
 from stopgo.mission.document.specs import robot_of
+from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
-from stopgo.mission.stages import Route
+from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour.least_time_bound import RouteRequirements, _Relaxation, least_time
 from stopgo.planner.covering_tour.problem import TourProblem, problem_of
@@ -26,8 +28,10 @@ from stopgo.planner.covering_tour.zones import Zones
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
 from stopgo.planner.routing.assemble import assemble
+from stopgo.planner.routing.grid_graph import grid_paths
 from stopgo.planner.routing.leg_kernel import follow
 from stopgo.planner.routing.leg_table import MICROSECONDS, leg_table
+from stopgo.planner.routing.paths import Paths
 from stopgo.planner.selection import cover_problem
 from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size, some
@@ -258,6 +262,21 @@ def test_the_times_of_the_search_are_those_of_the_schedule(world: str, case: int
     assert problem.times.total(line) / MICROSECONDS == pytest.approx(found.time.seconds, abs=1e-3)
 
 
+def third_party(space: NavigableSpace, points: FloatArray) -> Paths:
+    return grid_paths(space, points)
+
+
+@pytest.mark.parametrize("graph", ["grid", f"{__name__}:third_party"])
+@pytest.mark.parametrize("world", ["rooms", "corridor"])
+def test_on_any_graph_the_search_has_the_times_that_are_driven(world: str, graph: str) -> None:
+    driven = two_step(world, 3, graph=graph)
+    problem, made = problem_of(driven), least_time_route(driven)
+    assert made.time is not None and made.time.seconds < made.time.two_step_s
+    order = np.searchsorted(problem.rows, made.selection.chosen[made.order]).tolist()
+    total = problem.times.total([problem.line[0], *order, problem.line[-1]]) / MICROSECONDS
+    assert total == pytest.approx(made.time.seconds, abs=1e-3) == seconds_of(made)
+
+
 def test_paths_take_the_same_time_at_both_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = problem_of(two_step("corridor"))
     assert machine_code(follow)
@@ -359,6 +378,31 @@ def test_no_leg_takes_less_than_its_pieces_by_the_time_graph(world: str, case: i
     spent = problem.times.table.spent[:count, :count] / MICROSECONDS
     assert (least <= spent + 1e-4).all()
     assert np.median(least[spent > 0] / spent[spent > 0]) > 0.9
+
+
+SLOW = {"graph": "grid", "grid": 2.6, "turn_rate": 720.0, "acceleration": 0.05, "scan_time": 1.0}
+DRIVEN_ON_GRIDS: list[tuple[str, dict[str, Any]]] = [
+    ("corridor", {**SLOW, "start": (4.5, 3.3, 0.0), "tour": "open"}),
+    ("hall", {**SLOW, "start": (2.7, 2.0, 0.0)}),
+]
+
+
+@pytest.mark.parametrize(("world", "more"), DRIVEN_ON_GRIDS)
+def test_no_mission_on_a_grid_takes_less_than_the_bound(world: str, more: dict[str, Any]) -> None:
+    """The grid through fewer stops may be coarser, and its paths longer with fewer corners."""
+    driven = two_step(world, **more)
+    asked = replace(asked_of(problem_of(driven)), known_s=math.inf)
+    assert 0.5 * seconds_of(driven) < least_time(asked) <= seconds_of(driven)
+
+
+def test_on_a_grid_the_bound_over_very_many_candidates_is_that_of_the_stops(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(stopgo.planner.covering_tour.time_graph, "MOST_POINTS", 8)
+    for case in (0, 4):
+        driven = two_step("rooms", case, graph="grid")
+        asked = asked_of(problem_of(driven))
+        assert asked.pause_s * asked.stops - 0.01 <= least_time(asked) <= seconds_of(driven)
 
 
 def test_pieces_share_no_more_than_the_turn_between_them() -> None:

@@ -109,6 +109,7 @@ def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
 
 def test_no_bound_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bound, "COARSE", 20)
+    monkeypatch.setattr(bound, "FINE", 40)
     monkeypatch.setattr(bound_by_parts, "SIZE", 20)
     for _, cover, optimum in small_covers(range(size(short=5, full=300))):
         assert counting_bound(cover) <= optimum

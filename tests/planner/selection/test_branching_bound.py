@@ -1,0 +1,38 @@
+"""Bounds by branching, beside every subset of small covers, and what they prove."""
+
+from __future__ import annotations
+
+import pytest
+
+from stopgo.planner.selection import branching_bound as module
+from stopgo.planner.selection.bound import lower_bound, relaxation_bound
+from stopgo.planner.selection.branching_bound import branching_bound
+from tests.faults.sizes import size
+from tests.planner.selection.test_selection import fewest, small_covers
+from tests.planner.selection.test_swaps import cover_of_rooms
+
+
+def test_no_bound_by_branching_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where a selection is known that is not the smallest, and with groups of columns."""
+    monkeypatch.setattr(module, "ENTRIES", 40)
+    for seed, cover, optimum in small_covers(range(size(short=8, full=300))):
+        for found in (optimum, optimum + 1, optimum + 2):
+            assert branching_bound(cover, found=found) <= optimum, seed
+
+
+def test_branches_prove_more_selections_the_fewest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of random problems of 12 rows in 4 rooms; both limits of a branch are needed."""
+    gained = 0
+    for seed in range(40):
+        cover = cover_of_rooms(seed, rows=12, columns=40, rooms=4)
+        plain = relaxation_bound(cover)
+        bound = branching_bound(cover, found=plain + 1)
+        assert plain <= bound <= min(plain + 1, fewest(cover))
+        gained += bound - plain
+        assert lower_bound(cover, found=plain + 1) == bound
+    assert gained > 0
+    monkeypatch.setattr(module, "NODES", 1)
+    assert all(
+        branching_bound(cover, found=99) == relaxation_bound(cover)
+        for cover in (cover_of_rooms(seed, rows=12, columns=40, rooms=4) for seed in range(5))
+    )
