@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 from stopgo.mission.document import Mission
@@ -11,6 +12,7 @@ from stopgo.mission.document.schedule import schedule
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, OfVisibility, Route, Selection, Visibility
+from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.mission.stages.figures import Figures, percent
 from stopgo.mission.stages.plan_results import PlanResults
 
@@ -30,6 +32,11 @@ class PartPlan(OfVisibility):
     @property
     def visibility(self) -> Visibility:
         return self.selection.visibility
+
+    @cached_property
+    def totals(self) -> CoverageTotals:
+        """Weights and groups of all units; those of a divided plan are also those of its shares."""
+        return totals_of_plan(self.visibility, {item.room: item.why for item in self.figures.unreached})
 
     def stage_results(self) -> Iterator[Any]:
         """Yield every stage result from the floor to the figures, in the order in which they are made."""

@@ -24,6 +24,7 @@ from stopgo.result_files import is_missing, report_missing_rerun, result_folder
 from stopgo.spared_modules import load_when_used
 
 if TYPE_CHECKING:
+    from stopgo.mission.files.plan_svg import FloorsOnPaper
     from stopgo.mission.floor import FloorPlan
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
@@ -92,7 +93,10 @@ def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool
     with _print_findings_on_error(read):
         made = plan(read, settings, observe=writing.watch.observe, all_parts=all_parts)
     bodies = standing_bodies(floor, options_of(settings))
-    reports = [_write_part(made, number, folder, writing, bodies) for number in range(len(made.parts))]
+    floors = _floors_on_paper(made)
+    reports = [
+        _write_part(made, number, folder, writing, bodies, floors) for number in range(len(made.parts))
+    ]
     _set_aside_old(folder, len(reports), read, settings)
     if made.divided is None:
         return reports
@@ -143,6 +147,7 @@ def _write_part(
     folder: Path,
     writing: _Writing,
     bodies: Sequence[StandingBody],
+    floors: FloorsOnPaper | None,
 ) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
     from stopgo.planner.checking.model_clearance import too_near
@@ -150,13 +155,13 @@ def _write_part(
     from stopgo.planner.commands.plan_report import PlanReport
 
     files = names(folder, number)
-    part = _revised(plan.parts[number], files["mission"])
-    recording = _recording(part, writing.recorder)
+    part, is_last = _revised(plan.parts[number], files["mission"]), number == len(plan.parts) - 1
+    recording = _recording(part, plan, writing.recorder, more=plan.divided is not None and not is_last)
     if recording is None:
         del files["recording"]
     watch = writing.watch
-    contents = _PartContents(part, plan, writing.options, _today(), _seen_from(part, watch))
-    if number == len(plan.parts) - 1:
+    contents = _PartContents(part, plan, writing.options, _today(), floors, _seen_from(part, watch))
+    if is_last:
         _forget_derived(part)
     unwanted = [files.pop("picture")] if plan.divided and number else []
     forked = len(part.mission.stops) >= MANY and not writing.recorder.is_running
@@ -178,6 +183,13 @@ def _write_part(
     return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near, surface=contents.surface)
 
 
+def _floors_on_paper(plan: Plan) -> FloorsOnPaper | None:
+    """Drawings that the sheets of a divided plan's missions have in common."""
+    from stopgo.mission.files.plan_svg import FloorsOnPaper
+
+    return None if plan.divided is None else FloorsOnPaper()
+
+
 def _today() -> str:
     return datetime.date.today().isoformat()
 
@@ -193,7 +205,7 @@ def _revised(part: PartPlan, path: Path) -> PartPlan:
     return replace(part, mission=with_digest(changed(part.mission, revision=revision)))
 
 
-def _recording(part: PartPlan, recorder: RecordingProcess) -> PlanDrawing | None:
+def _recording(part: PartPlan, plan: Plan, recorder: RecordingProcess, *, more: bool) -> PlanDrawing | None:
     """The recording of a part, while it is drawn; None, and a line on stderr, if Rerun is not installed."""
     if not recorder.is_running:
         try:
@@ -205,8 +217,9 @@ def _recording(part: PartPlan, recorder: RecordingProcess) -> PlanDrawing | None
     from stopgo.mission.stages.sight import sight_of
 
     mission = part.mission
-    sight = sight_of(part.route, mission, part.figures)
-    return recorder.draw(mission.id, (*part.stage_results(), mission, schedule(mission), sight))
+    totals = None if plan.divided is None else plan.whole.totals
+    sight = sight_of(part.route, mission, part.figures, totals)
+    return recorder.draw(mission.id, (*part.stage_results(), mission, schedule(mission), sight), more=more)
 
 
 def _seen_from(part: PartPlan, watch: Stopwatch) -> SeenSurface | None:
@@ -233,6 +246,7 @@ class _PartContents:
     plan: Plan
     options: PrintOptions
     date: str
+    floors: FloorsOnPaper | None
     surface: SeenSurface | None = None
 
     def made(self, files: Mapping[str, Path], *, forked: bool) -> dict[str, bytes]:
@@ -249,10 +263,12 @@ class _PartContents:
         """The set of sheets, if it is wanted."""
         from stopgo.mission.files.plan_sheets import needs_sheets, plan_pdf
 
-        part, wanted = self.part, self.options.sheets
+        part, wanted, rings = self.part, self.options.sheets, self.options.rings
         if wanted is False or not (wanted or needs_sheets(part.route, part.mission)):
             return None
-        return plan_pdf(part.route, part.mission, part.figures, date=self.date, with_range=self.options.rings)
+        return plan_pdf(
+            part.route, part.mission, part.figures, date=self.date, with_range=rings, floors=self.floors
+        )
 
     def sheets(self, path: Path, printing: SideWork[bytes | None]) -> dict[str, bytes]:
         """The set of sheets; without one nothing, and a line on stderr if reportlab is not installed."""

@@ -15,7 +15,7 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -29,7 +29,7 @@ from stopgo.planner.geometry.side_work import can_fork
 from stopgo.spared_modules import SPARED_OF_RERUN, gather_when_used, load_when_used
 
 if TYPE_CHECKING:
-    from stopgo.recordings.plan import PlanRecording
+    from stopgo.recordings.plan import CommonDrawings, PlanRecording
 
 CHILD = """
 import json, sys
@@ -40,6 +40,9 @@ sys.stdout = sys.stderr
 serve(asked, answers)
 """
 """Program of a process that is not forked; its first line of input is the path of modules."""
+
+GIVEN_BACK_AT_ONCE = ("MIMALLOC_PURGE_DELAY", "0")
+"""For Rerun's allocator: else it keeps what the threads of each recording have freed, 7 to 12 MB."""
 
 CACHED = "_cached_"
 """Begin of the names of values that are derived from a result, and that no drawing reads."""
@@ -52,6 +55,8 @@ class RecordingProcess:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | _Fork | None = None
+        self._pickler: ResultPickler | None = None
+        self._here = _Recordings()
 
     @property
     def is_running(self) -> bool:
@@ -67,20 +72,25 @@ class RecordingProcess:
 
     def end(self) -> None:
         """End the process, also in the middle of its work."""
-        process, self._process = self._process, None
+        process, self._process, self._pickler = self._process, None, None
         if process is not None:
             process.kill()
             process.communicate()
 
-    def draw(self, recording_id: str, results: Iterable[object]) -> PlanDrawing:
-        """Begin to draw a recording of these stage results."""
-        results = tuple(results)
+    def draw(self, recording_id: str, results: Iterable[object], *, more: bool = False) -> PlanDrawing:
+        """Begin to draw a recording of these stage results.
+
+        With `more`, the next recording has some of the results too: they are sent and drawn once.
+        """
+        asked = (recording_id, tuple(results), more)
         if self._process is not None:
             try:
-                self._send((recording_id, results))
+                self._send(asked)
             except (pickle.PicklingError, TypeError, AttributeError):  # of a result that a plug-in made
                 self.end()
-        return PlanDrawing(self, recording_id, results)
+        if not more:
+            self._pickler = None
+        return PlanDrawing(self, lambda: self._here.of(*asked))
 
     def written(self, path: Path) -> bool:
         """True once the recording that is being drawn is in `path`, and was read to its end.
@@ -110,22 +120,23 @@ class RecordingProcess:
         """Send to the process without a copy; if it has ended, that is noticed when its answer is read."""
         assert self._process is not None and self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
-            pickle_into(value, self._process.stdin)
+            if self._pickler is None:
+                self._pickler = ResultPickler(self._process.stdin)
+            self._pickler.dump(value)
             self._process.stdin.flush()
 
 
 class PlanDrawing:
     """A recording that is drawn, next to the other files of a plan."""
 
-    def __init__(self, process: RecordingProcess, recording_id: str, results: tuple[object, ...]) -> None:
+    def __init__(self, process: RecordingProcess, drawn_here: Callable[[], PlanRecording]) -> None:
         self._process = process
-        self._recording_id = recording_id
-        self._results = results
+        self._drawn_here = drawn_here
 
     def write(self, path: Path) -> None:
         """Write the recording into `path`, and read the file to its end."""
         if not self._process.written(path):
-            _recording_of(self._recording_id, self._results).write(path)
+            self._drawn_here().write(path)
 
 
 @contextmanager
@@ -211,36 +222,52 @@ class _Fork:
 
 def serve(asked: IO[bytes], answers: IO[bytes]) -> None:
     """Draw and write recordings until the input ends; each answer is None, or the error of the writing."""
+    os.environ.setdefault(*GIVEN_BACK_AT_ONCE)
     leave_pandas_out()
     load_when_used(SPARED_OF_RERUN)
     gather_when_used()
     with looking_seldom(), contextlib.suppress(EOFError):
         import stopgo.recordings.plan  # noqa: F401  loaded while nothing is asked yet
 
+        requests, recordings = pickle.Unpickler(asked), _Recordings()
         while True:
-            _serve_one(asked, answers)
+            wanted = requests.load()
+            if not wanted[-1]:
+                requests = pickle.Unpickler(asked)
+            _serve_one(recordings.of(*wanted), requests, answers)
+            del wanted  # the next results need its memory
 
 
-def _serve_one(asked: IO[bytes], answers: IO[bytes]) -> None:
-    recording = _recording_of(*pickle.load(asked))
+def _serve_one(recording: PlanRecording, requests: pickle.Unpickler, answers: IO[bytes]) -> None:
     recording.draw()
     give_back()
     problem = None
     try:
-        recording.write(pickle.load(asked))
+        recording.write(requests.load())
     except (OSError, InputError) as error:
         problem = error
     answers.write(pickle.dumps(problem))
     answers.flush()
 
 
-def _recording_of(recording_id: str, results: Iterable[object]) -> PlanRecording:
-    from stopgo.recordings.plan import PlanRecording
+class _Recordings:
+    """Recordings of one plan after the other, in the process that draws them."""
 
-    recording = PlanRecording(recording_id)
-    for result in results:
-        recording.observe(result)
-    return recording
+    def __init__(self) -> None:
+        self._common: CommonDrawings | None = None
+
+    def of(self, recording_id: str, results: Iterable[object], more: bool) -> PlanRecording:
+        """Return a recording of these results; with `more`, drawings of them are kept for the next."""
+        from stopgo.recordings.plan import CommonDrawings, PlanRecording
+
+        if more and self._common is None:
+            self._common = CommonDrawings()
+        recording = PlanRecording(recording_id, self._common)
+        if not more:
+            self._common = None
+        for result in results:
+            recording.observe(result)
+        return recording
 
 
 class _WithoutPandas:
@@ -256,8 +283,11 @@ def leave_pandas_out() -> None:
     sys.meta_path.insert(0, _WithoutPandas())
 
 
-class _Pickler(pickle.Pickler):
-    """Pickles stage results; what was derived from them stays here."""
+class ResultPickler(pickle.Pickler):
+    """Pickles stage results, each once; what was derived from them stays here."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
 
     def reducer_override(self, value: Any) -> Any:
         if type(value).__name__ == "UnsetType":  # else pickle looks for it in all modules, also in stand-ins
@@ -285,8 +315,3 @@ def _unset() -> object:
 
 def _read_only(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
     return MappingProxyType(values)
-
-
-def pickle_into(value: object, file: IO[bytes]) -> None:
-    """Pickle results for a drawing."""
-    _Pickler(file, protocol=pickle.HIGHEST_PROTOCOL).dump(value)

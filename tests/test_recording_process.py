@@ -22,7 +22,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Visibility
 from stopgo.mission.stages.sight import sight_of
 from stopgo.planner import plan
-from stopgo.recording_process import RecordingProcess, pickle_into, recording_process
+from stopgo.recording_process import RecordingProcess, ResultPickler, recording_process
 from stopgo.recordings.rrd.read import check
 from tests.disk import small_disk
 from tests.planner.worlds import two_rooms
@@ -65,7 +65,7 @@ def lasting() -> Iterator[RecordingProcess]:
 
 def pickled(value: object) -> bytes:
     file = io.BytesIO()
-    pickle_into(value, file)
+    ResultPickler(file).dump(value)
     return file.getvalue()
 
 
@@ -80,6 +80,36 @@ def test_the_process_writes_what_would_be_written_here(
     lasting.draw("next", results).write(there)
     assert lasting.is_running
     assert check(there).recording_id == "next"
+
+
+def test_results_that_recordings_share_are_sent_once(results: tuple[object, ...]) -> None:
+    file = io.BytesIO()
+    pickler = ResultPickler(file)
+    pickler.dump(("first", results))
+    first = file.tell()
+    pickler.dump(("second", results))
+    assert file.tell() - first < 100
+    file.seek(0)
+    unpickler = pickle.Unpickler(file)
+    (_, before), (_, after) = unpickler.load(), unpickler.load()
+    assert all(a is b for a, b in zip(before, after, strict=True))
+
+
+@pytest.mark.parametrize("when", ["beside", "killed between", "here"])
+def test_recordings_that_share_results_are_as_each_alone(
+    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path, when: str
+) -> None:
+    alone, shared = tmp_path / "alone.rrd", tmp_path / "shared.rrd"
+    RecordingProcess().draw("same", results).write(alone)
+    sharing = RecordingProcess() if when == "here" else process
+    for recording_id, more in (("first", True), ("same", True), ("last", False), ("same", False)):
+        drawing = sharing.draw(recording_id, results, more=more)
+        if when == "killed between" and recording_id == "same" and process._process is not None:
+            process._process.kill()
+        drawing.write(shared)
+        assert check(shared).recording_id == recording_id
+        assert recording_id != "same" or check(shared) == check(alone)
+    assert sharing.is_running == (when == "beside")
 
 
 def test_results_are_pickled_without_a_search_in_other_modules(

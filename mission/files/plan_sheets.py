@@ -17,7 +17,14 @@ from stopgo.mission.document import Mission
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import outline
 from stopgo.mission.files.pdf import PdfPage, pdf_of
-from stopgo.mission.files.plan_svg import drawing_of, extent_of, legs_of, overview, whole_sheet
+from stopgo.mission.files.plan_svg import (
+    FloorsOnPaper,
+    drawing_of,
+    extent_of,
+    legs_of,
+    overview,
+    whole_sheet,
+)
 from stopgo.mission.files.room_labels import inside, points_along
 from stopgo.mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, PaperSheet
 from stopgo.mission.files.stop_list import stop_list
@@ -57,9 +64,9 @@ class Tile:
     def holds(self, x: float, y: float) -> bool:
         return self.low[0] <= x <= self.high[0] and self.low[1] <= y <= self.high[1]
 
-    def shows(self, room: Room) -> bool:
-        """True if a part of the room may lie in this window."""
-        x0, y0, x1, y1 = bounds(part.exterior for part in room.polygons)
+    def shows(self, box: tuple[float, float, float, float]) -> bool:
+        """True if a part of what lies within these bounds may be in this window."""
+        x0, y0, x1, y1 = box
         return x0 <= self.high[0] and self.low[0] <= x1 and y0 <= self.high[1] and self.low[1] <= y1
 
 
@@ -69,22 +76,37 @@ def needs_sheets(made: Route, mission: Mission) -> bool:
 
 
 def plan_pdf(
-    made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
+    made: Route,
+    mission: Mission,
+    figures: Figures,
+    *,
+    date: str,
+    with_range: bool = False,
+    floors: FloorsOnPaper | None = None,
 ) -> bytes:
     """The whole set; equal inputs give equal bytes.
 
-    `with_range` adds a ring of the scanner's range about each stop.
+    `with_range` adds a ring of the scanner's range about each stop. What the sets of several missions have in
+    common is kept in `floors`.
     """
-    pages, shared = sheets_of(made, mission, figures, date=date, with_range=with_range)
+    pages, shared = sheets_of(made, mission, figures, date=date, with_range=with_range, floors=floors)
     return pdf_of(pages, title=f"{mission.name}: scan plan {mission.id[:12]}", shared=shared)
 
 
 def sheets_of(
-    made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
+    made: Route,
+    mission: Mission,
+    figures: Figures,
+    *,
+    date: str,
+    with_range: bool = False,
+    floors: FloorsOnPaper | None = None,
 ) -> tuple[list[PdfPage], dict[str, str]]:
     """The sheets, and the drawings that several of them show."""
     floor = made.floor
-    content, whole = overview(made, mission, date=date, with_range=with_range, with_table=False)
+    content, whole = overview(
+        made, mission, date=date, with_range=with_range, with_table=False, floors=floors
+    )
     pages = [PdfPage(whole.width, whole.height, content, "Overview", whole.drawing)]
     give_back()  # a drawing is made from many short words
     every = tiles_of(made, mission) if whole.scale > READABLE else []
@@ -92,8 +114,9 @@ def sheets_of(
     shared: dict[str, str] = {}
     if tiles:
         site = _site_sheet(whole.centre)
-        rooms = [room for room in floor.rooms if room.polygons and any(tile.shows(room) for tile in tiles)]
-        shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range, rooms=rooms))
+        rooms = _rooms_shown(floor.rooms, tiles)
+        drawn = drawing_of(made, mission, site, with_range=with_range, rooms=rooms, floors=floors)
+        shared["site"] = "\n".join(drawn)
         give_back()
         shared["key"] = _key(every, floor)
         shared["legend"] = _tile_legend(made, mission, tiles[0])
@@ -142,6 +165,12 @@ def _driven(tiles: Sequence[Tile], mission: Mission) -> list[Tile]:
     """The windows through which a mission's route leads: other places belong to other missions."""
     way = points_along(legs_of(mission), spacing=1.0).tolist()
     return [tile for tile in tiles if any(tile.holds(x, y) for x, y in way)]
+
+
+def _rooms_shown(rooms: Sequence[Room], tiles: Sequence[Tile]) -> list[Room]:
+    """The rooms of which a part may be on one of the sheets."""
+    boxes = [(room, bounds(part.exterior for part in room.polygons)) for room in rooms if room.polygons]
+    return [room for room, box in boxes if any(tile.shows(box) for tile in tiles)]
 
 
 def _letters(row: int) -> str:

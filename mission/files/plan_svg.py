@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -11,15 +12,15 @@ import numpy as np
 from stopgo.mission.document import Mission
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import building, targets
-from stopgo.mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
+from stopgo.mission.files.room_labels import STOPS, WALLS, WAY, Busy, KnownLabels, points_along, room_labels
 from stopgo.mission.files.route_drawing import STOP, errors, network, rings, route, stops
 from stopgo.mission.files.shared_drawing import shared_routes, shared_stops
-from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit, sheet_with
+from stopgo.mission.files.sheet import PaperBox, PaperMap, PaperSheet, SheetContents, fit, sheet_with
 from stopgo.mission.files.stop_list import stop_list
 from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
-from stopgo.mission.floor import FloorPlan, Room
+from stopgo.mission.floor import Room
 from stopgo.mission.geometry import FloatArray, bounds, closed
-from stopgo.mission.stages import Route
+from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.mission.stages.figures import Figures
 
 HANDY = 200
@@ -58,6 +59,7 @@ def overview(
     date: str,
     with_range: bool = False,
     with_table: bool = True,
+    floors: FloorsOnPaper | None = None,
 ) -> tuple[str, PaperSheet]:
     """Return the blocks of the one sheet that shows everything, and the sheet."""
     facts = panel.facts_of(made, mission, shared, date=date)
@@ -65,7 +67,7 @@ def overview(
     contents = _contents(made, shared or (mission,), facts, entries)
     rows = _table_rows(contents, mission, figures, shared) if with_table else []
     sheet = fit(replace(contents, rows=len(rows)))
-    inside = "\n".join(drawing_of(made, mission, sheet, shared, with_range=with_range))
+    inside = "\n".join(drawing_of(made, mission, sheet, shared, with_range=with_range, floors=floors))
     drawn = (
         group("drawing", [inside], clip_path="url(#frame)"),
         _outline(sheet.drawing),
@@ -107,6 +109,45 @@ def _contents(
     return SheetContents(extent_of(made, *missions), PADDING, *blocks)
 
 
+@dataclass(frozen=True, eq=False)
+class FloorOnPaper:
+    """A floor on a sheet, whatever mission is drawn over it."""
+
+    space: NavigableSpace
+    sheet: PaperSheet
+
+    @cached_property
+    def building(self) -> tuple[str, ...]:
+        """Floor, rooms, elements and openings."""
+        return tuple(building(self.space, self.sheet))
+
+    @cached_property
+    def walls(self) -> Busy:
+        """Points of the elements, which room names avoid."""
+        elements = self.space.floor.elements
+        solids = [closed(solid.exterior) for item in elements for solid in item.solids]
+        lines = [
+            self.sheet.on_paper(line) for line in (*solids, *(one for item in elements for one in item.lines))
+        ]
+        return Busy.of((WALLS, [points_along(lines, spacing=1.5)]))
+
+    @cached_property
+    def labels(self) -> KnownLabels:
+        """Names of all rooms, off the elements."""
+        return KnownLabels.of(self.space.floor.rooms, self.sheet, self.walls)
+
+
+class FloorsOnPaper:
+    """Drawings of one floor that several missions have in common: one for each map to paper."""
+
+    def __init__(self) -> None:
+        self._drawn: dict[PaperMap, FloorOnPaper] = {}
+
+    def on(self, space: NavigableSpace, sheet: PaperSheet) -> FloorOnPaper:
+        """Return the drawing of the space on a sheet."""
+        return self._drawn.setdefault(sheet.map, FloorOnPaper(space, sheet))
+
+
 def drawing_of(
     made: Route,
     mission: Mission,
@@ -115,25 +156,30 @@ def drawing_of(
     *,
     with_range: bool,
     rooms: Sequence[Room] | None = None,
+    floors: FloorsOnPaper | None = None,
 ) -> tuple[str, ...]:
-    """Return everything to scale, from the floor up to the numbers; the names of `rooms`, else of all."""
+    """Return everything to scale, from the floor up to the numbers; the names of `rooms`, else of all.
+
+    What other missions' drawings have in common is in `floors`, if it is given.
+    """
     missions = shared or (mission,)
     named = made.floor.rooms if rooms is None else rooms
-    space = made.space
+    floor = FloorOnPaper(made.space, sheet) if floors is None else floors.on(made.space, sheet)
+    avoid, known = _busy(missions, sheet, floor.walls), floor.labels if floors else None
     parts = chain(
-        building(space, sheet),
+        floor.building,
         targets(made.selection, sheet),
         [rings(item, sheet) for item in missions] if with_range else [],
         shared_routes(shared, sheet) if shared else route(mission, sheet),
         network(mission, sheet),
-        [room_labels(named, sheet, avoid=_busy(missions, space.floor, sheet))],
+        [room_labels(named, sheet, avoid=avoid, known=known)],
         [errors(mission, sheet)],
         shared_stops(shared, sheet) if shared else stops(mission, sheet),
     )
     return tuple(part for part in parts if part)
 
 
-def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> Busy:
+def _busy(missions: Sequence[Mission], sheet: PaperSheet, walls: Busy) -> Busy:
     """Return the points that room names avoid: stops above all, then the route, then elements."""
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     disc = (STOP + 0.5) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
@@ -143,13 +189,8 @@ def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> B
         for place in ((item.start.x, item.start.y), *((stop.x, stop.y) for stop in item.stops))
     ]
     discs = [place + disc for place in sheet.on_paper(np.array(centres))]
-    solids = [closed(solid.exterior) for item in floor.elements for solid in item.solids]
-    lines = [line for item in floor.elements for line in item.lines]
-    return Busy.of(
-        (STOPS, discs),
-        (WAY, [points_along([sheet.on_paper(leg) for leg in _legs(missions)], spacing=1.0)]),
-        (WALLS, [points_along([sheet.on_paper(line) for line in (*solids, *lines)], spacing=1.5)]),
-    )
+    way = points_along([sheet.on_paper(leg) for leg in _legs(missions)], spacing=1.0)
+    return Busy.of((STOPS, discs), (WAY, [way]), below=walls)
 
 
 def _legs(missions: Sequence[Mission]) -> list[FloatArray]:

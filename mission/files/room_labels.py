@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,18 +45,23 @@ class Busy:
 
     xy: FloatArray
     weight: FloatArray
+    below: Busy | None = None
+    """More points, which several share."""
 
     @classmethod
-    def of(cls, *layers: tuple[int, list[FloatArray]]) -> Busy:
+    def of(cls, *layers: tuple[int, list[FloatArray]], below: Busy | None = None) -> Busy:
         """From (weight, points) of each layer."""
         kept = [(weight, np.concatenate(points)) for weight, points in layers if points]
         weights = [np.full(len(points), float(weight)) for weight, points in kept]
-        return cls(np.concatenate([points for _, points in kept]), np.concatenate(weights))
+        return cls(np.concatenate([points for _, points in kept]), np.concatenate(weights), below)
 
     def and_also(self, weight: int, points: FloatArray) -> Busy:
-        weights = np.full(len(points), float(weight))
-        xy = np.concatenate([self.xy.T, points.T], axis=1).T
-        return Busy(xy, np.concatenate([self.weight, weights]))
+        return self.joined(Busy(points, np.full(len(points), float(weight))))
+
+    def joined(self, other: Busy) -> Busy:
+        """The points of both."""
+        xy = np.concatenate([self.xy.T, other.xy.T], axis=1).T
+        return Busy(xy, np.concatenate([self.weight, other.weight]))
 
     def only(self, chosen: BoolArray) -> Busy:
         """Those of the points (n,) that are chosen."""
@@ -73,7 +78,8 @@ class Busy:
             found.append(slice(*(first[strip] + x.searchsorted((left, right)))))
         xy = np.concatenate([xy[:, there] for there in found], axis=1)
         within = (xy[1] > bottom) & (xy[1] < top)
-        return Busy(xy.T, np.concatenate([weight[there] for there in found])).only(within)
+        own = Busy(xy.T, np.concatenate([weight[there] for there in found])).only(within)
+        return own if self.below is None else own.joined(self.below.near(low, high))
 
     @cached_property
     def _lowest(self) -> int:
@@ -108,31 +114,109 @@ class Label:
 _ALL_OVER = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 4)), axis=-1).reshape(-1, 2)
 
 
-def room_labels(rooms: Sequence[Room], sheet: PaperSheet, *, avoid: Busy) -> str:
+def room_labels(
+    rooms: Sequence[Room], sheet: PaperSheet, *, avoid: Busy, known: KnownLabels | None = None
+) -> str:
     """Return name and area of each room, away from `avoid` and each other.
 
     Without space for both, the name is alone, then only its first word; a room without space even for that
-    has no label here.
+    has no label here. The labels `known` are those of all rooms, off what is below `avoid`.
     """
-    labels: list[Label] = []
-    written = np.empty((*_ALL_OVER.T.shape, len(rooms)))
-    # The smallest rooms first: they have the least choice.
-    for room in sorted((room for room in rooms if room.polygons), key=lambda room: room.area):
-        label = _label(room, sheet, avoid, written[:, :, : len(labels)])
-        if label is not None:
-            written[:, :, len(labels)] = label.points.T
-            labels.append(label)
+    labels = known.off(avoid, rooms) if known else _labels(_smallest_first(rooms), sheet, avoid)
     style: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.5}
-    drawn = ("".join(_lines(label)) for label in labels)
+    drawn = ("".join(_lines(label)) for label in labels if label is not None)
     return group("names", drawn, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
+
+
+def _smallest_first(rooms: Sequence[Room]) -> list[Room]:
+    """The rooms to name: the smallest have the least choice."""
+    return sorted((room for room in rooms if room.polygons), key=lambda room: room.area)
+
+
+def _labels(rooms: Sequence[Room], sheet: PaperSheet, avoid: Busy) -> list[Label | None]:
+    return _in_turn(len(rooms), lambda k, written: _label(rooms[k], sheet, avoid, written))
+
+
+def _in_turn(many: int, label_of: Callable[[int, FloatArray], Label | None]) -> list[Label | None]:
+    """The label of each room, from its number and the points (2, 28, n) of the n labels before it."""
+    labels: list[Label | None] = []
+    written, count = np.empty((*_ALL_OVER.T.shape, many)), 0
+    for k in range(many):
+        label = label_of(k, written[:, :, :count])
+        if label is not None:
+            written[:, :, count] = label.points.T
+            count += 1
+        labels.append(label)
+    return labels
+
+
+@dataclass(frozen=True, eq=False)
+class KnownLabels:
+    """Labels of all rooms of a floor on a sheet, off the points that several missions share."""
+
+    sheet: PaperSheet
+    rooms: list[Room]
+    """The smallest first."""
+    labels: list[Label | None]
+    within: FloatArray
+    """Lower and upper corner of what is considered for each label (n, 2, 2)."""
+
+    @classmethod
+    def of(cls, rooms: Sequence[Room], sheet: PaperSheet, avoid: Busy) -> KnownLabels:
+        named = _smallest_first(rooms)
+        within = [_considered(room, sheet) for room in named]
+        return cls(sheet, named, _labels(named, sheet, avoid), np.reshape(within, (-1, 2, 2)))
+
+    def off(self, avoid: Busy, rooms: Sequence[Room]) -> list[Label | None]:
+        """Labels of some rooms off more points: only near these, and near labels that differ, others."""
+        shown = {id(room) for room in rooms}
+        cells = np.unique(np.floor(avoid.xy / STRIP), axis=0) * STRIP
+        again = self._near(cells, cells + STRIP)
+
+        def label_of(k: int, written: FloatArray) -> Label | None:
+            known, label = self.labels[k], None
+            if id(self.rooms[k]) in shown:
+                label = _label(self.rooms[k], self.sheet, avoid, written) if again[k] else known
+            for changed in (label, known) if not _alike(label, known) else ():
+                if changed is not None:
+                    corners = changed.centre - changed.half, changed.centre + changed.half
+                    again[:] |= self._near(*(corner[None] for corner in corners))
+            return label
+
+        return _in_turn(len(self.rooms), label_of)
+
+    def _near(self, low: FloatArray, high: FloatArray) -> BoolArray:
+        """True for the rooms for whose labels something between any of these corners (m, 2) is considered."""
+        begins, ends = self.within[:, None, 0], self.within[:, None, 1]
+        both = np.all((begins <= high) & (low <= ends), axis=2)
+        return np.asarray(np.any(both, axis=1))
+
+
+def _alike(one: Label | None, other: Label | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return one.lines == other.lines and np.array_equal(one.centre, other.centre)
+
+
+def _considered(room: Room, sheet: PaperSheet) -> tuple[FloatArray, FloatArray]:
+    """Corners of the room with the widest margin of any of its labels."""
+    corners = np.concatenate(_rings_on(sheet, room))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    layouts = (lines for several in _layouts(room, _widest(low, high)) for lines in several)
+    margin = np.max([_half(lines) for lines in layouts], axis=0) + 2 * AROUND
+    return low - margin, high + margin
+
+
+def _rings_on(sheet: PaperSheet, room: Room) -> list[FloatArray]:
+    return [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
 
 
 def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> Label | None:
     """The fullest that crosses no wall and no other label; they are at the points `written` (2, 28, n)."""
-    rings = [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
+    rings = _rings_on(sheet, room)
     corners = np.concatenate(rings)
     places = LabelPlaces(rings, corners.min(axis=0), corners.max(axis=0), avoid, written)
-    for layouts in _layouts(room, max(float(places.high[0] - places.low[0]) - 1.0, LEAST)):
+    for layouts in _layouts(room, _widest(places.low, places.high)):
         best: Label | None = None
         for lines in layouts:
             label = _placed(lines, places)
@@ -158,10 +242,20 @@ def _layouts(room: Room, widest: float) -> Iterator[list[list[tuple[str, float]]
 
 def _placed(lines: list[tuple[str, float]], places: LabelPlaces) -> Label | None:
     """Return the label at its best place; None if it crosses a wall, a stop or another label there."""
-    size = (max(text_width(*item) for item in lines), sum(size + 0.4 for _, size in lines))
-    half = np.array(size) / 2
+    half = _half(lines)
     found = places.best(half)
     return None if found is None else Label(lines, found[1], half, found[0])
+
+
+def _widest(low: FloatArray, high: FloatArray) -> float:
+    """Millimetres that a label may take in a room between these corners."""
+    return max(float(high[0] - low[0]) - 1.0, LEAST)
+
+
+def _half(lines: list[tuple[str, float]]) -> FloatArray:
+    """Half the width and height of a label."""
+    size = (max(text_width(*item) for item in lines), sum(size + 0.4 for _, size in lines))
+    return np.array(size) / 2
 
 
 def wrapped(name: str, *, width: float, cut: float | None = None) -> list[str]:

@@ -74,10 +74,15 @@ class PaperSheet:
     centre: tuple[float, float]
     """The point of the site, in metres, at the centre of the drawing."""
 
+    @property
+    def map(self) -> PaperMap:
+        """Map to the sheet's millimetres."""
+        middle = (self.drawing.x + self.drawing.width / 2, self.drawing.y + self.drawing.height / 2)
+        return PaperMap(self.centre, middle, 1000 / self.scale)
+
     def on_paper(self, xy: FloatArray) -> FloatArray:
         """Site metres (…, 2), y up, as millimetres on the sheet, y down."""
-        middle = (self.drawing.x + self.drawing.width / 2, self.drawing.y + self.drawing.height / 2)
-        return PaperMap(self.centre, middle, 1000 / self.scale).on_paper(xy)
+        return self.map.on_paper(xy)
 
     def length(self, metres: float) -> float:
         """Metres as millimetres on paper."""

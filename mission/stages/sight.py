@@ -108,8 +108,8 @@ def required_of(sight: Sight, mission: Mission) -> Sight:
     return sight if mission.share is UNSET else replace(sight, totals=sight.totals.without_requirements)
 
 
-def sight_of(route: Route, mission: Mission, figures: Figures) -> Sight:
-    """Return the visibility of a plan's stops, in the order of driving."""
+def sight_of(route: Route, mission: Mission, figures: Figures, totals: CoverageTotals | None = None) -> Sight:
+    """Return the visibility of a plan's stops, in the order of driving; its `totals` may be known."""
     visibility = route.visibility
     rows = route.selection.chosen[route.order].tolist()
     runs = [slice(int(visibility.pointer[row]), int(visibility.pointer[row + 1])) for row in rows]
@@ -119,7 +119,7 @@ def sight_of(route: Route, mission: Mission, figures: Figures) -> Sight:
         revision=mission.revision,
         digest=mission.digest,
         targets=visibility.targets,
-        totals=totals_of_plan(visibility, {item.room: item.why for item in figures.unreached}),
+        totals=totals or totals_of_plan(visibility, {item.room: item.why for item in figures.unreached}),
         stops=tuple(SeenFrom(stop.id, stop.x, stop.y) for stop in mission.stops),
         pointer=frozen(np.concatenate([[0], np.cumsum(counts)]), np.int64),
         first=frozen(np.concatenate([[0][:0], *(visibility.first[run] for run in runs)]), np.int64),

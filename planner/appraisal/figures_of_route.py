@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from stopgo.mission.floor import Finding, Rank
+from stopgo.mission.plan import PartPlan
 from stopgo.mission.stages import Candidates, Route, Selection, Unreached, Visibility
 from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.covered_intervals import seen_units
@@ -84,9 +85,9 @@ def figures_of(route: Route, before: FiguresBefore | None = None) -> Figures:
     )
 
 
-def figures_of_share(route: Route, whole: Figures, before: FiguresBefore) -> Figures:
-    """Return the figures of one of several missions; the required coverage applies to all together."""
-    groups = coverage_by_group(route.selection, why={item.room: item.why for item in whole.unreached})
+def figures_of_share(route: Route, plan: PartPlan, before: FiguresBefore) -> Figures:
+    """Return the figures of one mission of a plan; the required coverage applies to all together."""
+    whole, groups = plan.figures, plan.totals.coverage(seen_units(route.selection))
     of_all = (item for item in whole.findings if item.code in (NOT_MET, FEWER_VIEWS, *SCANS_APART))
     findings = (*route.space.findings, *leg_doubts(route), *before.doubts, *of_all)
     return replace(

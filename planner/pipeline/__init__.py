@@ -219,7 +219,7 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     for k, route in enumerate(division.routes):
         allocation = MissionAllocation(kind=division.kind, number=k + 1, of=len(division.routes))
         mission = assemble(route, part=k, allocation=allocation)
-        shares.append(PartPlan(route, figures_of_share(route, whole.figures, before), mission))
+        shares.append(PartPlan(route, figures_of_share(route, whole, before), mission))
     made = DividedPlan(division.kind, whole, tuple(shares), division.limit_s, division.bound, division.method)
     observe(made)
     return Plan(made.shares, made)

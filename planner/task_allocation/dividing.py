@@ -17,7 +17,7 @@ from stopgo.mission.stages.division import DividedRoute
 from stopgo.planner.routing import Ends, check_position, tour_bound
 from stopgo.planner.routing.assemble import assemble
 from stopgo.planner.selection import coverage_steps
-from stopgo.planner.selection.cover import cover_of
+from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.task_allocation.exchange import Tours, filled, shorter, shorter_longest
 from stopgo.planner.task_allocation.least_times import least_makespan, least_tours
@@ -80,8 +80,7 @@ def _fleet(route: Route, settings: Settings) -> DividedRoute:
     if len(starts) == 1:
         rank = {stop: k for k, stop in enumerate(route.order.tolist())}
         tours = tuple(sorted(tours, key=lambda tour: min(rank[stop] for stop in tour)))
-    routes = [_route(route, clock, tour, k) for tour, k in zip(tours, numbers, strict=True)]
-    return DividedRoute("robot", tuple(routes), None, bound, METHOD)
+    return DividedRoute("robot", _routes(route, clock, tours, numbers), None, bound, METHOD)
 
 
 def _balanced(clock: TourTimes, numbers: list[int], bound: float, route: Route, *, seed: int) -> Tours:
@@ -153,7 +152,7 @@ def _shifts(route: Route, settings: Settings) -> DividedRoute:
     tours = _fewest(clock, route, bound, limit_s - SPARE_S, seed=settings.seed)
     rank = {stop: k for k, stop in enumerate(route.order.tolist())}
     tours = tuple(sorted(tours, key=lambda tour: min(rank[stop] for stop in tour)))
-    routes = tuple(_route(route, clock, tour, 0) for tour in tours)
+    routes = _routes(route, clock, tours, [0] * len(tours))
     return DividedRoute("tour", routes, limit_s, float(bound), METHOD)
 
 
@@ -210,9 +209,17 @@ def _cut_in_time(clock: TourTimes, route: Route, limit_s: float) -> Tours:
     return tuple(tours)
 
 
-def _route(whole: Route, clock: TourTimes, tour: Tour, start: int) -> Route:
-    """The route of one tour, over the selection of its own stops."""
-    selection, order = _selected(whole.selection, tour)
+def _routes(whole: Route, clock: TourTimes, tours: Tours, starts: list[int]) -> tuple[Route, ...]:
+    """The route of each tour from its start, over the selection of its own stops."""
+    cover = cover_of(whole.visibility, demands_of(whole.visibility))
+    parts = (_selected(whole.selection, cover, tour) for tour in tours)
+    each = zip(parts, tours, starts, strict=True)
+    return tuple(_route(whole, *part, clock, tour, start) for part, tour, start in each)
+
+
+def _route(
+    whole: Route, selection: Selection, order: IntArray, clock: TourTimes, tour: Tour, start: int
+) -> Route:
     line = [clock.stops + start, *tour]
     legs = [clock.legs.path(a, b) for a, b in pairwise([*line, *line[: int(clock.closed)]])]
     approaches, back = legs[: len(tour)], legs[-1] if clock.closed and len(legs[-1]) > 1 else None
@@ -232,12 +239,11 @@ def _route(whole: Route, clock: TourTimes, tour: Tour, start: int) -> Route:
     )
 
 
-def _selected(whole: Selection, tour: Tour) -> tuple[Selection, IntArray]:
+def _selected(whole: Selection, cover: Cover, tour: Tour) -> tuple[Selection, IntArray]:
     """The selection of a tour's stops in the order of choice, and the index in it of each stop."""
     stops = sorted(tour)
     chosen = whole.chosen[stops]
-    visibility = whole.visibility
-    steps = coverage_steps(cover_of(visibility, demands_of(visibility)), chosen)
+    steps = coverage_steps(cover, chosen)
     part = replace(
         whole, chosen=frozen(chosen, np.int64), coverage_steps=frozen(steps), required=0.0, bound=0,
         method=f"{whole.method}, allocated",

@@ -32,7 +32,7 @@ Invariants:
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -164,6 +164,33 @@ class Canvas:
         indexes = [index] if isinstance(index, rr.TimeColumn) else list(index)
         self.counts[entity] += len(indexes[0].times)
         self.stream.send_columns(entity, indexes=indexes, columns=[c for group in groups for c in group])
+
+
+@dataclass(frozen=True)
+class KeepingCanvas(Canvas):
+    """A canvas that keeps what is drawn by `show`, `at` and `columns`, for canvases of the same origin."""
+
+    kept: list[Callable[[Canvas], None]] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, canvas: Canvas) -> KeepingCanvas:
+        """Return a canvas that draws into the recording of another."""
+        return cls(canvas.stream, canvas.origin, canvas.drawn, canvas.counts)
+
+    def show(self, entity: str, *archetypes: Any) -> None:
+        """Draw a static row, and keep it."""
+        self.kept.append(lambda canvas: canvas.show(entity, *archetypes))
+        super().show(entity, *archetypes)
+
+    def at(self, entity: str, archetype: Any, **times: Any) -> None:
+        """Draw a row at the given times, and keep it."""
+        self.kept.append(lambda canvas: canvas.at(entity, archetype, **times))
+        super().at(entity, archetype, **times)
+
+    def columns(self, entity: str, index: rr.TimeColumn | Sequence[rr.TimeColumn], *groups: Any) -> None:
+        """Draw many rows at once, and keep them."""
+        self.kept.append(lambda canvas: canvas.columns(entity, index, *groups))
+        super().columns(entity, index, *groups)
 
 
 def arrow_of_lines(lines: NDArray[Any]) -> pa.Array:

@@ -21,6 +21,7 @@ from stopgo.recordings.drawing import entities
 from stopgo.recordings.drawing.blueprint import Bounds
 from stopgo.recordings.drawing.canvas import (
     Canvas,
+    KeepingCanvas,
     LocalOrigin,
     Sheet,
     layout_alone,
@@ -69,15 +70,39 @@ DRAWINGS: dict[type, tuple[Drawing, ...]] = {
 """Drawing functions of each stage result; results of other types are left out."""
 
 
+COMMON = frozenset({FloorPlan, NavigableSpace, Candidates, Visibility})
+"""Stage results that several missions may have in common; they are drawn without any other result."""
+
+
+class CommonDrawings:
+    """Drawings of results that several recordings have in common: each is made once for a local origin."""
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[type, LocalOrigin], tuple[object, list[Callable[[Canvas], None]]]] = {}
+
+    def draw(self, canvas: Canvas, result: object) -> None:
+        """Draw a result, as before if it was the last of its type; else it is kept in its place."""
+        key = (type(result), canvas.origin)
+        of, kept = self._kept.get(key, (None, []))
+        if of is result:
+            for draw_again in kept:
+                draw_again(canvas)
+            return
+        keeping = KeepingCanvas.of(canvas)
+        _draw_result(keeping, result)
+        self._kept[key] = (result, keeping.kept)
+
+
 class PlanRecording:
     """Collects the stage results of one plan, and draws them when it is written.
 
     Drawing waits for the end, because the local origin is the mission's. The mission is the last result, and
-    its field recordings have the same origin.
+    its field recordings have the same origin. What it has in `common` with other recordings is drawn once.
     """
 
-    def __init__(self, recording_id: str) -> None:
+    def __init__(self, recording_id: str, common: CommonDrawings | None = None) -> None:
         self.recording_id = recording_id
+        self._common = common
         self._results: dict[type, Any] = {}
         self._drawn: bytes | None = None
 
@@ -89,7 +114,7 @@ class PlanRecording:
     def draw(self) -> bytes:
         """Draw the stage results; returns the recording in Rerun's format, the same at each call."""
         if self._drawn is None:
-            self._drawn = _recording(self.recording_id, self._results)
+            self._drawn = _recording(self.recording_id, self._results, self._common)
         return self._drawn
 
     def write(self, path: Path) -> None:
@@ -107,15 +132,21 @@ class PlanRecording:
         return layout + _recording(self.recording_id, self._results)
 
 
-def _recording(recording_id: str, results: StageResults) -> bytes:
+def _recording(recording_id: str, results: StageResults, common: CommonDrawings | None = None) -> bytes:
     with open_canvas(_sheet(recording_id, results)) as canvas:
-        for kind, drawings in DRAWINGS.items():
-            for draw in drawings if kind in results else ():
+        for kind in DRAWINGS:
+            if kind in results:
+                draw = common.draw if common and kind in COMMON else _draw_result
                 draw(canvas, results[kind])
         _draw_planned_drive(canvas, results)
         _describe_plan(canvas, results)
         embed_end(canvas)
         return canvas.drain()
+
+
+def _draw_result(canvas: Canvas, result: object) -> None:
+    for draw in DRAWINGS[type(result)]:
+        draw(canvas, result)
 
 
 def _sheet(recording_id: str, results: StageResults) -> Sheet:

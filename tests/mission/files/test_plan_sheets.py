@@ -12,7 +12,7 @@ from msgspec import UNSET
 from msgspec.structs import replace as changed
 
 from stopgo.mission.document import MissionAllocation
-from stopgo.mission.files import plan_sheets
+from stopgo.mission.files import plan_sheets, plan_svg
 from stopgo.mission.files.pdf import PdfPage, pdf_of
 from stopgo.mission.files.plan_sheets import plan_pdf, rooms_of, sheets_of, tiles_of
 from stopgo.mission.files.plan_svg import legs_of
@@ -76,6 +76,19 @@ def test_one_mission_of_several_has_the_sheets_that_its_route_leads_through() ->
     kept = [page.name.removeprefix("Sheet ") for page in pages if page.name.startswith("Sheet ")]
     assert 0 < len(kept) < len(tiles)
     assert all(any(tile.holds(x, y) for tile in tiles if tile.name in kept) for leg in way for x, y in leg)
+
+
+def test_what_the_sheets_of_missions_have_in_common_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    route, mission, drawn = room_route(), room_mission(), []
+    each = [
+        changed(mission, stops=mission.stops[k:][:1], share=MissionAllocation("tour", 1, 2)) for k in (0, 1)
+    ]
+    alone = [plan_pdf(route, item, FIGURES, date=DATE) for item in each]
+    building = plan_svg.building
+    monkeypatch.setattr(plan_svg, "building", lambda *given: drawn.append(given) or building(*given))
+    floors = plan_svg.FloorsOnPaper()
+    assert [plan_pdf(route, item, FIGURES, date=DATE, floors=floors) for item in each] == alone
+    assert len(drawn) == 2, "for the overview, and for the sheets"
 
 
 def test_neighbouring_sheets_share_a_strip() -> None:

@@ -14,10 +14,14 @@ from stopgo.mission.files.room_labels import (
     WALLS,
     WAY,
     Busy,
+    KnownLabels,
     LabelPlaces,
     inside,
+    room_labels,
 )
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.files.sheet import PaperBox, PaperSheet
+from stopgo.mission.floor import Room
+from stopgo.mission.geometry import FloatArray, Polygon
 
 ROOM = np.array([[0, 0], [1, 0], [1, 1], [0.6, 1], [0.5, 0.7], [0, 1]])
 
@@ -52,3 +56,22 @@ def _costs(tried: FloatArray, half: FloatArray, places: LabelPlaces) -> tuple[Fl
     within = inside(x.ravel(), y.ravel(), places.rings).reshape(len(y), 3, len(x), 3)
     outside = 9 - within.sum(axis=(1, 3)).ravel()
     return under @ (weight * (weight != WAY)) + OUTSIDE * outside, under @ (weight * (weight == WAY))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.booleans())
+def test_known_labels_give_way_as_if_all_were_placed_again(seed: int, points: int, all_shown: bool) -> None:
+    random = np.random.default_rng(seed)
+    nowhere = PaperBox(0.0, 0.0, 0.0, 0.0)
+    sheet = PaperSheet("", 0.0, 0.0, 100, nowhere, nowhere, nowhere, (), (0.0, 0.0))
+    low = np.stack(np.meshgrid(*[np.arange(6) * 1.5] * 2), axis=-1).reshape(-1, 2)
+    sizes = random.choice([1.5, 2.4, 5.0], (len(low), 2))
+    rooms = [
+        Room(f"R{k}", f"{k} Meeting and conference", (Polygon.of(at + (ROOM * size).round(3)),))
+        for k, (at, size) in enumerate(zip(low, sizes, strict=True))
+    ]
+    walls = Busy.of((WALLS, [random.uniform(0, 120, (60, 2)) * (1, -1)]))
+    marks = random.uniform(0, 120, (points, 2)) * (1, -1)
+    avoid = Busy.of((STOPS, [marks[::2]]), (WAY, [marks[1::2]]), below=walls)
+    shown = rooms if all_shown else [room for room in rooms if random.random() < 0.5]
+    known = KnownLabels.of(rooms, sheet, walls)
+    assert room_labels(shown, sheet, avoid=avoid, known=known) == room_labels(shown, sheet, avoid=avoid)

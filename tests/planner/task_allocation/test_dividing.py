@@ -383,3 +383,10 @@ def test_no_tours_together_take_less_than_the_bound_with_turns(world: str, close
             if len(groups) == tours
         )
         assert driven_and_turned(clock, tours) <= least - clock.stops * clock.pause_s
+
+
+def test_the_coverage_of_all_tours_is_counted_in_one_cover(monkeypatch: pytest.MonkeyPatch) -> None:
+    route, made, build = route_of("hall", robots=3), [], dividing.cover_of
+    monkeypatch.setattr(dividing, "cover_of", lambda *given: made.append(given) or build(*given))
+    assert len(dividing.divided(route).routes) == 3
+    assert len(made) == 1

@@ -11,8 +11,9 @@ import pytest
 from stopgo.mission.geometry import frozen
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.mission.stages import DROP_REASONS
+from stopgo.recordings import plan as plan_recording
 from stopgo.recordings.drawing import entities, palette
-from stopgo.recordings.plan import PlanRecording
+from stopgo.recordings.plan import COMMON, CommonDrawings, PlanRecording
 from stopgo.recordings.rrd.read import check
 from tests.faults.sizes import some
 from tests.recordings import world
@@ -223,3 +224,19 @@ def test_edges_are_called_by_their_elements_and_global_ids_where_a_model_has_the
     labels = static(tmp_path / "plan.rrd", "/plan/floor/columns", "LineStrips2D:labels")
     assert list(labels) == ["c1 0LiOMJvJv5Bu0hPkJYEFGw", "c2"]
     assert not cells(tmp_path / "plan.rrd", "/plan/floor/walls", "LineStrips2D:labels")
+
+
+def test_what_recordings_have_in_common_is_drawn_once_for_an_origin(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[type] = []
+    for kind, drawings in plan_recording.DRAWINGS.items():
+        noted = (lambda canvas, result, kind=kind: drawn.append(kind), *drawings)
+        monkeypatch.setitem(plan_recording.DRAWINGS, kind, noted)
+    common, near, far = CommonDrawings(), world.nouns_at(), world.nouns_at(500_100.0, 5_401_000.0)
+    for nouns, others in ((near, False), (near, True), (far, False), (far, True)):
+        drawn.clear()
+        recording = PlanRecording(world.MISSION_ID, common)
+        for noun in nouns:
+            recording.observe(noun)
+        assert recording.draw()
+        kinds = {type(noun) for noun in nouns if type(noun) in plan_recording.DRAWINGS}
+        assert sorted(map(str, drawn)) == sorted(map(str, kinds - COMMON if others else kinds))
