@@ -63,7 +63,7 @@ class _Tree:
         self.nodes += 2
         fewer = self._with(-rows, -math.floor(number), value)
         if rounded_up(fewer) < self.found:
-            return max(value, fewer)
+            return value
         return max(value, min(fewer, self._with(rows, math.ceil(number), value)))
 
     def _is_promising(self, gain: float, value: float) -> bool:
