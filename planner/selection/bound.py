@@ -18,6 +18,8 @@ COARSE = 30_000
 """Entries of a coarse relaxation, about."""
 FINE = 100_000
 """Entries of a relaxation, about: with more the bound is hardly better, and takes many times as long."""
+CHOSEN = 1e-6
+"""Fraction above which a relaxation's solution has a part of a row."""
 FEW = 30
 """Most rows of a selection that a bound often proves the fewest."""
 FIRST_STEPS = 100
@@ -84,7 +86,6 @@ def first_bound(cover: Cover, *, found: int) -> int:
     return max(simple, multiplier_bound(cover, found=found, steps=steps))
 
 
-@instance_cached
 def relaxation_bound(cover: Cover) -> int:
     """Rounded-up optimum of: min Σ x_i, v_j y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 
@@ -94,22 +95,39 @@ def relaxation_bound(cover: Cover) -> int:
     - Σ_i max(0, Σ_j in i u_j + Σ c_hi q_h - 1) by weak duality, and it is computed from the solver's. Of a
     large problem neighbouring columns are one, as in the coarse bound.
     """
-    return _bound_of_relaxation(cover, FINE)
+    return _fine(cover)[0]
 
 
-@instance_cached
 def coarse_bound(cover: Cover) -> int:
     """Rounded-up bound at the prices of a relaxation in which neighbouring columns are one.
 
     A group may be seen in part, and its columns have prices by their weight. By weak duality these too
     prove a bound of the whole problem. It is a little weaker than the relaxation's, at a tenth of the time.
     """
-    return _bound_of_relaxation(cover, COARSE)
+    return _coarse(cover)[0]
 
 
-def _bound_of_relaxation(cover: Cover, entries: int) -> int:
+def likely_rows(cover: Cover, *, coarse: bool = False) -> IntArray:
+    """Rows of which a relaxation has a part (n,): a good selection is often among them."""
+    return (_coarse if coarse else _fine)(cover)[1]
+
+
+@instance_cached
+def _coarse(cover: Cover) -> tuple[int, IntArray]:
+    return _relaxed(cover, COARSE)
+
+
+@instance_cached
+def _fine(cover: Cover) -> tuple[int, IntArray]:
+    return _relaxed(cover, FINE)
+
+
+def _relaxed(cover: Cover, entries: int) -> tuple[int, IntArray]:
+    """The bound of a relaxation of about so many entries, and the rows of which its solution has a part."""
     if not cover.needed.any():
-        return 0
+        return 0, np.empty(0, np.int64)
     relaxation = CoverRelaxation(cover, entries)
     solution = relaxation.solution()
-    return 0 if solution is None else rounded_up(relaxation.proved(solution))
+    if solution is None:
+        return 0, np.empty(0, np.int64)
+    return rounded_up(relaxation.proved(solution)), np.flatnonzero(solution.values[: cover.rows] > CHOSEN)
