@@ -200,12 +200,12 @@ def _connected(
 
 def _connected_again(task: ConnectedCover, rows: IntArray, bound: int) -> tuple[IntArray, int]:
     """Fewer rows, searched for from those that a relaxation uses, where that may help and is quick."""
-    problem, few = task.problem, len(rows) <= FEW
-    if bound >= len(rows) or len(rows) > GUIDED or problem.sees.nnz > (LARGEST if few else FINE):
+    problem, coarse = task.problem, task.problem.sees.nnz > FINE
+    largest = LARGEST if len(rows) <= FEW else FINE
+    if bound >= len(rows) - 1 or len(rows) > GUIDED or problem.sees.nnz > largest:
         return rows, bound
-    coarse = problem.sees.nnz > FINE
     bound = max(bound, coarse_bound(problem) if coarse else relaxation_bound(problem))
-    if len(rows) - bound < (1 if few else 2):
+    if bound >= len(rows) - 1:
         return rows, bound
     search = Searches.default(task, likely=likely_rows(problem, coarse=coarse))
     return connected(task, search, rounds=ROUNDS, patience=PATIENCE, known=(rows, bound))
@@ -216,8 +216,9 @@ class Searches:
 
     @staticmethod
     def default(task: ConnectedCover, likely: IntArray | None = None) -> Search:
-        """Drop-and-repair, under the conditions too, though not all of them are necessary; first of `likely`.
+        """Drop-and-repair, under the conditions too, though not all of them are necessary.
 
+        It begins with a selection of the rows `likely`, if they are given and see enough.
         The first bound holds for later problems too, which only have more demands. The rows found last are
         repaired first, since they miss little but the newest demands.
         """

@@ -10,23 +10,21 @@ from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
 from stopgo.planner.selection.branching_bound import branching_bound
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.cover_relaxation import CoverRelaxation
+from stopgo.planner.selection.knapsack_cuts import CHOSEN
 from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_up
 
 LARGEST = 400_000
-"""Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
+"""Entries of the covering matrix above which the relaxation is not solved: it takes up to 3 s below."""
 COARSE = 30_000
 """Entries of a coarse relaxation, about."""
 FINE = 100_000
 """Entries of a relaxation, about: with more the bound is hardly better, and takes many times as long."""
-CHOSEN = 1e-6
-"""Fraction above which a relaxation's solution has a part of a row."""
 FEW = 30
 """Most rows of a selection that a bound often proves the fewest."""
 FIRST_STEPS = 100
 """Steps of a first bound by the multipliers, for problems that are too large for a relaxation."""
 FIRST_WORK = 40_000_000
 """Entries evaluated in all of them together."""
-
 LONG_WORK = 600_000_000
 """Entries evaluated in all steps of the multiplier bound where the range is long: some 2 s."""
 
@@ -47,8 +45,8 @@ def lower_bound(cover: Cover, *, found: int) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
     Small problems use the linear relaxation, large ones that of one part after another, or the multiplier
-    bound where the range is long. A coarse relaxation comes first for few rows, and often proves them; else
-    branches may.
+    bound where the range is long. For few rows a coarse relaxation comes first, which often proves them, and
+    branches come last.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
