@@ -18,13 +18,30 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.geometry.instance_cache import forget, instance_cached, taken
 from stopgo.planner.overlap import links_of
-from stopgo.planner.selection.bound import counting_bound, early_bound, first_bound, lower_bound
+from stopgo.planner.selection.bound import (
+    FEW,
+    FINE,
+    LARGEST,
+    coarse_bound,
+    counting_bound,
+    early_bound,
+    first_bound,
+    likely_rows,
+    lower_bound,
+    relaxation_bound,
+)
 from stopgo.planner.selection.connected_selection import ConnectedCover, Search, connected
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.exact_cover import exact
 from stopgo.planner.selection.greedy import greedy, in_greedy_order
-from stopgo.planner.selection.improve import EntriesLeft, improved, improved_otherwise, repaired_again
+from stopgo.planner.selection.improve import (
+    EntriesLeft,
+    found_among,
+    improved,
+    improved_otherwise,
+    repaired_again,
+)
 from stopgo.planner.selection.separators import Conditions
 
 Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
@@ -63,6 +80,8 @@ QUICK_SWAPS = 20
 """Swaps per removed stop in a plan that only estimates the number of stops."""
 ROUNDS = 12
 """Rounds in which the default method adds cuts to connect its selection."""
+GUIDED = 150
+"""Most stops of a selection that is searched for again among the rows that a relaxation uses."""
 PATIENCE = 3
 """Rounds without fewer stops after which it adds no more."""
 EXACT_ROUNDS = 60
@@ -167,6 +186,7 @@ def _connected(
         rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
     elif method.name == "default":
         rows, bound = connected(task, Searches.default(task), rounds=ROUNDS, patience=PATIENCE)
+        rows, bound = _connected_again(task, rows, bound)
     else:
         rows, bound = connected(task, lambda cover, *_: _solved(method, cover, settings), rounds=1)
     if method.ours and bound < len(rows):
@@ -178,13 +198,27 @@ def _connected(
     return np.concatenate([fixed, others]).astype(np.int64), bound
 
 
+def _connected_again(task: ConnectedCover, rows: IntArray, bound: int) -> tuple[IntArray, int]:
+    """Fewer rows, searched for from those that a relaxation uses, where that may help and is quick."""
+    problem, coarse = task.problem, task.problem.sees.nnz > FINE
+    largest = LARGEST if len(rows) <= FEW else FINE
+    if bound >= len(rows) - 1 or len(rows) > GUIDED or problem.sees.nnz > largest:
+        return rows, bound
+    bound = max(bound, coarse_bound(problem) if coarse else relaxation_bound(problem))
+    if bound >= len(rows) - 1:
+        return rows, bound
+    search = Searches.default(task, likely=likely_rows(problem, coarse=coarse))
+    return connected(task, search, rounds=ROUNDS, patience=PATIENCE, known=(rows, bound))
+
+
 class Searches:
     """Searches of our own methods for fewer rows, from a known solution and under conditions."""
 
     @staticmethod
-    def default(task: ConnectedCover) -> Search:
+    def default(task: ConnectedCover, likely: IntArray | None = None) -> Search:
         """Drop-and-repair, under the conditions too, though not all of them are necessary.
 
+        It begins with a selection of the rows `likely`, if they are given and see enough.
         The first bound holds for later problems too, which only have more demands. The rows found last are
         repaired first, since they miss little but the newest demands.
         """
@@ -198,6 +232,8 @@ class Searches:
                 cover.forget_seers()  # before the next one: each is a large part of the memory
             asked = cover.with_one_of_each(sets)
             again = repaired_again(asked, last) if 0 < len(last) < len(start) else None
+            if likely is not None and not len(last):
+                again = found_among(asked, likely, at_least=bound)
             first = start if again is None else again
             last = improved(asked, first, at_least=bound, settled=settled)
             if not task.parts(last):

@@ -10,10 +10,11 @@ from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
 from stopgo.planner.selection.branching_bound import branching_bound
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.cover_relaxation import CoverRelaxation
+from stopgo.planner.selection.knapsack_cuts import CHOSEN
 from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_up
 
 LARGEST = 400_000
-"""Entries of the covering matrix above which the relaxation is not solved: it takes up to 6 s below."""
+"""Entries of the covering matrix above which the relaxation is not solved: it takes up to 3 s below."""
 COARSE = 30_000
 """Entries of a coarse relaxation, about."""
 FINE = 100_000
@@ -24,7 +25,6 @@ FIRST_STEPS = 100
 """Steps of a first bound by the multipliers, for problems that are too large for a relaxation."""
 FIRST_WORK = 40_000_000
 """Entries evaluated in all of them together."""
-
 LONG_WORK = 600_000_000
 """Entries evaluated in all steps of the multiplier bound where the range is long: some 2 s."""
 
@@ -45,8 +45,8 @@ def lower_bound(cover: Cover, *, found: int) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
     Small problems use the linear relaxation, large ones that of one part after another, or the multiplier
-    bound where the range is long. A coarse relaxation comes first for few rows, and often proves them; else
-    branches may.
+    bound where the range is long. For few rows a coarse relaxation comes first, which often proves them, and
+    branches come last.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
@@ -84,7 +84,6 @@ def first_bound(cover: Cover, *, found: int) -> int:
     return max(simple, multiplier_bound(cover, found=found, steps=steps))
 
 
-@instance_cached
 def relaxation_bound(cover: Cover) -> int:
     """Rounded-up optimum of: min Σ x_i, v_j y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 
@@ -94,22 +93,39 @@ def relaxation_bound(cover: Cover) -> int:
     - Σ_i max(0, Σ_j in i u_j + Σ c_hi q_h - 1) by weak duality, and it is computed from the solver's. Of a
     large problem neighbouring columns are one, as in the coarse bound.
     """
-    return _bound_of_relaxation(cover, FINE)
+    return _fine(cover)[0]
 
 
-@instance_cached
 def coarse_bound(cover: Cover) -> int:
     """Rounded-up bound at the prices of a relaxation in which neighbouring columns are one.
 
     A group may be seen in part, and its columns have prices by their weight. By weak duality these too
     prove a bound of the whole problem. It is a little weaker than the relaxation's, at a tenth of the time.
     """
-    return _bound_of_relaxation(cover, COARSE)
+    return _coarse(cover)[0]
 
 
-def _bound_of_relaxation(cover: Cover, entries: int) -> int:
+def likely_rows(cover: Cover, *, coarse: bool = False) -> IntArray:
+    """Rows of which a relaxation has a part (n,): a good selection is often among them."""
+    return (_coarse if coarse else _fine)(cover)[1]
+
+
+@instance_cached
+def _coarse(cover: Cover) -> tuple[int, IntArray]:
+    return _relaxed(cover, COARSE)
+
+
+@instance_cached
+def _fine(cover: Cover) -> tuple[int, IntArray]:
+    return _relaxed(cover, FINE)
+
+
+def _relaxed(cover: Cover, entries: int) -> tuple[int, IntArray]:
+    """The bound of a relaxation of about so many entries, and the rows of which its solution has a part."""
     if not cover.needed.any():
-        return 0
+        return 0, np.empty(0, np.int64)
     relaxation = CoverRelaxation(cover, entries)
     solution = relaxation.solution()
-    return 0 if solution is None else rounded_up(relaxation.proved(solution))
+    if solution is None:
+        return 0, np.empty(0, np.int64)
+    return rounded_up(relaxation.proved(solution)), np.flatnonzero(solution.values[: cover.rows] > CHOSEN)

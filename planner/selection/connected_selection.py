@@ -142,14 +142,20 @@ class ConnectedCover:
 
 
 def connected(
-    task: ConnectedCover, search: Search, *, rounds: int, patience: int | None = None
+    task: ConnectedCover,
+    search: Search,
+    *,
+    rounds: int,
+    patience: int | None = None,
+    known: tuple[IntArray, int] | None = None,
 ) -> tuple[IntArray, int]:
     """Rows that meet every demand and are connected as far as links allow, and a lower bound.
 
-    It ends after so many rounds, or before, once `patience` of them brought no better rows.
+    It begins at `known` rows and their bound, and ends after so many rounds, or before, once `patience` of
+    them brought no better rows.
     """
-    best = _by_greedy(task)
-    bound, conditions, waited = 0, Conditions(task.cover.rows), 0
+    best, bound = (_by_greedy(task), 0) if known is None else known
+    conditions, waited = Conditions(task.cover.rows), 0
     for _ in range(rounds):
         rows, at_least = search(task.problem, best, conditions)
         bound = max(bound, at_least)

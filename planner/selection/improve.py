@@ -13,6 +13,7 @@ import numpy as np
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.districts import improved_by_districts
+from stopgo.planner.selection.greedy import greedy
 from stopgo.planner.selection.swap_search import TENURE, repaired
 
 SWAPS = 400
@@ -55,6 +56,12 @@ def improved(
             at_least=at_least, settled=set() if settled is None else settled,
         )  # fmt: skip
     return _improved(cover, chosen, at_least, min(swaps, most_swaps(cover, len(chosen))))
+
+
+def found_among(cover: Cover, likely: IntArray, *, at_least: int) -> IntArray | None:
+    """A selection of some rows alone; None if they do not meet every demand."""
+    among = cover.offering(likely)
+    return None if (among.needed < cover.needed).any() else improved(among, greedy(among), at_least=at_least)
 
 
 def most_swaps(cover: Cover, many: int) -> int:

@@ -22,12 +22,10 @@ LEVELS = 20
 """Sets of columns that are tried for each demand: those seen least, up to so many levels of a full view."""
 SEEN = 1.0 + 1e-6
 """Views, as a fraction of those needed, above which a column is seen more than enough."""
-CHOSEN = 1e-9
+CHOSEN = 1e-6
 """Fraction above which a row is chosen in part."""
 VIOLATED = 1e-3
 """Part of an inequality that a solution must leave unmet."""
-
-
 ROUNDS = 10
 """Most rounds in which a programme is solved again with more inequalities."""
 LEAST_GAIN = 0.05

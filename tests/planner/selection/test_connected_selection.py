@@ -11,10 +11,11 @@ from scipy.sparse import csr_array
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.settings import Settings
 from stopgo.planner.selection import EXACT_ROUNDS, ROUNDS, Searches
-from stopgo.planner.selection.bound import lower_bound
+from stopgo.planner.selection.bound import likely_rows, lower_bound
 from stopgo.planner.selection.component_kernel import label_components
 from stopgo.planner.selection.connected_selection import ConnectedCover, connected
 from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.improve import found_among
 from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size
 from tests.planner.checks import meets
@@ -71,6 +72,25 @@ def test_the_default_search_finds_the_fewest_connected_rows_where_a_component_se
     assert meets(task.cover, rows)
     assert not task.parts(rows)
     assert len(rows) == fewest(task)
+
+
+def test_a_search_from_the_rows_of_a_relaxation_finds_fewer_or_keeps_what_is_known() -> None:
+    for seed in range(12):
+        task = task_of(seed, rows=30, columns=60, near=0.35)
+        rows, least = connected(task, Searches.default(task), rounds=ROUNDS)
+        search = Searches.default(task, likely=likely_rows(task.problem))
+        found, bound = connected(task, search, rounds=ROUNDS, known=(np.concatenate(task.regions), least))
+        assert meets(task.cover, found)
+        assert not task.parts(found)
+        assert least <= bound <= len(found) <= len(rows) + 1
+        same, _ = connected(task, lambda _, start, __: (start, 0), rounds=1, known=(rows, least))
+        assert same.tolist() == rows.tolist()
+
+
+def test_rows_that_do_not_see_enough_are_no_selection() -> None:
+    cover = task_of(1).cover
+    assert found_among(cover, np.empty(0, np.int64), at_least=0) is None
+    assert found_among(cover, np.arange(cover.rows), at_least=0) is not None
 
 
 def test_two_rooms_take_the_row_between_them() -> None:

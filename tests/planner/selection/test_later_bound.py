@@ -69,6 +69,7 @@ def test_a_plan_has_its_bound_in_the_end(monkeypatch: pytest.MonkeyPatch, many: 
     monkeypatch.setattr(pipeline, "MANY", many)
     monkeypatch.setattr(side_work, "can_fork", lambda: True)
     monkeypatch.setattr("stopgo.planner.selection.early_bound", lambda *_, **__: 0)
+    monkeypatch.setattr("stopgo.planner.selection.relaxation_bound", lambda _: 0)
     seen: list[Any] = []
     made = pipeline.plan(two_rooms(0.9), Settings(refine=False), observe=seen.append)
     assert made.selection.bound > 0
