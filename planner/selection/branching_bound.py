@@ -63,12 +63,13 @@ class _Tree:
         self.nodes += 2
         fewer = self._with(-rows, -math.floor(number), value)
         if rounded_up(fewer) < self.found:
-            return max(value, fewer)
+            return value
         return max(value, min(fewer, self._with(rows, math.ceil(number), value)))
 
     def _is_promising(self, gain: float, value: float) -> bool:
         """True if branches that gain as much as the last one did may reach the end before the last node."""
-        return (self.found - 1 - value) <= gain * math.log2(max(1, NODES - self.nodes))
+        left = NODES - self.nodes
+        return left > 1 and self.found - 1 - value <= gain * math.log2(left)
 
     def _branched(self, solution: Solution) -> tuple[FloatArray, float] | None:
         """The set whose rows are farthest from a whole number (rows,), and their number; None if all are."""
