@@ -205,9 +205,10 @@ def time_lines(route: Route, whose: str = "") -> list[str]:
         return []
     before = f"{duration(time.two_step_s)} with {time.two_step_stops} stops"
     saved = f"{duration(time.saved_s)} less than" if time.saved_s >= 0.5 else "not less than"
+    less = "less by shortest paths" if route.settings.graph == "exact" else "less"
     return [
         f"  least time  {whose}{duration(time.seconds)}, {saved} by fewest stops first ({before}); "
-        f"no plan over these candidates takes less than {duration(math.floor(time.bound))}"
+        f"no plan over these candidates takes {less} than {duration(math.floor(time.bound))}"
     ]
 
 

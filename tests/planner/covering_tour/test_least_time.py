@@ -395,6 +395,18 @@ def test_no_mission_on_a_grid_takes_less_than_the_bound(world: str, more: dict[s
     assert 0.5 * seconds_of(driven) < least_time(asked) <= seconds_of(driven)
 
 
+def test_a_longer_way_on_a_grid_may_take_less_than_the_bound_by_shortest_paths() -> None:
+    """It has fewer bends; the bound on a grid is that of any path."""
+    ways = {**SLOW, "range": 3.3, "grid": 2.36, "coverage": 0.99, "start": (1.12, 1.17, 40.0), "speed": 0.2}
+    floor = two_rooms(1.0, at=1.9)
+    found = [
+        planned(floor, Settings(**{**BASIS, **ways, "graph": graph}))[1][Route] for graph in ("exact", "grid")
+    ]
+    shortest, on_grid = (least_time_route(route).time for route in found)
+    assert shortest is not None and on_grid is not None
+    assert on_grid.bound <= on_grid.seconds < shortest.bound <= shortest.seconds
+
+
 def test_on_a_grid_the_bound_over_very_many_candidates_is_that_of_the_stops(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

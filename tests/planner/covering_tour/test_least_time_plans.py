@@ -73,7 +73,9 @@ def test_a_person_reads_both_numbers() -> None:
     found = made(minimise="time").route
     assert found.time is not None
     (line,) = time_lines(found)
-    assert "no plan over these candidates takes less than" in line
+    assert "no plan over these candidates takes less by shortest paths than" in line
+    (on_a_grid,) = time_lines(made(minimise="time", graph="grid").route)
+    assert "no plan over these candidates takes less than" in on_a_grid  # by any paths
     assert PlanResults.of({Route: found}).properties["two_step_s"] == round(found.time.two_step_s, 1)
 
 
