@@ -191,6 +191,7 @@ def time_table(route: Route) -> dict[str, Any]:
             "total_s": time.seconds,
             "bound_s": time.bound,
             "bound_over": "these candidates",
+            "bound_paths": "shortest" if _is_by_shortest_paths(route) else "any",
             "two_step_s": time.two_step_s,
             "two_step_stops": time.two_step_stops,
             "saved_s": time.saved_s,
@@ -205,11 +206,16 @@ def time_lines(route: Route, whose: str = "") -> list[str]:
         return []
     before = f"{duration(time.two_step_s)} with {time.two_step_stops} stops"
     saved = f"{duration(time.saved_s)} less than" if time.saved_s >= 0.5 else "not less than"
-    less = "less by shortest paths" if route.settings.graph == "exact" else "less"
+    less = "less by shortest paths" if _is_by_shortest_paths(route) else "less"
     return [
         f"  least time  {whose}{duration(time.seconds)}, {saved} by fewest stops first ({before}); "
         f"no plan over these candidates takes {less} than {duration(math.floor(time.bound))}"
     ]
+
+
+def _is_by_shortest_paths(route: Route) -> bool:
+    """True if the lower bound of the time holds for shortest paths only, not for straight lines too."""
+    return route.settings.graph == "exact"
 
 
 def quality_table(figures: Figures) -> dict[str, Any]:

@@ -68,13 +68,16 @@ def test_a_plan_for_the_least_time_passes_its_check(
 
 
 def test_a_person_reads_both_numbers() -> None:
-    from stopgo.planner.commands.plan_report import time_lines
+    from stopgo.planner.commands.plan_report import time_lines, time_table
 
     found = made(minimise="time").route
     assert found.time is not None
     (line,) = time_lines(found)
     assert "no plan over these candidates takes less by shortest paths than" in line
-    (on_a_grid,) = time_lines(made(minimise="time", graph="grid").route)
+    on_grid = made(minimise="time", graph="grid").route
+    (on_a_grid,) = time_lines(on_grid)
+    paths = [time_table(route)["least_time"]["bound_paths"] for route in (found, on_grid)]
+    assert paths == ["shortest", "any"]
     assert "no plan over these candidates takes less than" in on_a_grid  # by any paths
     assert PlanResults.of({Route: found}).properties["two_step_s"] == round(found.time.two_step_s, 1)
 
