@@ -33,11 +33,11 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/pyrefly check
 
-# Most tests of links wait for something, so six files at a time are run even on two processors (tests/workers.py), in
+# Most tests of links wait for something, so eight files at a time are run even on two processors (tests/workers.py), in
 # the order that tests/conftest.py deals them out. pyrefly checks types beside them and speaks last.
 test: lint
 	@$(BIN)/pyrefly check -j 1 >$(VENV)/types.txt 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -p tests.workers --workers 6; tests=$$?; \
+	$(BIN)/python -m pytest -p tests.workers --workers 8; tests=$$?; \
 	wait $$types; typed=$$?; cat $(VENV)/types.txt; \
 	[ $$tests -eq 0 ] && [ $$typed -eq 0 ]
 

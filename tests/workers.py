@@ -1,6 +1,6 @@
 """Runs test files in several processes that are copies of one, which alone imports and collects everything.
 
-``pytest -p tests.workers --workers 6``. Started anew, each process would import all libraries and collect all
+``pytest -p tests.workers --workers 8``. Started anew, each process would import all libraries and collect all
 tests again: ten seconds of a processor for each. Every worker takes one file after another from one queue.
 
 A copy has no threads but its own. Rerun asks its viewers and servers in threads that begin at its import: the
