@@ -18,7 +18,7 @@ LARGEST = 400_000
 COARSE = 30_000
 """Entries of a coarse relaxation, about."""
 FINE = 100_000
-"""Entries of a relaxation, about: with more the bound is hardly better, and takes many times as long."""
+"""Entries of a relaxation, about: with more the bound is hardly better, and takes up to 4 times as long."""
 FEW = 30
 """Most rows of a selection that a bound often proves the fewest."""
 FIRST_STEPS = 100
@@ -100,7 +100,7 @@ def coarse_bound(cover: Cover) -> int:
     """Rounded-up bound at the prices of a relaxation in which neighbouring columns are one.
 
     A group may be seen in part, and its columns have prices by their weight. By weak duality these too
-    prove a bound of the whole problem. It is a little weaker than the relaxation's, at a tenth of the time.
+    prove a bound of the whole problem. It is a little weaker than the relaxation's, at about half the time.
     """
     return _coarse(cover)[0]
 

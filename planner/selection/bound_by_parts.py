@@ -2,10 +2,10 @@
 
 A linear programme of a whole floor takes time that grows with almost the square of its size. Prices that
 are already good are improved part by part instead, while all others stay: a dual block ascent. Each part
-is one programme, with what the other prices leave of each row's cost, and after one pass over overlapping
-parts the bound is within 0.2 % of the whole programme's. Two parts that have little in common are solved at
-a time, from the same prices, so that the solver uses two cores. The bound is computed from the prices
-alone, so it needs no trust in the solver.
+is one programme, with what the other prices leave of each row's cost. After one pass over overlapping parts
+the bound of 7 573 m² is within 0.7 % of the whole programme's. Two parts that have little in
+common are solved at a time, from the same prices, so that the solver uses two cores. The bound is computed
+from the prices alone, so it needs no trust in the solver.
 """
 
 from __future__ import annotations
