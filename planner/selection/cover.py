@@ -319,8 +319,8 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
 
 
 def _pattern(matrix: csr_array) -> csr_array:
-    """1 where the matrix has an entry, even of 0."""
-    ones = np.ones(len(matrix.indices), dtype=np.int64)
+    """True where the matrix has an entry, even of 0."""
+    ones = np.ones(len(matrix.indices), dtype=bool)
     return csr_array((ones, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
