@@ -241,7 +241,7 @@ def cover_of(visibility: Visibility, demands: Demands) -> Cover:
 
 
 class _Runs:
-    """What each row sees, as runs of *stretches*: units between which no run of any row begins or ends."""
+    """Runs of *stretches* that rows see: units between which no run of any row begins or ends."""
 
     def __init__(self, visibility: Visibility) -> None:
         begins = np.zeros(visibility.targets.total + 1, dtype=bool)
@@ -267,7 +267,7 @@ class _Runs:
         pointer = np.concatenate([[0], np.cumsum(np.bincount(self.row, many, self._rows))]).astype(np.int64)
         blocks = np.searchsorted(np.cumsum(many), np.arange(0, pointer[-1], BLOCK), side="left").tolist()
         parts = [
-            ranges(begin[low:high], many[low:high]).astype(np.int32)
+            ranges(begin[low:high].astype(np.int64), many[low:high]).astype(np.int32)
             for low, high in pairwise(np.unique([0, *blocks, len(many)]).tolist())
         ]
         to = np.concatenate([np.empty(0, np.int32), *parts])
