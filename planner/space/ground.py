@@ -83,9 +83,7 @@ class Ground:
         return Walls(np.concatenate([solid, edges]), clearance)
 
 
-def drivable(
-    ground: Ground, settings: Settings, *, forked: bool = False
-) -> tuple[BaseGeometry, FloatArray]:
+def drivable(ground: Ground, settings: Settings, *, forked: bool = False) -> tuple[BaseGeometry, FloatArray]:
     """Return the drive area of the robot's centre, and the exact crossings of gaps just wide enough.
 
     If `forked`, another process looks for the gaps.
