@@ -92,10 +92,13 @@ def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool
         must_be_writable(path)
     with _print_findings_on_error(read):
         made = plan(read, settings, observe=writing.watch.observe, all_parts=all_parts)
+    from stopgo.mission.files.plan_svg import FloorsOnPaper
+
     bodies = standing_bodies(floor, options_of(settings))
-    floors = _floors_on_paper(made)
+    common = None if made.divided is None else FloorsOnPaper(several=True)
     reports = [
-        _write_part(made, number, folder, writing, bodies, floors) for number in range(len(made.parts))
+        _write_part(made, number, folder, writing, bodies, common or FloorsOnPaper(several=False))
+        for number in range(len(made.parts))
     ]
     _set_aside_old(folder, len(reports), read, settings)
     if made.divided is None:
@@ -147,7 +150,7 @@ def _write_part(
     folder: Path,
     writing: _Writing,
     bodies: Sequence[StandingBody],
-    floors: FloorsOnPaper | None,
+    floors: FloorsOnPaper,
 ) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
     from stopgo.planner.checking.model_clearance import too_near
@@ -181,13 +184,6 @@ def _write_part(
     watch.lap("files")
     near = tuple(too_near(part.mission, bodies, plan.settings))
     return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near, surface=contents.surface)
-
-
-def _floors_on_paper(plan: Plan) -> FloorsOnPaper | None:
-    """Drawings that the sheets of a divided plan's missions have in common."""
-    from stopgo.mission.files.plan_svg import FloorsOnPaper
-
-    return None if plan.divided is None else FloorsOnPaper()
 
 
 def _today() -> str:
@@ -246,7 +242,7 @@ class _PartContents:
     plan: Plan
     options: PrintOptions
     date: str
-    floors: FloorsOnPaper | None
+    floors: FloorsOnPaper
     surface: SeenSurface | None = None
 
     def made(self, files: Mapping[str, Path], *, forked: bool) -> dict[str, bytes]:
@@ -300,6 +296,7 @@ class _PartContents:
             self.plan.shared,
             date=self.date,
             with_range=self.options.rings,
+            floors=self.floors,
         )
 
     def mission(self) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 
@@ -37,6 +37,7 @@ def plan_svg(
     *,
     date: str,
     with_range: bool = False,
+    floors: FloorsOnPaper | None = None,
 ) -> bytes:
     """Return the plan as SVG, with a table of its figures if they are given.
 
@@ -44,9 +45,10 @@ def plan_svg(
 
     `date` is printed in the title block as given, so equal inputs give equal bytes.
 
-    `with_range` adds a faint ring of the scanner's range about each stop.
+    `with_range` adds a faint ring of the scanner's range about each stop. What other drawings have in common
+    with it is kept in `floors`.
     """
-    content, sheet = overview(made, mission, figures, shared, date=date, with_range=with_range)
+    content, sheet = overview(made, mission, figures, shared, date=date, with_range=with_range, floors=floors)
     return _document(sheet, mission, content)
 
 
@@ -115,6 +117,8 @@ class FloorOnPaper:
 
     space: NavigableSpace
     sheet: PaperSheet
+    drawn: dict[tuple[object, ...], tuple[str, ...]] = field(default_factory=dict)
+    """Whole drawings on it, by what they show."""
 
     @cached_property
     def building(self) -> tuple[str, ...]:
@@ -138,14 +142,18 @@ class FloorOnPaper:
 
 
 class FloorsOnPaper:
-    """Drawings of one floor that several missions have in common: one for each map to paper."""
+    """Drawings of one floor that are made once for each map to paper.
 
-    def __init__(self) -> None:
-        self._drawn: dict[PaperMap, FloorOnPaper] = {}
+    Of several missions it is the floor and its names; of one mission it is the whole drawing.
+    """
+
+    def __init__(self, *, several: bool) -> None:
+        self.several = several
+        self._floors: dict[PaperMap, FloorOnPaper] = {}
 
     def on(self, space: NavigableSpace, sheet: PaperSheet) -> FloorOnPaper:
         """Return the drawing of the space on a sheet."""
-        return self._drawn.setdefault(sheet.map, FloorOnPaper(space, sheet))
+        return self._floors.setdefault(sheet.map, FloorOnPaper(space, sheet))
 
 
 def drawing_of(
@@ -160,12 +168,30 @@ def drawing_of(
 ) -> tuple[str, ...]:
     """Return everything to scale, from the floor up to the numbers; the names of `rooms`, else of all.
 
-    What other missions' drawings have in common is in `floors`, if it is given.
+    What other drawings have in common with it is in `floors`, if it is given.
     """
-    missions = shared or (mission,)
-    named = made.floor.rooms if rooms is None else rooms
     floor = FloorOnPaper(made.space, sheet) if floors is None else floors.on(made.space, sheet)
-    avoid, known = _busy(missions, sheet, floor.walls), floor.labels if floors else None
+    if floors is None or floors.several or rooms is not None:
+        known = floor.labels if floors and floors.several else None
+        return _drawn(made, mission, floor, shared, with_range=with_range, rooms=rooms, known=known)
+    shows = (with_range, *(item.digest for item in shared or (mission,)))
+    if shows not in floor.drawn:
+        floor.drawn[shows] = _drawn(made, mission, floor, shared, with_range=with_range)
+    return floor.drawn[shows]
+
+
+def _drawn(
+    made: Route,
+    mission: Mission,
+    floor: FloorOnPaper,
+    shared: Sequence[Mission],
+    *,
+    with_range: bool,
+    rooms: Sequence[Room] | None = None,
+    known: KnownLabels | None = None,
+) -> tuple[str, ...]:
+    missions, sheet = shared or (mission,), floor.sheet
+    named, avoid = made.floor.rooms if rooms is None else rooms, _busy(missions, sheet, floor.walls)
     parts = chain(
         floor.building,
         targets(made.selection, sheet),

@@ -6,7 +6,7 @@ only the rings around the box. Its result is the same as that of a cut of the wh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import floor
 
 import numpy as np
@@ -80,15 +80,33 @@ def triangles_of(shape: BaseGeometry) -> NDArray[np.object_]:
 
 def areas_within(cells: NDArray[np.object_], shape: BaseGeometry) -> FloatArray:
     """Area of the part of each small shape (n,) that lies in a large one."""
+    sizes = np.zeros(len(cells))
+    for group, piece in _pieces_around(cells, shape):
+        sizes[group] = _areas_within(cells[group], piece)
+    return sizes
+
+
+def parts_within(cells: NDArray[np.object_], shape: BaseGeometry) -> NDArray[np.object_]:
+    """The part of each small shape (n,) that lies in a large one."""
+    parts = np.full(len(cells), shapely.MultiPolygon(), dtype=object)
+    for group, piece in _pieces_around(cells, shape):
+        parts[group] = shapely.intersection(cells[group], piece)
+    return parts
+
+
+def _pieces_around(
+    cells: NDArray[np.object_], shape: BaseGeometry
+) -> Iterator[tuple[IntArray, BaseGeometry]]:
+    """Indices of shapes that lie near one another, and the piece of a large shape round them."""
     if not len(cells) or shapely.get_num_coordinates(shape) <= FEW:
-        return _areas_within(cells, shape)
-    sizes, index, bounds = np.zeros(len(cells)), RingIndex(shape), shapely.bounds(cells)
+        yield np.arange(len(cells)), shape
+        return
+    index, bounds = RingIndex(shape), shapely.bounds(cells)
     _, tile = np.unique(np.floor(bounds[:, :2] / TILE), axis=0, return_inverse=True)
     order = np.argsort(tile.reshape(-1), kind="stable")
     for group in np.split(order, np.cumsum(np.bincount(tile.reshape(-1)))[:-1]):
         low, high = bounds[group, :2].min(axis=0), bounds[group, 2:].max(axis=0)
-        sizes[group] = _areas_within(cells[group], index.within((*low.tolist(), *high.tolist())))
-    return sizes
+        yield group, index.within((*low.tolist(), *high.tolist()))
 
 
 def _areas_within(cells: NDArray[np.object_], shape: BaseGeometry) -> FloatArray:

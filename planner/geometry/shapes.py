@@ -19,6 +19,7 @@ from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray, Polygon, bounds, frozen
 from stopgo.planner.geometry.instance_cache import instance_cached
+from stopgo.planner.geometry.near_shapes import labels_of
 
 GRID = 1e-5
 """Metres per grid step."""
@@ -30,6 +31,10 @@ HAIRLINE = 4e-7
 """Thickness in metres that an obstacle drawn as a single line gets, so that it has an inside."""
 LARGEST = 5000.0
 """Greatest extent of a floor in metres; with the elements around it, it stays within FARTHEST_STEPS."""
+FEW = 5_000
+"""Vertices up to which shapes are united all at once; more take half the time where they lie apart."""
+APART = 4.0
+"""Grid steps from which on two shapes do not change each other's rounding, with room to spare."""
 SETTLING = 20
 """Maximum number of rounding passes until an outline no longer changes; two or three are enough."""
 FARTHEST_STEPS = 2**29
@@ -89,7 +94,7 @@ def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
     if len(found) == 1 and found[0].geom_type == "Polygon" and found[0].is_valid:
         return shapely.normalize(shapely.remove_repeated_points(found[0]))
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
-    whole = shapely.union_all(ordered)
+    whole = _united(ordered, within=APART * GRID)
     if len(found) > 1 and not _has_corners(whole, shapely.get_coordinates(found)):
         whole = shapely.union_all(ordered, grid_size=SLACK / 100)
     return shapely.normalize(whole)
@@ -158,8 +163,18 @@ def union_of_snapped(shapes: NDArray[np.object_]) -> BaseGeometry:
     """The same, of shapes that are each `snapped` already."""
     found = _in_steps(shapes)
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
-    whole = np.array([shapely.union_all(ordered, grid_size=1.0)], dtype=object)
+    whole = np.array([_united(ordered, within=APART, grid_size=1.0)], dtype=object)
     return shapely.normalize(_in_metres(_settled(whole))[0])
+
+
+def _united(shapes: NDArray[np.object_], *, within: float, grid_size: float | None = None) -> BaseGeometry:
+    """The union of polygonal shapes; of many, those farther apart than `within` are united by themselves."""
+    if shapely.get_num_coordinates(shapes).sum() <= FEW:
+        return shapely.union_all(shapes, grid_size=grid_size)
+    group = labels_of(shapes.tolist(), within=within)
+    groups = np.split(shapes[np.argsort(group, kind="stable")], np.cumsum(np.bincount(group))[:-1])
+    parts = [part for some in groups for part in polygon_parts(shapely.union_all(some, grid_size=grid_size))]
+    return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
 
 
 def _in_steps(shapes: NDArray[np.object_]) -> NDArray[np.object_]:

@@ -22,6 +22,8 @@ CHUNK = 256
 """Points whose distances to all nodes are in memory at a time."""
 MANY = 20_000_000
 """Pieces in all searches together from which on two processes search."""
+FEW = 3
+"""Paths from a point that are searched one by one; a route has two at each point."""
 MOST_KEPT = 32_000_000
 """Nodes of all the trees of paths that are kept, 128 MB."""
 
@@ -38,29 +40,39 @@ class Paths:
     """(nodes, nodes): lengths of the straight pieces."""
     limit: float = np.inf
     """Metres beyond which paths were not searched."""
-    _trees: dict[int, IntArray | None] = field(default_factory=dict)
-    """By point: the node before each node (nodes,), once a second path from the point was asked for."""
+    _trees: dict[int, IntArray] = field(default_factory=dict)
+    """By point: the node before each node (nodes,), if it is kept."""
+    _asked: dict[int, int] = field(default_factory=dict)
+    """By point: how many paths were searched from it, one by one."""
 
     def path(self, start: int, end: int) -> FloatArray:
         """The polyline (n, 2) from one point to another, both included."""
-        before = self._tree(start, end)
-        nodes = [end]
-        while nodes[-1] != start:
-            if before[nodes[-1]] < 0:
-                raise ValueError(f"no path from point {start} to point {end}")
-            nodes.append(int(before[nodes[-1]]))
-        return straightened(self.xy[nodes[::-1]])
+        tree = self._tree(start)
+        nodes = self._nodes_between(start, end) if tree is None else _followed(tree, start, end)
+        return straightened(self.xy[nodes])
 
-    def _tree(self, start: int, end: int) -> IntArray:
-        """The node before each node on its shortest path from `start` (nodes,), or only to `end`."""
+    def _tree(self, start: int) -> IntArray | None:
+        """The node before each node on its shortest path from `start` (nodes,), if many paths begin there."""
         kept = self._trees.get(start)
-        if kept is not None:
-            return kept
-        again = start in self._trees and len(self.xy) * len(self._trees) <= MOST_KEPT
-        limit = np.inf if again else float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
-        found: IntArray = dijkstra(self._both_ways, True, start, return_predecessors=True, limit=limit)[1]
-        self._trees[start] = found if again else None
-        return found
+        if kept is None:
+            self._asked[start] = self._asked.get(start, 0) + 1
+            if self._asked[start] > FEW and len(self.xy) * (len(self._trees) + 1) <= MOST_KEPT:
+                kept = dijkstra(self._both_ways, True, start, return_predecessors=True)[1]
+                self._trees[start] = kept
+        return kept
+
+    def _nodes_between(self, start: int, end: int) -> IntArray:
+        """The nodes on the shortest path between two points.
+
+        None of them is farther from both points together than the path is long.
+        """
+        longest = float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
+        away = (np.hypot(*(self.xy - self.xy[point]).T) for point in (start, end))
+        near = np.flatnonzero(sum(away) <= longest)
+        own = self._both_ways[near][:, near]
+        first, last = np.searchsorted(near, (start, end)).tolist()
+        before = dijkstra(own, True, first, return_predecessors=True, limit=longest)[1]
+        return near[_followed(before, first, last)]
 
     @cached_property
     def _both_ways(self) -> csr_array:
@@ -85,6 +97,16 @@ class Paths:
         return np.array(kept)
 
     way = path  # its name in 0.1; ends with 0.3
+
+
+def _followed(before: IntArray, start: int, end: int) -> list[int]:
+    """The nodes from one to another, by the node before each."""
+    nodes = [end]
+    while nodes[-1] != start:
+        if before[nodes[-1]] < 0:
+            raise ValueError(f"no path from point {start} to point {end}")
+        nodes.append(int(before[nodes[-1]]))
+    return nodes[::-1]
 
 
 def straightened(line: FloatArray) -> FloatArray:

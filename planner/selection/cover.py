@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from hashlib import blake2b
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack, vstack
 
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.index_ranges import ranges
@@ -233,31 +232,70 @@ class Cover:
 
 def cover_of(visibility: Visibility, demands: Demands) -> Cover:
     """Merge equal columns without loss: first units between ends of runs, then equal sets of rows."""
-    stretch_first = _first_of_stretches(visibility)
-    sees = _stretch_matrix(visibility, stretch_first)
-    group = _alike(sees, demands.weight, stretch_first)
-    seen = group >= 0
-    _, first = np.unique(group[seen], return_index=True)
-    merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
-    del sees
-    worth = _worth(demands, np.repeat(group, np.diff(np.append(stretch_first, len(demands.weight)))))
+    runs = _Runs(visibility)
+    weighs = np.add.reduceat(demands.weight, runs.stretch_first) > 0
+    group, first = _alike(runs, visibility.rows, weighs)
+    worth = _worth(demands, np.repeat(group, np.diff(np.append(runs.stretch_first, len(demands.weight)))))
     needed = demands.needed(np.asarray(worth.sum(axis=1)).ravel())
-    return Cover(merged, worth, needed, visibility.asked[stretch_first[seen][first]])
+    return Cover(runs.matrix(first), worth, needed, visibility.asked[runs.stretch_first[first]])
 
 
-def _alike(sees: csr_array, weight: IntArray, stretch_first: IntArray) -> IntArray:
-    """Group of each stretch by the rows that see it; -1 where no row does, or where it has no weight.
+class _Runs:
+    """Runs of *stretches* that rows see: units between which no run of any row begins or ends."""
 
-    Long lists of rows are compared by digests, which take no memory to speak of.
+    def __init__(self, visibility: Visibility) -> None:
+        begins = np.zeros(visibility.targets.total + 1, dtype=bool)
+        begins[0] = True
+        begins[visibility.first] = True
+        begins[visibility.last + 1] = True
+        self.stretch_first = np.flatnonzero(begins[:-1])
+        """First unit of each stretch (stretches,)."""
+        stretch = np.cumsum(begins, dtype=np.int32) - 1
+        parts: list[list[NDArray[np.int32]]] = [[], [], []]
+        for row, _, first, last in visibility.runs_apart_by_rows():
+            found = (row.astype(np.int32), stretch[first], stretch[last + 1])
+            for part, array in zip(parts, found, strict=True):
+                part.append(array)
+        self.row, self.begin, self.end = (np.concatenate([np.empty(0, np.int32), *part]) for part in parts)
+        """Of each run, by row and then by stretch: its row, its first stretch and the one after its last."""
+        self._rows = visibility.rows
+
+    def matrix(self, columns: IntArray) -> csr_array:
+        """1 where the row sees the stretch (rows, columns), of these stretches, ascending."""
+        before = np.searchsorted(columns, np.arange(len(self.stretch_first) + 1)).astype(np.int32)
+        begin, many = before[self.begin], before[self.end] - before[self.begin]
+        pointer = np.concatenate([[0], np.cumsum(np.bincount(self.row, many, self._rows))]).astype(np.int64)
+        blocks = np.searchsorted(np.cumsum(many), np.arange(0, pointer[-1], BLOCK), side="left").tolist()
+        parts = [
+            ranges(begin[low:high].astype(np.int64), many[low:high]).astype(np.int32)
+            for low, high in pairwise(np.unique([0, *blocks, len(many)]).tolist())
+        ]
+        to = np.concatenate([np.empty(0, np.int32), *parts])
+        small = pointer.astype(np.int32) if pointer[-1] < np.iinfo(np.int32).max else pointer
+        return csr_array((np.ones(len(to), dtype=np.int8), to, small), shape=(self._rows, len(columns)))
+
+
+def _alike(runs: _Runs, rows: int, weighs: BoolArray) -> tuple[IntArray, IntArray]:
+    """Group of each stretch by the rows that see it, and the first stretch of each group, ascending.
+
+    The group is -1 where no row sees the stretch, or where it does not weigh. Sets of rows are compared by
+    the sums of two random numbers of each row, which take no memory to speak of.
     """
-    by_column = _sorted(sees.T)
-    counts = np.add.reduceat(weight, stretch_first) > 0
-    groups: dict[bytes, int] = {}
-    group = np.full(by_column.shape[0], -1, dtype=np.int64)
-    for column in np.flatnonzero(counts & (np.diff(by_column.indptr) > 0)):
-        rows = by_column.indices[by_column.indptr[column] : by_column.indptr[column + 1]]
-        group[column] = groups.setdefault(blake2b(rows, digest_size=32).digest(), len(groups))
-    return group
+    many = len(weighs)
+    seen = np.cumsum(np.bincount(runs.begin, minlength=many + 1) - np.bincount(runs.end, minlength=many + 1))
+    sums = np.zeros((2, many + 1), dtype=np.uint64)
+    numbers = np.random.default_rng(0).integers(0, 2**64, (2, rows), dtype=np.uint64)
+    for sum_, number in zip(sums, numbers, strict=True):
+        np.add.at(sum_, runs.begin, number[runs.row])
+        np.subtract.at(sum_, runs.end, number[runs.row])
+        np.cumsum(sum_, out=sum_)
+    asked = np.flatnonzero((seen[:-1] > 0) & weighs)
+    _, first, which = np.unique(sums[:, asked].T, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.argsort(order)
+    group = np.full(many, -1, dtype=np.int64)
+    group[asked] = rank[which.reshape(-1)]
+    return group, asked[first[order]]
 
 
 def _worth(demands: Demands, column: IntArray) -> csr_array:
@@ -281,43 +319,12 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
 
 
 def _pattern(matrix: csr_array) -> csr_array:
-    """1 where the matrix has an entry, even of 0."""
-    ones = np.ones(len(matrix.indices), dtype=np.int64)
+    """True where the matrix has an entry, even of 0."""
+    ones = np.ones(len(matrix.indices), dtype=bool)
     return csr_array((ones, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _sorted(matrix: csr_array) -> csr_array:
     matrix = matrix.tocsr()
     matrix.sort_indices()
-    return matrix
-
-
-def _first_of_stretches(visibility: Visibility) -> IntArray:
-    """First unit of each stretch within which no run begins or ends."""
-    begins = np.zeros(visibility.targets.total + 1, dtype=bool)
-    begins[0] = True
-    begins[visibility.first] = True
-    begins[visibility.last + 1] = True
-    return np.flatnonzero(begins[:-1])
-
-
-def _stretch_matrix(visibility: Visibility, stretch_first: IntArray) -> csr_array:
-    """1 where the row sees the stretch (rows, stretches); its indices have 32 bits, as it has many."""
-    blocks = np.searchsorted(visibility.pointer[:-1], np.arange(0, len(visibility.first), BLOCK))
-    rows = np.unique([0, *blocks.tolist(), visibility.rows]).tolist()
-    parts = [_stretches_of(visibility, stretch_first, *some) for some in pairwise(rows)]
-    return csr_array(vstack([csr_array((0, len(stretch_first)), dtype=np.int8), *parts], format="csr"))
-
-
-def _stretches_of(visibility: Visibility, stretch_first: IntArray, low: int, high: int) -> csr_array:
-    """`_stretch_matrix` of the rows from `low` to below `high`."""
-    pointer = visibility.pointer[low : high + 1]
-    own = slice(int(pointer[0]), int(pointer[-1]))
-    begin = np.searchsorted(stretch_first, visibility.first[own])
-    end = np.searchsorted(stretch_first, visibility.last[own], side="right")
-    rows = np.repeat(np.repeat(np.arange(high - low, dtype=np.int32), np.diff(pointer)), end - begin)
-    columns = ranges(begin, end - begin).astype(np.int32)
-    shape = (high - low, len(stretch_first))
-    matrix = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=shape)
-    matrix.data[:] = 1
     return matrix

@@ -8,7 +8,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import RoomSpace
-from stopgo.planner.geometry.ring_index import RingIndex
+from stopgo.planner.geometry.ring_index import RingIndex, parts_within
 from stopgo.planner.geometry.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import threshold
@@ -27,15 +27,15 @@ def room_spaces(
         (k, floor.rooms[k].label, _without_inner(shape, shapes, k, inside)) for k, shape in enumerate(shapes)
     ]
     planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, outside))
-    allowed = RingIndex(stop_area)
+    allowed = parts_within(np.array([shape for *_, shape in planned], dtype=object), stop_area)
     return tuple(
         RoomSpace(
             room=index,
             name=name,
             area=to_polygons(shape, ground.origin),
-            stop_area=to_polygons(shape.intersection(allowed.around(shape.bounds)), ground.origin),
+            stop_area=to_polygons(part, ground.origin),
         )
-        for index, name, shape in planned
+        for (index, name, shape), part in zip(planned, allowed, strict=True)
     )
 
 

@@ -86,9 +86,21 @@ def test_what_the_sheets_of_missions_have_in_common_is_drawn_once(monkeypatch: p
     alone = [plan_pdf(route, item, FIGURES, date=DATE) for item in each]
     building = plan_svg.building
     monkeypatch.setattr(plan_svg, "building", lambda *given: drawn.append(given) or building(*given))
-    floors = plan_svg.FloorsOnPaper()
+    floors = plan_svg.FloorsOnPaper(several=True)
     assert [plan_pdf(route, item, FIGURES, date=DATE, floors=floors) for item in each] == alone
     assert len(drawn) == 2, "for the overview, and for the sheets"
+
+
+def test_a_drawing_of_one_mission_is_made_once_for_each_map_to_paper(monkeypatch: pytest.MonkeyPatch) -> None:
+    route, mission, drawn = room_route(), room_mission(), []
+    alone = plan_svg.overview(route, mission, date=DATE), plan_pdf(route, mission, FIGURES, date=DATE)
+    network = plan_svg.network
+    monkeypatch.setattr(plan_svg, "network", lambda *given: drawn.append(given) or network(*given))
+    floors = plan_svg.FloorsOnPaper(several=False)
+    for _ in range(2):
+        picture = plan_svg.overview(route, mission, date=DATE, floors=floors)
+        assert (picture, plan_pdf(route, mission, FIGURES, date=DATE, floors=floors)) == alone
+    assert len(drawn) == 4, "that of the sheets, with some of the names, is made each time"
 
 
 def test_neighbouring_sheets_share_a_strip() -> None:
