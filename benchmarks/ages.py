@@ -61,7 +61,7 @@ def _imported(begin: list[str]) -> set[str]:
     left = list(begin)
     while left:
         module = left.pop()
-        if module not in {*found, *LEFT_OUT} and _path(module) is not None:
+        if module not in found and module not in LEFT_OUT and _path(module) is not None:
             found.add(module)
             left += [module.rpartition(".")[0], *_names(module)]
     return found

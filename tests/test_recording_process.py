@@ -97,15 +97,16 @@ def test_results_that_recordings_share_are_sent_once(results: tuple[object, ...]
 
 @pytest.mark.parametrize("when", ["beside", "killed between", "here"])
 def test_recordings_that_share_results_are_as_each_alone(
-    process: RecordingProcess, results: tuple[object, ...], tmp_path: Path, when: str
+    request: pytest.FixtureRequest, results: tuple[object, ...], tmp_path: Path, when: str
 ) -> None:
     alone, shared = tmp_path / "alone.rrd", tmp_path / "shared.rrd"
     RecordingProcess().draw("same", results).write(alone)
-    sharing = RecordingProcess() if when == "here" else process
+    fixture = {"beside": "lasting", "killed between": "process"}.get(when)
+    sharing = request.getfixturevalue(fixture) if fixture else RecordingProcess()
     for recording_id, more in (("first", True), ("same", True), ("last", False), ("same", False)):
         drawing = sharing.draw(recording_id, results, more=more)
-        if when == "killed between" and recording_id == "same" and process._process is not None:
-            process._process.kill()
+        if when == "killed between" and recording_id == "same" and sharing._process is not None:
+            sharing._process.kill()
         drawing.write(shared)
         assert check(shared).recording_id == recording_id
         assert recording_id != "same" or check(shared) == check(alone)
@@ -222,25 +223,25 @@ FORKED = """
 import pickle, sys
 from pathlib import Path
 from stopgo.recording_process import recording_process
-with recording_process() as process:
-    process.start()
-    assert type(process._process).__name__ == "_Fork"
-    drawing = process.draw("same", pickle.load(sys.stdin.buffer))
-    if sys.argv[2] == "killed":
-        process._process.kill()
-    drawing.write(Path(sys.argv[1]))
-    print(process.is_running)
+results = pickle.load(sys.stdin.buffer)
+for path in sys.argv[1:]:
+    with recording_process() as process:
+        process.start()
+        assert type(process._process).__name__ == "_Fork"
+        drawing = process.draw("same", results)
+        if "killed" in path:
+            process._process.kill()
+        drawing.write(Path(path))
+        print(process.is_running)
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="no process is forked here")
-@pytest.mark.parametrize("end", ["killed", "asked for nothing more"])
-def test_a_fork_writes_what_would_be_written_here(
-    results: tuple[object, ...], tmp_path: Path, end: str
-) -> None:
-    here, there = tmp_path / "here.rrd", tmp_path / "there.rrd"
+def test_a_fork_writes_what_would_be_written_here(results: tuple[object, ...], tmp_path: Path) -> None:
+    """One is asked for nothing more, and then another one is killed."""
+    here, there, killed = (tmp_path / f"{name}.rrd" for name in ("here", "there", "killed"))
     RecordingProcess().draw("same", results).write(here)
-    command = [sys.executable, "-c", FORKED, str(there), end]
+    command = [sys.executable, "-c", FORKED, str(there), str(killed)]
     done = subprocess.run(command, input=pickled(results), capture_output=True, check=True)
-    assert done.stdout.split() == [b"False" if end == "killed" else b"True"]
-    assert check(there) == check(here)
+    assert done.stdout.split() == [b"True", b"False"]
+    assert check(killed) == check(there) == check(here)

@@ -27,3 +27,4 @@ def _speed() -> Iterator[None]:
 def no_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Register no scans: the test asks what each one acquires, and registration takes most of the time."""
     monkeypatch.setattr(verification, "registered", lambda *given: ())
+    monkeypatch.setattr(verification, "surface_of", lambda *given: None)

@@ -63,7 +63,7 @@ def test_known_labels_give_way_as_if_all_were_placed_again(seed: int, points: in
     random = np.random.default_rng(seed)
     nowhere = PaperBox(0.0, 0.0, 0.0, 0.0)
     sheet = PaperSheet("", 0.0, 0.0, 100, nowhere, nowhere, nowhere, (), (0.0, 0.0))
-    low = np.stack(np.meshgrid(*[np.arange(6) * 1.5] * 2), axis=-1).reshape(-1, 2)
+    low = np.stack(np.meshgrid(*[np.arange(4) * 1.5] * 2), axis=-1).reshape(-1, 2)
     sizes = random.choice([1.5, 2.4, 5.0], (len(low), 2))
     rooms = [
         Room(f"R{k}", f"{k} Meeting and conference", (Polygon.of(at + (ROOM * size).round(3)),))

@@ -266,8 +266,15 @@ def third_party(space: NavigableSpace, points: FloatArray) -> Paths:
     return grid_paths(space, points)
 
 
-@pytest.mark.parametrize("graph", ["grid", f"{__name__}:third_party"])
-@pytest.mark.parametrize("world", ["rooms", "corridor"])
+THIRD_PARTY = f"{__name__}:third_party"
+
+
+@pytest.mark.parametrize(
+    ("graph", "world"),
+    some(
+        [("grid", "rooms"), ("grid", "corridor"), (THIRD_PARTY, "corridor"), (THIRD_PARTY, "rooms")], every=2
+    ),
+)
 def test_on_any_graph_the_search_has_the_times_that_are_driven(world: str, graph: str) -> None:
     driven = two_step(world, 3, graph=graph)
     problem, made = problem_of(driven), least_time_route(driven)

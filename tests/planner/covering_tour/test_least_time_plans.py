@@ -70,11 +70,11 @@ def test_a_plan_for_the_least_time_passes_its_check(
 def test_a_person_reads_both_numbers() -> None:
     from stopgo.planner.commands.plan_report import time_lines, time_table
 
-    found = made(minimise="time").route
+    found = made(minimise="time", d_dis=0.2, grid=2.0).route
     assert found.time is not None
     (line,) = time_lines(found)
     assert "no plan over these candidates takes less by shortest paths than" in line
-    on_grid = made(minimise="time", graph="grid").route
+    on_grid = made(minimise="time", d_dis=0.2, grid=2.0, graph="grid").route
     (on_a_grid,) = time_lines(on_grid)
     paths = [time_table(route)["least_time"]["bound_paths"] for route in (found, on_grid)]
     assert paths == ["shortest", "any"]

@@ -124,7 +124,7 @@ def test_a_plan_is_the_same_with_a_second_process(
     for many in (0, 10**9):
         monkeypatch.setattr(pipeline, "MANY", many)
         monkeypatch.setattr(navigable, "MANY", many)
-        plans.append(pipeline.plan(two_rooms(0.9), Settings(refine=refine, fov=fov)))
+        plans.append(pipeline.plan(two_rooms(0.9), Settings(d_dis=0.1, refine=refine, fov=fov)))
     forked, alone = plans
     assert forked.figures == alone.figures
     assert forked.mission == alone.mission

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import msgspec
 import pytest
@@ -11,11 +12,13 @@ import pytest
 from stopgo.mission.files.coverage_json import Coverage, coverage_json
 from stopgo.mission.floor import Element
 from stopgo.mission.geometry import Polygon
+from stopgo.mission.plan import Plan
 from stopgo.mission.proof.plan_proof import PlanProof, Simulation
 from stopgo.mission.proof.proof_text import proof_text
 from stopgo.mission.settings import Settings
 from stopgo.planner import plan
 from stopgo.planner.scan_simulation.verification import NOT_AS_ASKED, verify
+from tests.faults.sizes import some
 from tests.planner.worlds import element, hall
 
 pytestmark = pytest.mark.usefixtures("no_pairs")
@@ -30,8 +33,13 @@ def round_column(x: float, y: float, radius: float = 0.3, sides: int = 90) -> El
     return element("column", "columns", Polygon.of(ring))
 
 
+@cache
+def planned(settings: Settings) -> Plan:
+    return plan(hall(6, 4, round_column(3, 2)), settings)
+
+
 def proved(settings: Settings, simulation: Simulation) -> PlanProof:
-    made = plan(hall(6, 4, round_column(3, 2)), settings)
+    made = planned(settings)
     told = msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
     return verify(made.mission, made.space, simulation, told)
 
@@ -53,9 +61,9 @@ def test_a_scanner_that_is_given_has_points_or_misses() -> None:
     assert given.between_rays > 0.1
 
 
-@pytest.mark.parametrize("step", [0.3, 0.6])
+@pytest.mark.parametrize("step", some([0.6, 0.3], every=2))
 def test_a_plan_that_knows_the_step_promises_points_on_every_unit(step: float) -> None:
-    made = plan(hall(6, 4, round_column(3, 2)), replace(SETTINGS, angular_step=step)).first
+    made = planned(replace(SETTINGS, angular_step=step))
     assert made.mission.limits.density_mm == 50.0
     proof = proved(replace(SETTINGS, angular_step=step), replace(COARSE, step_deg=step))
     assert proof.met, proof.unmet

@@ -12,6 +12,7 @@ from stopgo.mission.geometry import Polygon
 from stopgo.mission.proof.plan_proof import Simulation
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded
+from tests.faults.sizes import size
 from tests.planner.worlds import column, element, hall
 
 SIMULATION = Simulation(range_m=10.0, step_deg=0.5)
@@ -37,7 +38,7 @@ def kinds_of(solids: ExtrudedFloor, met: np.ndarray) -> np.ndarray:
     return np.stack([np.append(item, NONE)[met] for item in (solids.face, height, solids.under != NONE)])
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(size(short=2, full=4)))
 @pytest.mark.parametrize("fov", [360.0, 100.0])
 @pytest.mark.parametrize("see_through", [False, True])
 def test_every_ray_of_a_run_meets_the_surface_of_the_one_that_is_cast(

@@ -18,7 +18,7 @@ from tests.planner.selection.test_swaps import cover_of_rooms
 def test_no_bound_by_branching_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where a selection is known that is not the smallest, and with groups of columns."""
     monkeypatch.setattr(module, "ENTRIES", 40)
-    for seed, cover, optimum in small_covers(range(size(short=8, full=300))):
+    for seed, cover, optimum in small_covers(range(size(short=3, full=300))):
         for found in (optimum, optimum + 1, optimum + 2, optimum + 5):
             assert branching_bound(cover, found=found) <= optimum, seed
 

@@ -75,7 +75,7 @@ def test_the_default_search_finds_the_fewest_connected_rows_where_a_component_se
 
 
 def test_a_search_from_the_rows_of_a_relaxation_finds_fewer_or_keeps_what_is_known() -> None:
-    for seed in range(12):
+    for seed in range(size(short=4, full=12)):
         task = task_of(seed, rows=30, columns=60, near=0.35)
         rows, least = connected(task, Searches.default(task), rounds=ROUNDS)
         search = Searches.default(task, likely=likely_rows(task.problem))

@@ -64,7 +64,7 @@ def test_bounds_are_higher_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
     sums = np.zeros((2, 3), dtype=np.int64)
     for number, rounds in enumerate((0, knapsack_cuts.ROUNDS)):
         monkeypatch.setattr(knapsack_cuts, "ROUNDS", rounds)
-        for seed in range(6):
+        for seed in range(size(short=3, full=6)):
             cover, again = (cover_of_rooms(seed, rows=100, columns=100, rooms=12) for _ in range(2))
             monkeypatch.setattr(bound, "FINE", 100_000)
             sums[number, :2] += relaxation_bound(cover), bound_by_parts(cover, found=99)

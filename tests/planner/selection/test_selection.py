@@ -111,7 +111,7 @@ def test_no_bound_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bound, "COARSE", 20)
     monkeypatch.setattr(bound, "FINE", 40)
     monkeypatch.setattr(bound_by_parts, "SIZE", 20)
-    for _, cover, optimum in small_covers(range(size(short=5, full=300))):
+    for _, cover, optimum in small_covers(range(size(short=3, full=300))):
         assert counting_bound(cover) <= optimum
         assert coarse_bound(cover) <= relaxation_bound(cover) <= optimum
         assert multiplier_bound(cover, found=len(greedy(cover))) <= optimum

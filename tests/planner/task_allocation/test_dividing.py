@@ -33,6 +33,7 @@ from stopgo.planner import pipeline, plan
 from stopgo.planner.checking.network_claims import network_overclaims
 from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.commands.shared_report import shared_report
+from stopgo.planner.covering_tour import least_time_bound
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
 from stopgo.planner.task_allocation import dividing
 from stopgo.planner.task_allocation import tour_times as tour_times_module
@@ -352,6 +353,7 @@ def test_a_mission_of_another_plan_is_no_share() -> None:
 
 
 def test_of_many_stops_only_the_route_of_least_time_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(least_time_bound, "MOST_STEPS", 40)
     selection, divisions = route_of("rooms", minimise="time").selection, []
     monkeypatch.setattr(dividing, "divided", divisions.append)
     monkeypatch.setattr(pipeline, "BOTH_UP_TO", 0)

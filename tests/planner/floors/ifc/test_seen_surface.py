@@ -19,7 +19,7 @@ from tests.planner.floors.ifc.house import House, two_rooms
 
 def planned(path: Path, *more: str) -> dict:
     out = path.parent / "plan"
-    few = ["--range", "8", "--no-refine"]
+    few = ["--range", "8", "--no-refine", "--no-sheets"]
     assert main(["plan", str(path), "--storey", "EG", "-o", str(out), *few, *more]) == 0
     return json.loads((out / "coverage.json").read_text())["surface"]
 
@@ -147,7 +147,7 @@ def test_a_plan_that_claims_more_than_the_model_shows_is_not_met(
     )
     coverage.write_text(text)
     capsys.readouterr()
-    assert main(["prove", mission, "--floor", floor, "--solids", "model", "--angular-step", "0.5"]) == 1
+    assert main(["prove", mission, "--floor", floor, "--solids", "model", "--angular-step", "1"]) == 1
     assert "area of walls: 100.0 % claimed, the model's solids show" in capsys.readouterr().out
 
 

@@ -31,7 +31,20 @@ def without_furniture(*given: object) -> list[object]:
 
 
 def planned(path: Path, *more: str) -> int:
-    return main(["plan", str(path), "--storey", "EG", "-o", str(path.parent / "plan"), "--range", "6", *more])
+    return main(
+        [
+            "plan",
+            str(path),
+            "--storey",
+            "EG",
+            "-o",
+            str(path.parent / "plan"),
+            "--range",
+            "6",
+            "--no-sheets",
+            *more,
+        ]
+    )
 
 
 def test_the_bodies_of_a_floor_are_those_in_the_robots_height(read: Read, tmp_path: Path) -> None:
