@@ -13,10 +13,10 @@ from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.routing.dijkstra_kernel import find_lengths
-from stopgo.planner.routing.path_trees import path_trees
 
 CHUNK = 256
 """Points whose distances to all nodes are in memory at a time."""
@@ -57,7 +57,7 @@ class Paths:
         if kept is None:
             self._asked[start] = self._asked.get(start, 0) + 1
             if self._asked[start] > FEW and len(self.xy) * (len(self._trees) + 1) <= MOST_KEPT:
-                kept = path_trees(self._both_ways, np.array([start]))[1][0].astype(np.int32)
+                kept = dijkstra(self._both_ways, True, start, return_predecessors=True)[1]
                 self._trees[start] = kept
         return kept
 
@@ -71,19 +71,29 @@ class Paths:
         near = np.flatnonzero(sum(away) <= longest)
         own = self._both_ways[near][:, near]
         first, last = np.searchsorted(near, (start, end)).tolist()
-        before = path_trees(own, np.array([first]), limit=longest)[1][0]
+        before = dijkstra(own, True, first, return_predecessors=True, limit=longest)[1]
         return near[_followed(before, first, last)]
 
     @cached_property
     def _both_ways(self) -> csr_array:
-        """The graph with each piece in both directions."""
-        return csr_array(self.graph + self.graph.T)
+        """The graph with each piece in both directions, those to higher nodes first, as scipy takes them."""
+        back = self.graph.T.tocsr()
+        first = self.graph.indptr + back.indptr
+        ahead, many = ranges(first[:-1], np.diff(self.graph.indptr)), first[-1]
+        after = np.delete(np.arange(many), ahead)
+        to, length = np.empty(many, dtype=first.dtype), np.empty(many)
+        for place, half in ((ahead, self.graph), (after, back)):
+            to[place], length[place] = half.indices, half.data
+        return csr_array((length, to, first), shape=self.graph.shape)
 
     def before(self, points: IntArray) -> IntArray:
         """The node before each node on its shortest path from each of these points (n, nodes)."""
         kept = [self._trees.get(point) for point in points.tolist()]
         if any(tree is None for tree in kept):
-            return path_trees(self._both_ways, points, limit=self.limit)[1]
+            found: IntArray = dijkstra(
+                self._both_ways, True, points, return_predecessors=True, limit=self.limit
+            )[1]
+            return found
         return np.array(kept)
 
     way = path  # its name in 0.1; ends with 0.3
@@ -119,10 +129,10 @@ def shortest_paths(
     graph, kept = edge_lengths(xy, edges), {}
     if not trees or points * len(xy) > MOST_KEPT:
         return Paths(frozen(xy), frozen(_lengths(graph, points, limit)), graph, limit=limit)
-    lengths, both_ways = np.empty((points, points)), csr_array(graph + graph.T)
+    lengths = np.empty((points, points))
     for chunk in np.split(np.arange(points), range(CHUNK, points, CHUNK)):
-        away, before = path_trees(both_ways, chunk, limit=limit)
-        kept.update(zip(chunk.tolist(), before.astype(np.int32), strict=True))
+        away, before = dijkstra(graph, False, chunk, return_predecessors=True, limit=limit)
+        kept.update(zip(chunk.tolist(), before, strict=True))
         lengths[chunk] = away[:, :points]
     return Paths(frozen(xy), frozen(lengths), graph, limit=limit, _trees=kept)
 

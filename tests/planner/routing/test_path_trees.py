@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.routing.dijkstra_kernel import grow
 from stopgo.planner.routing.path_trees import NONE, path_trees
-from stopgo.planner.routing.paths import edge_lengths, shortest_paths
+from stopgo.planner.routing.paths import edge_lengths
 from tests.planner.kernels import interpret
 from tests.planner.routing.test_nearby_paths import network
 
@@ -59,11 +59,3 @@ def test_of_equally_short_paths_the_last_node_but_one_is_the_lowest() -> None:
             others = graph.indices[own]
             last = others[lengths[others] + graph.data[own] == lengths[node]]
             assert nodes[node] == (last.min() if len(last) else NONE)
-
-
-def test_a_path_by_itself_is_that_of_the_tree() -> None:
-    xy, edges = lattice()
-    alone, kept = (shortest_paths(xy, edges, 9, trees=trees) for trees in (False, True))
-    for start in range(9):
-        for end in range(9):
-            assert alone.path(start, end).tolist() == kept.path(start, end).tolist()
