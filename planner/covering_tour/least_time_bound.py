@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.covering_tour.time_graph import BLOCK, FARTHEST_S, TimeGraph
 from stopgo.planner.covering_tour.zones import Zones
+from stopgo.planner.routing.path_trees import path_trees
 from stopgo.planner.routing.tour import NANOMETRES, best_of_all, length_of, nanometres
 from stopgo.planner.routing.tour_bound import growing, highest, one_tree
 from stopgo.planner.selection.cover import Cover
@@ -207,7 +207,7 @@ class _Relaxation:
         for k in range(0, len(zones), BLOCK):
             some = slice(k, min(k + BLOCK, len(zones)))
             sources = np.arange(nodes + some.start, nodes + some.stop)
-            away, before = dijkstra(times, indices=sources, limit=limit, return_predecessors=True)
+            away, before = path_trees(times, sources, limit=limit)
             for row in before:
                 reached = np.flatnonzero(row >= 0)
                 ways.append((reached, row[reached]))

@@ -39,7 +39,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
-from scipy.spatial import cKDTree
+import shapely
 
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
@@ -310,7 +310,9 @@ def nearest_rows(candidates: Candidates, offered: IntArray, chosen: IntArray, *,
     if len(offered) <= most:
         return offered
     xy = candidates.xy[candidates.kept]
-    away = cKDTree(xy[chosen]).query(xy[offered])[0]
+    _, away = shapely.STRtree(shapely.points(xy[chosen])).query_nearest(
+        shapely.points(xy[offered]), return_distance=True, all_matches=False
+    )
     return np.sort(offered[np.argsort(np.round(away, 6), kind="stable")[:most]])
 
 

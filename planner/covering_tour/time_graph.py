@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from stopgo.mission.document import RobotSpec
 from stopgo.mission.document.straight_times import straight_times
@@ -26,6 +25,7 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.routing.assemble import ROUNDING_M, ROUNDING_RAD
+from stopgo.planner.routing.path_trees import path_trees
 from stopgo.planner.routing.roadmap import graph_of, outward_corners
 
 ROUNDS = 40
@@ -96,11 +96,15 @@ class TimeGraph:
         if not len(line) or not np.isfinite(self.xy).all():
             return np.full(points, np.nan)
         at = np.array(line, dtype=np.int64)
-        own = cKDTree(self.xy[at]).query(self.xy[:points])[1]
+        point, nearest = shapely.STRtree(shapely.points(self.xy[at])).query_nearest(
+            shapely.points(self.xy[:points])
+        )
+        own = np.full(points, len(at))
+        np.minimum.at(own, point, nearest)
         away, ways = np.zeros((points, 2)), np.zeros(points, dtype=np.int64)
         times = self.times(np.zeros(self.nodes), [])
         for k in range(0, len(at), BLOCK):
-            found = dijkstra(times, indices=at[k : k + BLOCK], return_predecessors=True, limit=FARTHEST_S)[1]
+            found = path_trees(times, at[k : k + BLOCK], limit=FARTHEST_S)[1]
             for there, before in enumerate(found, k):
                 near = np.flatnonzero((np.abs(own - there) == 1) & (before[:points] >= 0))
                 step = self.xy[before[near]] - self.xy[near]

@@ -77,6 +77,12 @@ class Overlaps:
             self._by_row[row] = self._pairs(np.array([row]), np.array([0]))
         return self._by_row[row]
 
+    def of_each(self, rows: IntArray) -> Iterator[Pairs]:
+        """Each of the rows (n,) with every other row, in blocks; not cached."""
+        for begin in range(0, len(rows), BLOCK):
+            some = rows[begin : begin + BLOCK]
+            yield self._pairs(some, np.zeros(len(some), dtype=np.int64))
+
     def later(self, some: range | None = None, *, least_m: float = 0.0) -> Iterator[Pairs]:
         """Some or all rows with every later row that has at least so much boundary in common, in blocks.
 

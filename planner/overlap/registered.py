@@ -172,15 +172,9 @@ def _remedy(
     """A remedy that connects two sets of stops, and its position: target spheres, else an opening."""
     space = route.space
     overlaps = _overlaps_of_stops(route)
-    best = None
-    for k in here.tolist():
-        pairs = overlaps.of(k)
-        for index in np.flatnonzero(np.isin(pairs.other, there)).tolist():
-            worth = (float(pairs.hold_m[index]), float(pairs.common_m[index]))
-            found = (worth, k, int(pairs.other[index]))
-            best = max(best, found) if best else found
+    best = max(_common_between(overlaps, here, there), default=None)
     if best is not None:
-        _, k, j = best
+        _, _, k, j = best
         x, y = (overlaps.middle_of_common(k, j) + local_origin(space.floor)).tolist()
         spheres = f"a target sphere or board that {names[k]} and {names[j]} both see would join them, such as"
         return f"{spheres} near ({x:.1f}, {y:.1f}): {_reason(route, k, j)}", (x, y)
@@ -204,6 +198,16 @@ def _remedy(
         else f"it would join them if it were not {opening.why}: a scan from it"
     )
     return f"{kind} {name} at ({x:.1f}, {y:.1f}) is nearest to both; {advice} or spheres there", (x, y)
+
+
+def _common_between(
+    overlaps: Overlaps, here: IntArray, there: IntArray
+) -> Iterator[tuple[float, float, int, int]]:
+    """Strength, metres in common and stops of all pairs of two sets that see some of the same boundary."""
+    for pairs in overlaps.of_each(here):
+        at = np.flatnonzero(np.isin(pairs.other, there))
+        columns = (pairs.hold_m, pairs.common_m, pairs.row, pairs.other)
+        yield from zip(*(values[at].tolist() for values in columns), strict=True)
 
 
 def _midway(route: Route, here: IntArray, there: IntArray) -> tuple[int, int, tuple[float, float]] | None:

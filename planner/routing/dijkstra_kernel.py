@@ -121,6 +121,33 @@ def find_lengths(
                 rise(there, away, queue, place)
 
 
+def grow(
+    source: int, limit: float, first: Any, to: Any, length: Any, away: Any, before: Any, queue: Any,
+    place: Any,
+) -> None:  # fmt: skip
+    """Find the shortest paths from one node to all nodes, none longer than the limit.
+
+    `away`, infinite before, receives their lengths, and `before`, -1 before, the node before each: of
+    equally short paths the lowest. `queue` and `place` are as in `find_lengths`.
+    """
+    away[source], queue[0], size = 0.0, source, 1
+    while size > 0:
+        here = queue[0]
+        size -= 1
+        sink(queue[size], size, away, queue, place)
+        for edge in range(first[here], first[here + 1]):
+            there = to[edge]
+            total = away[here] + length[edge]
+            if total < away[there] and total <= limit:
+                if away[there] > MOST:
+                    place[there] = size
+                    size += 1
+                away[there], before[there] = total, here
+                rise(there, away, queue, place)
+            elif total == away[there] and here < before[there]:
+                before[there] = here
+
+
 def rise(node: int, away: Any, queue: Any, place: Any) -> None:
     """Move a node towards the head of the queue, from its place or the end."""
     at = place[node]

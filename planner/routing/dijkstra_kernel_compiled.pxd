@@ -32,6 +32,12 @@ cpdef void find_lengths(
     double[::1] away, whole[::1] queue, whole[::1] place
 ) noexcept nogil
 
+@cython.locals(edge=whole, here=whole, size=whole, there=whole, total=double)
+cpdef void grow(
+    whole source, double limit, const whole[::1] first, const whole[::1] to, const double[::1] length,
+    double[::1] away, whole[::1] before, whole[::1] queue, whole[::1] place
+) noexcept nogil
+
 @cython.locals(at=whole)
 cdef void rise(whole node, const double[::1] away, whole[::1] queue, whole[::1] place) noexcept nogil
 

@@ -76,8 +76,11 @@ class _Tree:
         numbers = self.sets @ solution.values[: self.sets.shape[1]]
         fraction = numbers - np.floor(numbers)
         apart = np.minimum(fraction, 1.0 - fraction)
-        k = int(np.argmax(apart)) if len(apart) else 0
-        return (self.sets[k], float(numbers[k])) if len(apart) and apart[k] > LEAST_FRACTION else None
+        far = np.flatnonzero(apart > LEAST_FRACTION)
+        if not len(far):
+            return None
+        k = far[np.argmax(apart[far])]
+        return self.sets[k], float(numbers[k])
 
     def _with(self, rows: FloatArray, least: float, otherwise: float) -> float:
         """The least bound with one more demand, or the other one if the solver fails."""

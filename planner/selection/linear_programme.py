@@ -26,9 +26,12 @@ class LinearProgramme:
     """The programme: least `cost` with `rows` @ x >= `least` and 0 <= x <= `most`; rows can be added.
 
     `rows` is a sparse matrix (rows, columns). The solver runs on one thread, so that it is reproducible.
+    Without `presolve` it does not simplify the programme first.
     """
 
-    def __init__(self, cost: FloatArray, rows: Any, least: FloatArray, most: FloatArray) -> None:
+    def __init__(
+        self, cost: FloatArray, rows: Any, least: FloatArray, most: FloatArray, *, presolve: bool = True
+    ) -> None:
         import highspy
 
         matrix = csc_array(rows)
@@ -42,6 +45,8 @@ class LinearProgramme:
         self._solver = highspy.Highs()
         for option, value in (("output_flag", False), ("threads", 1), ("random_seed", 0)):
             self._solver.setOptionValue(option, value)
+        if not presolve:
+            self._solver.setOptionValue("presolve", "off")
         self._solver.passModel(model)
 
     def add(self, rows: csr_array, least: FloatArray) -> None:

@@ -55,6 +55,15 @@ class Parts:
             parts |= set(self.gap_part[near].tolist())
         return parts
 
+    def only_part_in(self, shape: BaseGeometry) -> int | None:
+        """The part of which a triangle lies within `shape`, if no other part comes near; else None."""
+        near = self.tree.query(shape)
+        if len(near) and (self.cell_part[near] == self.cell_part[near[0]]).all():
+            shapely.prepare(shape)
+            if shapely.contains_properly(shape, self.cells[near]).any():
+                return int(self.cell_part[near[0]])
+        return None
+
     def area_by_part(self, shape: BaseGeometry) -> dict[int, float]:
         """Drive area within `shape`, by part."""
         inside = np.sort(self.tree.query(shape))

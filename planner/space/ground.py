@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import shapely
@@ -27,6 +28,7 @@ from stopgo.planner.geometry.shapes import (
     union,
     widened,
 )
+from stopgo.planner.geometry.side_work import SideWork
 from stopgo.planner.space.gaps import Walls, crossings_through, tight_gaps
 from stopgo.planner.space.opening_joins import Crossing, barrier, crossings_of, threshold
 from stopgo.planner.space.targets import solid_of
@@ -81,16 +83,20 @@ class Ground:
         return Walls(np.concatenate([solid, edges]), clearance)
 
 
-def drivable(ground: Ground, settings: Settings) -> tuple[BaseGeometry, FloatArray]:
-    """Return the drive area of the robot's centre, and the exact crossings of gaps just wide enough."""
+def drivable(ground: Ground, settings: Settings, *, forked: bool = False) -> tuple[BaseGeometry, FloatArray]:
+    """Return the drive area of the robot's centre, and the exact crossings of gaps just wide enough.
+
+    If `forked`, another process looks for the gaps.
+    """
     walls = ground.walls(settings)
-    area = snapped(_clear_of(walls, ground))
-    if not _keeps_clearances(area, walls):
-        area = snapped(_clear_of(walls, ground, grid_size=GRID))
-    area = shapely.MultiPolygon([part for part in polygon_parts(area) if part.area > GRID])
-    if area.is_empty:
-        return area, np.empty((0, 2, 2))
-    return area, crossings_through(tight_gaps(walls), walls, area, ground.outline)
+    with SideWork(partial(tight_gaps, walls), forked=forked) as gaps:
+        area = snapped(_clear_of(walls, ground))
+        if not _keeps_clearances(area, walls):
+            area = snapped(_clear_of(walls, ground, grid_size=GRID))
+        area = shapely.MultiPolygon([part for part in polygon_parts(area) if part.area > GRID])
+        if area.is_empty:
+            return area, np.empty((0, 2, 2))
+        return area, crossings_through(gaps.result(), walls, area, ground.outline)
 
 
 def _clear_of(walls: Walls, ground: Ground, *, grid_size: float | None = None) -> BaseGeometry:

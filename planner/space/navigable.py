@@ -49,7 +49,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         ground = Ground.of(floor, settings, forked=large)
         scanning = scanning or works.begun(partial(scanned, _closed_doors(ground, settings)))
         clearing = works.begun(partial(_cleared, ground, settings), after=scanning)
-        drive_area, gaps = drivable(ground, settings)
+        drive_area, gaps = drivable(ground, settings, forked=large)
         (drive_polygons, drive_shape), gaps = _kept(drive_area, origin), frozen(gaps + origin)
         parts = parts_of(drive_shape, gaps - origin)
         occluders, targets = scanning.result()

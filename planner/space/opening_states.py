@@ -88,6 +88,9 @@ def _opening_side(room: int | None, parts: Parts, ground: Ground) -> OpeningSide
         shape = ground.outline.difference(shapely.union_all(rooms))
     else:
         shape = to_shape(ground.floor.rooms[room].polygons, ground.origin)
+    only = parts.only_part_in(shape)
+    if only is not None:
+        return OpeningSide(shape, frozenset([only]))
     free = parts.area_by_part(shape)
     enough = min(REACHED_AREA, REACHED_FRACTION * sum(free.values()))
     return OpeningSide(shape, frozenset(part for part, area in free.items() if area >= enough and area > 0))
