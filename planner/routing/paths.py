@@ -67,8 +67,8 @@ class Paths:
         None of them is farther from both points together than the path is long.
         """
         longest = float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
-        away = (np.hypot(*(self.xy - self.xy[point]).T) for point in (start, end))
-        near = np.flatnonzero(sum(away) <= longest)
+        apart = sum(np.hypot(*(self.xy - self.xy[point]).T) for point in (start, end))
+        near = np.union1d(np.flatnonzero(apart <= longest), [start, end])
         own = self._both_ways[near][:, near]
         first, last = np.searchsorted(near, (start, end)).tolist()
         before = dijkstra(own, True, first, return_predecessors=True, limit=longest)[1]
