@@ -49,6 +49,8 @@ class Paths:
         """The polyline (n, 2) from one point to another, both included."""
         tree = self._tree(start)
         nodes = self._nodes_between(start, end) if tree is None else _followed(tree, start, end)
+        if not len(nodes):
+            raise ValueError(f"no path from point {start} to point {end}")
         return straightened(self.xy[nodes])
 
     def _tree(self, start: int) -> IntArray | None:
@@ -67,8 +69,8 @@ class Paths:
         None of them is farther from both points together than the path is long.
         """
         longest = float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
-        away = (np.hypot(*(self.xy - self.xy[point]).T) for point in (start, end))
-        near = np.flatnonzero(sum(away) <= longest)
+        apart = sum(np.hypot(*(self.xy - self.xy[point]).T) for point in (start, end))
+        near = np.union1d(np.flatnonzero(apart <= longest), [start, end])
         own = self._both_ways[near][:, near]
         first, last = np.searchsorted(near, (start, end)).tolist()
         before = dijkstra(own, True, first, return_predecessors=True, limit=longest)[1]
@@ -99,14 +101,14 @@ class Paths:
     way = path  # its name in 0.1; ends with 0.3
 
 
-def _followed(before: IntArray, start: int, end: int) -> list[int]:
-    """The nodes from one to another, by the node before each."""
+def _followed(before: IntArray, start: int, end: int) -> IntArray:
+    """The nodes from one to another, by the node before each; none if no path leads there."""
     nodes = [end]
     while nodes[-1] != start:
         if before[nodes[-1]] < 0:
-            raise ValueError(f"no path from point {start} to point {end}")
+            return np.empty(0, dtype=np.int64)
         nodes.append(int(before[nodes[-1]]))
-    return nodes[::-1]
+    return np.array(nodes[::-1])
 
 
 def straightened(line: FloatArray) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse.csgraph import dijkstra
@@ -44,3 +46,19 @@ def test_paths_are_those_of_a_search_of_pieces_without_direction() -> None:
     found = shortest_paths(xy, np.concatenate([across, along]), 9)
     asked = dijkstra(found.graph, directed=False, indices=range(9), return_predecessors=True)[1]
     assert found.before(np.arange(9)).tolist() == asked.tolist()
+
+
+def test_a_path_of_a_graph_whose_lengths_are_too_short_is_not_found() -> None:
+    """A third-party graph may have other lengths than its pieces: even the straight line is longer."""
+    found = shortest_paths(*network(1), 9)
+    wrong = replace(found, lengths=found.lengths / 1000)
+    with pytest.raises(ValueError, match="no path from point 0 to point 3"):
+        wrong.path(0, 3)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_path_by_itself_is_that_of_a_search_of_the_whole_graph(seed: int) -> None:
+    found = shortest_paths(*network(seed), POINTS)
+    whole = shortest_paths(*network(seed), POINTS, trees=True)
+    for a, b in np.random.default_rng(seed).integers(0, POINTS, (60, 2)).tolist():
+        assert found.path(a, b).tolist() == whole.path(a, b).tolist()
