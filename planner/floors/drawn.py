@@ -148,10 +148,11 @@ def _closed_key(shape: Closed) -> tuple:
 
 
 def region_key(region: Region) -> tuple:
-    """Sort key of regions: by position and then by every coordinate."""
+    """Sort key of regions: by position and then by every coordinate; empty ones come last."""
     parts = [region] if isinstance(region, shapely.Polygon) else shapely.get_parts(region)
-    rings = [canonical_ring(part.exterior).tolist() for part in parts]
-    return (*np.round(region.bounds, 6).tolist(), rings)
+    drawn = [part for part in parts if isinstance(part, shapely.Polygon) and not part.is_empty]
+    bounds = [np.inf] * 4 if region.is_empty else np.round(region.bounds, 6).tolist()
+    return (*bounds, [canonical_ring(part.exterior).tolist() for part in drawn])
 
 
 def _open_key(line: Open) -> tuple:

@@ -148,9 +148,8 @@ def _numbered(rooms: Sequence[_Room], *, outline: Region) -> tuple[tuple[Room, .
     shapely.prepare(outline)
     for room in sorted(rooms, key=lambda item: region_key(item.region)):
         if not polygons_of(room.region):
-            findings.append(
-                Finding("no_area", f"room '{room.name}' has no area left; dropped", at=_corner(room.region))
-            )
+            at = None if room.region.is_empty else _corner(room.region)
+            findings.append(Finding("no_area", f"room '{room.name}' has no area left; dropped", at=at))
             continue
         made = Room(f"room-{len(numbered) + 1:03d}", room.name, canonical_region(room.region), room.global_id)
         numbered.append(made)

@@ -97,14 +97,15 @@ def parts_within(cells: NDArray[np.object_], shape: BaseGeometry) -> NDArray[np.
 def _pieces_around(
     cells: NDArray[np.object_], shape: BaseGeometry
 ) -> Iterator[tuple[IntArray, BaseGeometry]]:
-    """Indices of shapes that lie near one another, and the piece of a large shape round them."""
+    """Indices of shapes near one another, without empty ones, and the piece of a large shape round them."""
     if not len(cells) or shapely.get_num_coordinates(shape) <= FEW:
         yield np.arange(len(cells)), shape
         return
     index, bounds = RingIndex(shape), shapely.bounds(cells)
-    _, tile = np.unique(np.floor(bounds[:, :2] / TILE), axis=0, return_inverse=True)
-    order = np.argsort(tile.reshape(-1), kind="stable")
-    for group in np.split(order, np.cumsum(np.bincount(tile.reshape(-1)))[:-1]):
+    real = np.flatnonzero(~shapely.is_empty(cells))
+    _, tile = np.unique(np.floor(bounds[real, :2] / TILE), axis=0, return_inverse=True)
+    order = real[np.argsort(tile.reshape(-1), kind="stable")]
+    for group in np.split(order, np.cumsum(np.bincount(tile.reshape(-1)))[:-1]) if len(real) else ():
         low, high = bounds[group, :2].min(axis=0), bounds[group, 2:].max(axis=0)
         yield group, index.within((*low.tolist(), *high.tolist()))
 

@@ -35,6 +35,8 @@ FEW = 5_000
 """Vertices up to which shapes are united all at once; more take half the time where they lie apart."""
 APART = 4.0
 """Grid steps from which on two shapes do not change each other's rounding, with room to spare."""
+SAMPLE, CROWDED = 200, 30
+"""Shapes whose boxes are looked at, and boxes over each above which shapes are united all at once."""
 SETTLING = 20
 """Maximum number of rounding passes until an outline no longer changes; two or three are enough."""
 FARTHEST_STEPS = 2**29
@@ -169,12 +171,18 @@ def union_of_snapped(shapes: NDArray[np.object_]) -> BaseGeometry:
 
 def _united(shapes: NDArray[np.object_], *, within: float, grid_size: float | None = None) -> BaseGeometry:
     """The union of polygonal shapes; of many, those farther apart than `within` are united by themselves."""
-    if shapely.get_num_coordinates(shapes).sum() <= FEW:
+    if shapely.get_num_coordinates(shapes).sum() <= FEW or _are_crowded(shapes):
         return shapely.union_all(shapes, grid_size=grid_size)
     group = labels_of(shapes.tolist(), within=within)
     groups = np.split(shapes[np.argsort(group, kind="stable")], np.cumsum(np.bincount(group))[:-1])
     parts = [part for some in groups for part in polygon_parts(shapely.union_all(some, grid_size=grid_size))]
     return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
+
+
+def _are_crowded(shapes: NDArray[np.object_]) -> bool:
+    """True if so many boxes of shapes overlap that it would take long to find those that lie apart."""
+    some = shapes[:: -(-len(shapes) // SAMPLE)]
+    return shapely.STRtree(shapes).query(some).shape[1] > CROWDED * len(some)
 
 
 def _in_steps(shapes: NDArray[np.object_]) -> NDArray[np.object_]:

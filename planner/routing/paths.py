@@ -24,6 +24,8 @@ MANY = 20_000_000
 """Pieces in all searches together from which on two processes search."""
 FEW = 3
 """Paths from a point that are searched one by one; a route has two at each point."""
+ROUNDING, WIDER = 1e-9, 1e-6
+"""Fractions, and metres, by which a path may be longer than its length, and farther from its ends."""
 MOST_KEPT = 32_000_000
 """Nodes of all the trees of paths that are kept, 128 MB."""
 
@@ -64,17 +66,22 @@ class Paths:
         return kept
 
     def _nodes_between(self, start: int, end: int) -> IntArray:
-        """The nodes on the shortest path between two points.
+        """The nodes on the shortest path between two points; none if there is no path of its length.
 
-        None of them is farther from both points together than the path is long.
+        None of them is farther from both points together than the path is long. A third-party graph may have
+        other lengths, and then all nodes are searched.
         """
-        longest = float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
+        length = float(self.lengths[start, end])
         apart = sum(np.hypot(*(self.xy - self.xy[point]).T) for point in (start, end))
-        near = np.union1d(np.flatnonzero(apart <= longest), [start, end])
-        own = self._both_ways[near][:, near]
-        first, last = np.searchsorted(near, (start, end)).tolist()
-        before = dijkstra(own, True, first, return_predecessors=True, limit=longest)[1]
-        return near[_followed(before, first, last)]
+        near = np.union1d(np.flatnonzero(apart <= length * (1 + WIDER) + WIDER), [start, end])
+        for nodes in (near, np.arange(len(self.xy))):
+            own = self._both_ways[nodes][:, nodes]
+            first, last = np.searchsorted(nodes, (start, end)).tolist()
+            limit = length * (1 + ROUNDING) + ROUNDING
+            found = dijkstra(own, True, first, return_predecessors=True, limit=limit)[1]
+            if len(path := _followed(found, first, last)):
+                break
+        return nodes[path]
 
     @cached_property
     def _both_ways(self) -> csr_array:

@@ -339,6 +339,21 @@ def test_rooms_that_overlap_are_parted_and_reported(read: Read) -> None:
     assert plan.findings[0].element == "room-001"
 
 
+@pytest.mark.parametrize("others", [[(1, 1, 4, 5), (4, 1, 7, 5)], [(0.5, 0.5, 4, 6), (4, 0.5, 8, 6)]])
+def test_a_room_that_others_fill_is_left_out_and_reported(
+    read: Read, others: list[tuple[float, float, float, float]]
+) -> None:
+    """They lie in it, or stick out of it."""
+
+    def draw(model: Modelspace) -> None:
+        for ring in ((1, 1, 7, 5), *others):
+            rectangle(model, "ROOMS", *ring)
+
+    plan = read(draw)
+    assert len(plan.rooms) == 2
+    assert "no_area" in codes(plan)
+
+
 def test_rooms_may_be_drawn_as_lines(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         lines_around(model, "ROOMS", [(0, 0), (10, 0), (10, 8), (0, 8)])

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from stopgo.planner.geometry import ring_index
-from stopgo.planner.geometry.ring_index import FEW, RingIndex, areas_within, triangles_of
+from stopgo.planner.geometry.ring_index import FEW, RingIndex, areas_within, parts_within, triangles_of
 from stopgo.planner.geometry.shapes import polygon_parts
 
 
@@ -66,3 +66,12 @@ def test_triangles_cover_a_large_polygon_once(angle: float, monkeypatch: pytest.
     assert shapely.area(shapely.symmetric_difference(shapely.union_all(triangles), slab)) < 1e-9
     monkeypatch.undo()
     assert len(triangles_of(slab)) < len(triangles)
+
+
+def test_parts_of_shapes_in_a_large_one_are_cut_from_its_pieces() -> None:
+    whole = _slabs(60, angle=24.7)
+    cells = np.array([*(shapely.box(*bounds) for bounds in _boxes(3.0)), shapely.Polygon()], dtype=object)
+    parts = parts_within(cells, whole)
+    assert all(part.is_empty for part in parts_within(cells[-1:], whole))
+    assert shapely.area(parts) == pytest.approx(shapely.area(shapely.intersection(cells, whole)), abs=1e-9)
+    assert shapely.area(parts) == pytest.approx(areas_within(cells, whole), abs=1e-9)

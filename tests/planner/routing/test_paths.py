@@ -62,3 +62,14 @@ def test_a_path_by_itself_is_that_of_a_search_of_the_whole_graph(seed: int) -> N
     whole = shortest_paths(*network(seed), POINTS, trees=True)
     for a, b in np.random.default_rng(seed).integers(0, POINTS, (60, 2)).tolist():
         assert found.path(a, b).tolist() == whole.path(a, b).tolist()
+
+
+def test_a_path_of_a_graph_whose_lengths_are_rounded_is_found() -> None:
+    """Those of a third-party graph may be a little shorter than the straight lines between its nodes."""
+    found = shortest_paths(*network(1), 9)
+    low = found.graph.copy()
+    low.data = np.nextafter(low.data.astype(np.float32), np.float32(0)).astype(float)
+    rounded = replace(found, graph=low, lengths=dijkstra(low, directed=False, indices=range(9))[:, :9])
+    for a in range(9):
+        for b in range(9):
+            assert rounded.path(a, b).tolist() == found.path(a, b).tolist()
