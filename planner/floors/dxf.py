@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 from ezdxf.document import Drawing
 
@@ -178,6 +179,7 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
     roles = {stroke.role for stroke in sheet.strokes}
     if not sheet.outlined and "walls" not in roles:
         raise InputError(f"{path}: {_no_walls(sheet)}")
+    _check_meetings(sheet, path)
     size = _size(sheet)
     if sheet.outlined:
         named = [as_room_name(word) for word in sheet.words]
@@ -212,6 +214,21 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
     return made
 
 
+def _check_meetings(sheet: DxfSheet, path: Path) -> None:
+    """Refuse walls of which very many lines end at one place: to find rooms between them takes minutes."""
+    lines = [stroke.points for stroke in sheet.strokes if stroke.role == "walls" and len(stroke.points)]
+    if len(lines) <= MOST_MEETING:
+        return
+    ends = np.round(np.concatenate([line[[0, -1]] for line in lines]), 3)
+    places, many = np.unique(ends, axis=0, return_counts=True)
+    if many.max() > MOST_MEETING:
+        x, y = places[np.argmax(many)].tolist()
+        raise InputError(
+            f"{path}: {many.max()} lines of walls end at ({x:.2f}, {y:.2f}), more than {MOST_MEETING}: that "
+            "is a symbol, no walls; put the walls on a layer of their own"
+        )
+
+
 def _encloses_nothing(made: Derived) -> bool:
     """True if walls enclose no floor, or only a corner between a few of them, or no room and no opening."""
     roles = {stroke.role for stroke in made.strokes}
@@ -230,6 +247,8 @@ def _enclose_nothing(sheet: DxfSheet) -> str:
     return f"the walls on {walls} enclose no floor"
 
 
+MOST_MEETING = 300
+"""Lines of walls that may end within a millimetre of one another."""
 _CORNER_M2 = 5.0
 """Least area in m² of a floor whose walls are open, or lie mostly elsewhere."""
 

@@ -75,6 +75,16 @@ def test_blocks_too_deep_in_one_another_are_refused(tmp_path: Path) -> None:
         read_floor(saved(made, tmp_path))
 
 
+def test_a_symbol_of_very_many_lines_is_no_walls(tmp_path: Path) -> None:
+    """Between 2 500 lines from one point, rooms were searched for minutes, and no signal was heard."""
+    made = drawing()
+    rectangle(made.modelspace(), "FLOOR", 0, 0, 10, 8)
+    for k in range(400):
+        made.modelspace().add_line((5, 4), (5 + k / 200, 6), dxfattribs={"layer": "WALLS"})
+    with pytest.raises(InputError, match=r"400 lines of walls end at \(5.00, 4.00\), more than 300: that is"):
+        read_floor(saved(made, tmp_path))
+
+
 def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "bomb.ifczip"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
