@@ -31,20 +31,8 @@ def without_furniture(*given: object) -> list[object]:
 
 
 def planned(path: Path, *more: str) -> int:
-    return main(
-        [
-            "plan",
-            str(path),
-            "--storey",
-            "EG",
-            "-o",
-            str(path.parent / "plan"),
-            "--range",
-            "6",
-            "--no-sheets",
-            *more,
-        ]
-    )
+    few = ["--range", "6", "--no-sheets"]
+    return main(["plan", str(path), "--storey", "EG", "-o", str(path.parent / "plan"), *few, *more])
 
 
 def test_the_bodies_of_a_floor_are_those_in_the_robots_height(read: Read, tmp_path: Path) -> None:
