@@ -215,18 +215,18 @@ def top_up(
     """
     _must_be_whole((planned.mission, *others))
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
-    wanted = None
-    if planned.is_follow_up and measured is None:
-        known = replace(known, settings=replace(known.settings, coverage=1.0))
-        wanted = known.left_of(poses)
-        if not wanted.any():
-            return None
+    known, wanted = _wanted_on(known, poses) if planned.is_follow_up and measured is None else (known, None)
+    if wanted is not None and not wanted.any():
+        return None
     seen, done = _with_poses(known, poses, measured, wanted)
     selection = select_follow_up(seen, done)
-    if not len(selection.chosen):
-        return None
-    mission = assemble(_driven(selection, planned.settings, done))
-    return _follow_up(mission, planned.mission, evidence, _coverage_alone(known, mission))
+    return _follow_up(known, selection, done, evidence) if len(selection.chosen) else None
+
+
+def _wanted_on(follow_up: PlannedFloor, poses: ScanPoses) -> tuple[PlannedFloor, BoolArray]:
+    """Return a follow-up mission's floor with all coverage required, and the units for which it is (n,)."""
+    known = replace(follow_up, settings=replace(follow_up.settings, coverage=1.0))
+    return known, known.left_of(poses)
 
 
 def _driven(selection: Selection, settings: Settings, done: IntArray) -> Route:
@@ -291,11 +291,13 @@ def _with_poses(
     return whole, np.arange(seen.rows, seen.rows + len(poses))
 
 
-def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float) -> Mission:
-    """Return the mission with its own id, and with the frame and georeference of the mission before.
+def _follow_up(known: PlannedFloor, selection: Selection, done: IntArray, evidence: str) -> Mission:
+    """Return the mission through the selected stops, with the frame and georeference of the mission before.
 
-    Its required coverage is what its own stops reach, for one view of each target.
+    It has its own id. Its required coverage is what its own stops reach, for one view of each target.
     """
+    mission, before = assemble(_driven(selection, known.settings, done)), known.mission
+    coverage = _coverage_alone(known, mission)
     asked = {"coverage": math.floor(coverage * 1e6) / 1e6, "room_coverage": 0.0, "kind_coverage": 0.0}
     parameters = {**mission.origin.parameters, **asked}
     parameters.pop("views", None)

@@ -29,7 +29,7 @@ from stopgo.recordings.logs.kitti import read_kitti
 from stopgo.recordings.logs.ros_poses import headings_of
 
 Numbers = tuple[float, ...]
-Row = tuple[int, Numbers]
+TableRow = tuple[int, Numbers]
 """Time in ns; x, y, heading in radians and height (NaN without one)."""
 TUM_COLUMNS = 8
 
@@ -110,7 +110,7 @@ def read_csv(path: Path, reading: Reading) -> FieldLog:
         columns = _Columns(
             [name.strip() for name in next(csv.reader(io.StringIO(begin), delimiter=separator))], path
         )
-        robots: dict[str, list[Row]] = {}
+        robots: dict[str, list[TableRow]] = {}
         lost = 0
         for cells in csv.reader(file, delimiter=separator):
             row = columns.row([cell.replace(",", ".") for cell in cells] if separator == ";" else cells)
@@ -176,7 +176,7 @@ class _Columns:
     def needed(self) -> tuple[str, ...]:
         return (self.time, *self.position)
 
-    def row(self, cells: list[str]) -> Row | None:
+    def row(self, cells: list[str]) -> TableRow | None:
         """Return the values of a row; None if one of them cannot be read."""
         try:
             ns = self._ns(cells[self.at[self.time]])
@@ -208,7 +208,7 @@ class _Columns:
             return float(headings_of(numbers)[0])
         return float("nan")
 
-    def track(self, rows: list[Row], robot: str) -> Poses | None:
+    def track(self, rows: list[TableRow], robot: str) -> Poses | None:
         """Return the poses of one robot in the order of time; None if none is valid."""
         ns, table = [row[0] for row in rows], np.array([row[1] for row in rows])
         if self.position[0].startswith("lat"):
