@@ -57,6 +57,7 @@ Timeout = Annotated[
     typer.Option(
         "--timeout",
         min=0.1,
+        max=1e6,
         metavar="S",
         rich_help_panel=CONNECTION,
         help="Longest wait for an answer, in seconds.",
@@ -67,6 +68,7 @@ PushTimeout = Annotated[
     typer.Option(
         "--timeout",
         min=0.1,
+        max=1e6,
         metavar="S",
         rich_help_panel=CONNECTION,
         help="Longest wait without an answer, in seconds; if not given, 5 to find the robot and 20 for each"
@@ -497,7 +499,11 @@ StationCommand = Annotated[
 ActionTime = Annotated[
     float,
     typer.Option(
-        "--patience", metavar="S", min=1, help="Time that you have for each action, without --command."
+        "--patience",
+        metavar="S",
+        min=1,
+        max=1e6,
+        help="Time that you have for each action, without --command.",
     ),
 ]
 

@@ -96,7 +96,7 @@ class Inbox:
         held = self._journal.missions.newest_manifest(mission_id)
         if held is None or held.revision < manifest.revision:
             return None
-        if (held.revision, held.digest) == (manifest.revision, manifest.digest) or self._holds(manifest):
+        if (held.revision, held.digest) == (manifest.revision, manifest.digest):
             return None
         if held.revision > manifest.revision:
             return _no(

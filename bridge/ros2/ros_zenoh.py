@@ -191,7 +191,7 @@ def read_domain(text: str) -> tuple[int | None, str]:
     domain, _, namespace = text.partition("/")
     if domain == BRIDGED:
         return None, namespace
-    if not domain.isdigit() or int(domain) > 232:
+    if not domain.isdecimal() or int(domain) > 232:
         raise InputError(
             f"--ros2 {text}: write the domain's number, 0 to 232, or DOMAIN/NAMESPACE, as 0/r1;"
             f" behind zenoh-bridge-ros2dds, {BRIDGED}/r1"

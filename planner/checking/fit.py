@@ -134,7 +134,7 @@ class _Fit:
     def over_ignored(self, mission: Mission) -> Iterator[Problem]:
         """Legs over lines of the drawing that were not read."""
         legs = [stop.approach for stop in mission.stops] + ([mission.return_] if mission.return_ else [])
-        shapes = [shapely.LineString(self._local(leg)) for leg in legs]
+        shapes = [shapely.LineString(self._local(leg)) for leg in legs if leg]
         radius = self.settings.radius
         for item in over_ignored(self.floor, shapes, stops=len(mission.stops), radius=radius):
             yield Problem("$.stops", item.message)

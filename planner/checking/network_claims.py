@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 import msgspec
 import numpy as np
 import shapely
+from msgspec.structs import replace
 from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.document import Mission, Stop, mission_id
@@ -45,15 +46,24 @@ REQUIRED = "the plan's parameters require scans that register with one another"
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
     """Every pair that registers less well than claimed or required, and pairs that are missing."""
     required = space.settings.registers
-    yield from _understated_errors(mission, space)
+    known = _with_known_pairs(mission)
+    yield from _understated_errors(known, space)
     if isinstance(mission.network, msgspec.UnsetType):
         if required and len(mission.stops) > 1:
             yield Problem("$.network", f"is missing, but {REQUIRED}")
         return
     yield from _weak_pairs(mission, space)
     if required and mission.share is msgspec.UNSET and _is_whole(mission, space):
-        yield from _separate_scans(mission, space)
-        yield from _inaccurate_scans(mission, space)
+        yield from _separate_scans(known, space)
+        yield from _inaccurate_scans(known, space)
+
+
+def _with_known_pairs(mission: Mission) -> Mission:
+    """Return the mission without pairs of stops that it does not have: these are problems of the document."""
+    if isinstance(mission.network, msgspec.UnsetType):
+        return mission
+    stops = {stop.id for stop in mission.stops}
+    return replace(mission, network=tuple(pair for pair in mission.network if {pair.a, pair.b} <= stops))
 
 
 def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
@@ -69,6 +79,8 @@ def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
         "share": settings.least_overlap,
     }
     for index, pair in enumerate(mission.network):
+        if not {pair.a, pair.b} <= row.keys():
+            continue
         pairs = overlaps.of(row[pair.a])
         at = np.flatnonzero(pairs.other == row[pair.b])
         for key, needed in least.items():

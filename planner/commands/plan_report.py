@@ -133,14 +133,20 @@ class PlanReport:
             ],
         }
 
+    @property
+    def joined_mission(self) -> Mission:
+        """The mission of all scans in the network."""
+        return self.mission
+
     def _error_lines(self) -> list[str]:
         """Line on the scan with the greatest predicted error in the frame of its network."""
-        errors = {stop.id: stop.error.major_m for stop in self.mission.stops if stop.error}
+        mission = self.joined_mission
+        errors = {stop.id: stop.error.major_m for stop in mission.stops if stop.error}
         if self.network is None or not self.network.overlaps or not errors:
             return []
         worst = max(errors, key=errors.__getitem__)
         at = f"{worst}: {1000 * errors[worst]:.1f} mm (standard deviation)"
-        frame = frame_of(self.mission) or CONTROL_FRAME
+        frame = frame_of(mission) or CONTROL_FRAME
         return [f"    error     predicted, in the frame of {frame}, at most at {at}"]
 
     def as_text(self) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from msgspec.structs import replace
+
 from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
@@ -40,15 +42,24 @@ class SharedReport(PlanReport):
     @property
     def network(self) -> Network | None:
         """The network of the scans of all missions; stop s03 of the first mission is 1:s03."""
+        joined = network_of(self.divided.whole.mission)
+        return None if joined is None else joined.renamed(self._names())
+
+    @property
+    def joined_mission(self) -> Mission:
+        """The stops of all missions, with names as in the network."""
+        whole, names = self.divided.whole.mission, self._names()
+        return replace(whole, stops=tuple(replace(stop, id=names[stop.id]) for stop in whole.stops))
+
+    def _names(self) -> dict[str, str]:
+        """Return the name of each stop of the whole plan by its mission: s03 of the first one is 1:s03."""
         whole = self.divided.whole
         name = {
             row: f"{number}:{stop.id}"
             for number, report in enumerate(self.reports, 1)
             for row, stop in zip(_rows(report.part), report.mission.stops, strict=True)
         }
-        named = {stop.id: name[row] for row, stop in zip(_rows(whole), whole.mission.stops, strict=True)}
-        joined = network_of(whole.mission)
-        return None if joined is None else joined.renamed(named)
+        return {stop.id: name[row] for row, stop in zip(_rows(whole), whole.mission.stops, strict=True)}
 
     @property
     def exit_code(self) -> int:

@@ -16,13 +16,15 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.as_driven import AsDriven
-from stopgo.mission.document import Mission, with_digest
+from stopgo.mission.document import Mission, Stop, mission_id, with_digest
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
+from stopgo.mission.run.scans import heading_error
+from stopgo.mission.run.tolerance import is_outside
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
@@ -41,6 +43,8 @@ from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.sight.sightlines import SightLines
 from stopgo.planner.visibility.unit_ranges import visibility_of
 
+NAME = "-top-up"
+"""End of the name of a follow-up mission."""
 ScanPoses = FloatArray
 """x, y and heading of each scan (n, 3)."""
 
@@ -65,14 +69,41 @@ class PlannedFloor:
     @cached_property
     def stops_see(self) -> BoolArray:
         """True for units that enough of the mission's stops see (n,)."""
-        stops = np.array([(stop.x, stop.y, stop.heading) for stop in self.mission.stops]).reshape(-1, 3)
-        views = _views(self.space, SightLines(self.space), stops)
+        views = _views(self.space, SightLines(self.space), _poses_of(self.mission.stops))
         return _seen_by(views, totals_of_plan(self.seen))
 
     @property
     def is_part(self) -> bool:
         """True if the mission shares its floor with others: what is required holds for all together."""
         return self.mission.share is not UNSET
+
+    @cached_property
+    def is_follow_up(self) -> bool:
+        """True if the mission is for what an earlier run left out: nothing is required but its own stops."""
+        if self.is_part or not self.mission.name.endswith(NAME):
+            return False
+        made_by, parts = self.mission.origin.stopgo, range(len(reach_of(self.space).parts.areas))
+        own = {mission_id(self.floor.source, self.settings, made_by, part) for part in parts}
+        return self.mission.id not in own
+
+    def left_of(self, poses: ScanPoses) -> BoolArray:
+        """Return the units of the stops without a pose within tolerance, which no pose sees (n,).
+
+        Raises
+        ------
+        NegativeResult
+            When no candidate sees any of them.
+        """
+        lines = SightLines(self.space)
+        left = [stop for stop in self.mission.stops if not _is_scanned(self.mission, stop, poses)]
+        wanted = np.zeros(self.space.targets.total, dtype=bool)
+        for units in _views(self.space, lines, _poses_of(left)):
+            wanted[units] = True
+        for units in _views(self.space, lines, poses):
+            wanted[units] = False
+        if wanted.any() and not (wanted & self.seen.visible).any():
+            raise NegativeResult(f"{self.mission.name}: no candidate sees what its missed stops were to see")
+        return frozen(wanted, np.bool_)
 
     @property
     def _part(self) -> int:
@@ -111,9 +142,23 @@ def as_driven(planned: PlannedFloor, poses: ScanPoses) -> AsDriven:
     """
     totals = totals_of_plan(planned.seen)
     return AsDriven(
-        totals=totals.without_requirements if planned.is_part else totals,
+        totals=totals.without_requirements if planned.is_part or planned.is_follow_up else totals,
         planned=planned.stops_see,
         driven=_seen_by(_views(planned.space, SightLines(planned.space), poses), totals),
+    )
+
+
+def _poses_of(stops: Sequence[Stop]) -> ScanPoses:
+    """Return the planned poses of stops."""
+    return np.array([(stop.x, stop.y, stop.heading) for stop in stops]).reshape(-1, 3)
+
+
+def _is_scanned(mission: Mission, stop: Stop, poses: ScanPoses) -> bool:
+    """True if a pose is within the stop's tolerance, with the heading that the scanner needs."""
+    return any(
+        not is_outside(math.dist((x, y), (stop.x, stop.y)), stop.tolerance_m)
+        and not heading_error(mission.scanner, stop.heading, heading)
+        for x, y, heading in poses.tolist()
     )
 
 
@@ -170,12 +215,18 @@ def top_up(
     """
     _must_be_whole((planned.mission, *others))
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
-    seen, done = _with_poses(known, poses, measured)
-    selection = select_follow_up(seen, done)
-    if not len(selection.chosen):
+    known, wanted = _wanted_on(known, poses) if planned.is_follow_up and measured is None else (known, None)
+    if wanted is not None and not wanted.any():
         return None
-    mission = assemble(_driven(selection, planned.settings, done))
-    return _follow_up(mission, planned.mission, evidence, _coverage_alone(known, mission))
+    seen, done = _with_poses(known, poses, measured, wanted)
+    selection = select_follow_up(seen, done)
+    return _follow_up(known, selection, done, evidence) if len(selection.chosen) else None
+
+
+def _wanted_on(follow_up: PlannedFloor, poses: ScanPoses) -> tuple[PlannedFloor, BoolArray]:
+    """Return a follow-up mission's floor with all coverage required, and the units for which it is (n,)."""
+    known = replace(follow_up, settings=replace(follow_up.settings, coverage=1.0))
+    return known, known.left_of(poses)
 
 
 def _driven(selection: Selection, settings: Settings, done: IntArray) -> Route:
@@ -186,12 +237,9 @@ def _driven(selection: Selection, settings: Settings, done: IntArray) -> Route:
 
 def _coverage_alone(known: PlannedFloor, mission: Mission) -> float:
     """Return the coverage of a mission's own stops, for one view of each target."""
-    stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(totals_of_plan(known.seen), asked=frozen([1], np.int64))
-    return (
-        once.coverage(_seen_by(_views(known.space, SightLines(known.space), stops), once)).whole.coverage
-        or 0.0
-    )
+    views = _views(known.space, SightLines(known.space), _poses_of(mission.stops))
+    return once.coverage(_seen_by(views, once)).whole.coverage or 0.0
 
 
 def _must_be_whole(missions: Sequence[Mission]) -> None:
@@ -222,11 +270,11 @@ def _with(floor: FloorPlan, obstacles: Sequence[Polygon]) -> FloorPlan:
 
 
 def _with_poses(
-    planned: PlannedFloor, poses: ScanPoses, measured: BoolArray | None
+    planned: PlannedFloor, poses: ScanPoses, measured: BoolArray | None, wanted: BoolArray | None
 ) -> tuple[Visibility, IntArray]:
     """Return the visibility with a row added for each scan pose, and the numbers of these rows.
 
-    Where clouds show what was measured, each row has that instead.
+    Where clouds show what was measured, each row has that instead. Only units `wanted` count, if given.
     """
     seen, space = planned.seen, planned.space
     if measured is None:
@@ -237,15 +285,19 @@ def _with_poses(
         views = [np.flatnonzero(measured & seen.visible)] * len(poses)
     joined = with_scans(seen.candidates, poses)
     units = [*(seen.seen_by(row) for row in range(seen.rows)), *views]
+    if wanted is not None:
+        units = [row[wanted[row]] for row in units]
     whole = visibility_of(joined, units, method=seen.method)
     return whole, np.arange(seen.rows, seen.rows + len(poses))
 
 
-def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float) -> Mission:
-    """Return the mission with its own id, and with the frame and georeference of the mission before.
+def _follow_up(known: PlannedFloor, selection: Selection, done: IntArray, evidence: str) -> Mission:
+    """Return the mission through the selected stops, with the frame and georeference of the mission before.
 
-    Its required coverage is what its own stops reach, for one view of each target.
+    It has its own id. Its required coverage is what its own stops reach, for one view of each target.
     """
+    mission, before = assemble(_driven(selection, known.settings, done)), known.mission
+    coverage = _coverage_alone(known, mission)
     asked = {"coverage": math.floor(coverage * 1e6) / 1e6, "room_coverage": 0.0, "kind_coverage": 0.0}
     parameters = {**mission.origin.parameters, **asked}
     parameters.pop("views", None)
@@ -255,7 +307,7 @@ def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float
         changed(
             mission,
             id=hashlib.sha256(basis.encode()).hexdigest()[:32],
-            name=f"{before.name}-top-up",
+            name=f"{before.name}{NAME}",
             frame=before.frame,
             georeference=before.georeference,
             limits=limits_spec_of(settings),

@@ -29,6 +29,8 @@ from stopgo.recordings.logs.kitti import read_kitti
 from stopgo.recordings.logs.ros_poses import headings_of
 
 Numbers = tuple[float, ...]
+TableRow = tuple[int, Numbers]
+"""Time in ns; x, y, heading in radians and height (NaN without one)."""
 TUM_COLUMNS = 8
 
 
@@ -74,7 +76,7 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
     ns = np.rint(table[:, 0] * 1e9).astype(np.int64)
     name = "EuRoC" if euroc else "TUM"
     track = poses_of(name, "trajectory", ns, table[:, 1:3], headings_of(table[:, 4:]), height=table[:, 3])
-    return _log(path, f"{name} trajectory", track, len(rows), lost, ns)
+    return _log(path, f"{name} trajectory", [] if track is None else [track], len(rows), lost, ns)
 
 
 def _looks_like_euroc(path: Path) -> bool:
@@ -108,16 +110,18 @@ def read_csv(path: Path, reading: Reading) -> FieldLog:
         columns = _Columns(
             [name.strip() for name in next(csv.reader(io.StringIO(begin), delimiter=separator))], path
         )
-        rows, lost = [], 0
+        robots: dict[str, list[TableRow]] = {}
+        lost = 0
         for cells in csv.reader(file, delimiter=separator):
             row = columns.row([cell.replace(",", ".") for cell in cells] if separator == ";" else cells)
             lost += bool(cells) and row is None
-            rows += [] if row is None else [row]
-    if not rows:
+            if row is not None:
+                robots.setdefault(columns.robot_of(cells), []).append(row)
+    if not robots:
         raise InputError(f"{path}: no row has numbers for {', '.join(columns.needed)}")
-    ns = [row[0] for row in rows]
-    track = columns.track([row[1] for row in rows], ns)
-    return _log(path, "CSV trajectory", track, len(rows), lost, np.array(ns, np.int64))
+    tracks = [track for robot, own in robots.items() if (track := columns.track(own, robot)) is not None]
+    ns = np.array([row[0] for own in robots.values() for row in own], np.int64)
+    return _log(path, "CSV trajectory", tracks, len(ns), lost, ns)
 
 
 TIMES: dict[str, float] = {
@@ -134,6 +138,8 @@ PLACES = (
     ("lat", "lon"),
     ("latitude", "longitude"),
 )
+ROBOTS = ("robot", "robot_name", "robot_id", "vehicle", "vehicle_id", "agent")
+"""Column names of the robot, where a table has the poses of several."""
 HEIGHTS = ("z", "z_m", "pz", "pos_z")
 TURNS: dict[str, Callable[[float], float]] = {
     **dict.fromkeys(("heading", "yaw", "theta", "heading_rad", "yaw_rad"), float),
@@ -153,6 +159,7 @@ class _Columns:
         self.time = next((name for name in TIMES if name in at), "")
         self.position: tuple[str, ...] = next((pair for pair in PLACES if set(pair) <= at.keys()), ())
         self.height = next((name for name in HEIGHTS if name in at), "")
+        self.robot = next((name for name in ROBOTS if name in at), "")
         self.turn = next((name for name in TURNS if name in at), "")
         self.quaternion: tuple[str, ...] = next(
             (names for names in QUATERNIONS if set(names) <= at.keys()), ()
@@ -169,8 +176,8 @@ class _Columns:
     def needed(self) -> tuple[str, ...]:
         return (self.time, *self.position)
 
-    def row(self, cells: list[str]) -> tuple[int, Numbers] | None:
-        """Return the time in ns, then x, y, heading in radians and height (NaN without one)."""
+    def row(self, cells: list[str]) -> TableRow | None:
+        """Return the values of a row; None if one of them cannot be read."""
         try:
             ns = self._ns(cells[self.at[self.time]])
             if abs(ns) > LATEST_S * 1e9:
@@ -180,6 +187,11 @@ class _Columns:
             return ns, (x, y, self._heading(cells), height)
         except (ValueError, IndexError, OverflowError):
             return None
+
+    def robot_of(self, cells: list[str]) -> str:
+        """Return the name of the robot in a row; empty without one."""
+        at = self.at.get(self.robot, len(cells))
+        return cells[at].strip() if at < len(cells) else ""
 
     def _ns(self, cell: str) -> int:
         if re.match(r"\d{4}-\d\d-\d\d[T ]", cell):
@@ -196,16 +208,17 @@ class _Columns:
             return float(headings_of(numbers)[0])
         return float("nan")
 
-    def track(self, rows: list[Numbers], ns: list[int]) -> Poses | None:
-        table = np.array(rows)
+    def track(self, rows: list[TableRow], robot: str) -> Poses | None:
+        """Return the poses of one robot in the order of time; None if none is valid."""
+        ns, table = [row[0] for row in rows], np.array([row[1] for row in rows])
         if self.position[0].startswith("lat"):
-            return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]))
+            return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]), robot=robot)
         height = table[:, 3] if self.height else None
-        return poses_of("CSV", "table", ns, table[:, :2], table[:, 2], height=height)
+        return poses_of("CSV", "table", ns, table[:, :2], table[:, 2], height=height, robot=robot)
 
 
-def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: np.ndarray) -> FieldLog:
-    ns = ns if track is None else track.ns
+def _log(path: Path, form: str, tracks: list[Poses], rows: int, lost: int, ns: np.ndarray) -> FieldLog:
+    ns = np.concatenate([track.ns for track in tracks]) if tracks else ns
     last = float(ns.max()) / 1e9
     return FieldLog(
         path=str(path),
@@ -216,7 +229,7 @@ def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: n
         begin_ns=int(ns.min()),
         end_ns=int(ns.max()),
         channels=(Channel("pose", "", rows),),
-        poses=() if track is None else (track,),
+        poses=tuple(tracks),
         lost=f"{lost} of {rows + lost} lines cannot be read" if lost else "",
     )
 

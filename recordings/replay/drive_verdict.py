@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -103,6 +104,11 @@ def _against(replay: Replay, against: Sequence[StopEvidence]) -> Iterator[str]:
         if one.is_placed and item.outside_text:
             far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
             yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
+        if one.turned:
+            yield (
+                f"{item.stop}: turned {math.degrees(abs(item.heading_rad or 0.0)):.1f}° from its heading; "
+                f"the scanner sees {replay.mission.scanner.fov_deg:g}°."
+            )
 
 
 def _floor_sentences(replay: Replay) -> Iterator[str]:

@@ -23,6 +23,7 @@ from stopgo.mission.run.tolerance import is_outside
 from stopgo.recordings.logs.telemetry_log import FORMAT
 from stopgo.recordings.replay.fit_error import fit_error_m
 from stopgo.recordings.replay.fitting import STRETCH
+from stopgo.recordings.replay.heading_evidence import heading_answer
 from stopgo.recordings.replay.jumps import (
     LEAST_CORRECTION_M,
     SIGMAS,
@@ -53,6 +54,8 @@ class StopEvidence:
     """Uncertainty of its position error; infinite where nothing limits it, None without a position."""
     is_placed: bool = True
     """True if the log has a pose of a standstill there, or the stop was not visited."""
+    turned: bool = False
+    """True if the robot did not face as its scanner needs."""
 
 
 def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
@@ -66,7 +69,8 @@ def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
         evidence = _with_hidden_jump(replay, k, evidence, hidden_m)
         evidence = _with_shifted_part(replay, k, evidence, errors)
         common_m = float(errors.unsure_m[k] + fit_m[k])
-        one = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
+        evidence = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
+        one = _with_heading(replay, k, evidence, drifts=errors.drifts)
         placed = one.is_placed and item.deviation_m is not None
         unsure_m = None if not placed else common_m + max(jump_m, hidden_m) + float(errors.spread_m[k])
         found.append(changed(one, unsure_m=unsure_m))
@@ -132,6 +136,14 @@ def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: boo
     ):
         return evidence
     return StopEvidence(item, "unknown", FIT if headings else NO_HEADINGS)
+
+
+def _with_heading(replay: Replay, number: int, evidence: StopEvidence, *, drifts: bool) -> StopEvidence:
+    """Return a yes as a no, or undecided, if the robot faced elsewhere or the log does not show where."""
+    if evidence.answer != "yes":
+        return evidence
+    answer, why = heading_answer(replay, number, drifts=drifts)
+    return changed(evidence, answer=answer, why=why, turned=answer == "no")
 
 
 NO_HEADINGS = "the log has no headings, so that a turn of the whole drive is hidden; give --map X,Y,HEADING"

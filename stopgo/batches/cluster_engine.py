@@ -172,7 +172,7 @@ def _problem_of(address: str, version: str, threads: int) -> str | None:
 def _must_answer(address: str) -> None:
     """Refuse an address at which nothing listens: the library would try for many seconds."""
     host, _, port = address.rpartition("//")[2].rpartition(":")
-    if not port.isdigit():
+    if not port.isdecimal():
         raise InputError(f"--scheduler {address}: give an address such as tcp://127.0.0.1:8786")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=10.0).close()

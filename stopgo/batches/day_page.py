@@ -45,7 +45,7 @@ def begin_of(text: str) -> float:
         When the text is no time of a day.
     """
     hours, _, minutes = text.partition(":")
-    if not (hours.isdigit() and minutes.isdigit() and int(hours) < 24 and int(minutes) < 60):
+    if not (hours.isdecimal() and minutes.isdecimal() and int(hours) < 24 and int(minutes) < 60):
         raise InputError(f"[day]: begin = {text!r}: give a time such as 07:00")
     return 3600.0 * int(hours) + 60.0 * int(minutes)
 

@@ -44,7 +44,10 @@ AgeOption = Annotated[
     typer.Option(metavar="TIME", help="With --gc: also results not used for 12h, 30d, 2w."),
 ]
 SizeOption = Annotated[
-    float, typer.Option("--store-gb", help="Largest size of the store; the longest unused results go first.")
+    float,
+    typer.Option(
+        "--store-gb", min=0, max=1e6, help="Largest size of the store; the longest unused results go first."
+    ),
 ]
 
 
@@ -169,7 +172,7 @@ def _collect(store: ResultStore, unused_for: str | None, store_gb: float) -> int
 
 def _seconds(text: str) -> float:
     unit = UNITS.get(text[-1:])
-    if unit is None or not text[:-1].replace(".", "", 1).isdigit():
+    if unit is None or not text[:-1].replace(".", "", 1).isdecimal():
         raise InputError(f"--unused-for {text}: give hours, days or weeks, such as 12h, 30d or 2w")
     return float(text[:-1]) * unit
 

@@ -113,6 +113,17 @@ def test_a_dry_run_lists_the_entries_and_plans_nothing(site: Path) -> None:
 
 
 @pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize("option", [("--store-gb", "nan"), ("--store-gb", "inf"), ("--unused-for", "²d")])
+def test_sizes_and_ages_that_are_none_are_refused_before_anything_is_planned(
+    option: tuple[str, str], site: Path
+) -> None:
+    """A size was first looked at when the last entry had been planned."""
+    done = called("batch", str(site / "plans.toml"), "-o", str(site / "out"), "--gc", *option)
+    assert done.returncode == 2 and option[0] in done.stderr
+    assert not (site / "out").exists() or not (site / "out" / "a").exists()
+
+
+@pytest.mark.usefixtures("in_this_process")
 def test_old_results_are_removed_on_request(site: Path) -> None:
     batch(site)
     done = called("batch", str(site / "plans.toml"), "-o", str(site / "out"), "--gc", "--store-gb", "0")

@@ -54,3 +54,14 @@ def test_options_that_cannot_be_are_refused_in_one_line(
     assert said in out.err
     assert len(out.err.strip().splitlines()) == 1
     assert not list(tmp_path.iterdir()), "nothing is begun"
+
+
+@pytest.mark.parametrize("seconds", ["inf", "nan", "1e300"])
+@pytest.mark.parametrize("command", [["status"], ["push", "mission.json"]])
+def test_a_wait_without_an_end_is_refused_in_one_line(
+    command: list[str], seconds: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = main([*command, "--robot", "r1", "--connect", "tcp/127.0.0.1:1", "--timeout", seconds])
+    assert code == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "'--timeout'" in line

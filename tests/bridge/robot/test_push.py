@@ -90,6 +90,16 @@ def test_an_older_revision_is_refused() -> None:
         field.station().push(corridor(revision=1))
 
 
+def test_an_older_revision_is_refused_though_it_is_still_stored() -> None:
+    """It was taken without a word, and the robot would have driven the plan that was replaced."""
+    field = Field()
+    for revision in (1, 2):
+        field.station().push(corridor(revision=revision))
+    with pytest.raises(NegativeResult, match="older_revision"):
+        field.station().push(corridor(revision=1))
+    assert field.controller.run.revision == 2
+
+
 def test_another_mission_is_refused_while_one_runs() -> None:
     field = Field()
     field.station().push(corridor())

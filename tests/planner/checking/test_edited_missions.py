@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 from msgspec import UNSET
 
-from stopgo.mission.document import Mission, stop_names
+from stopgo.command_line import main
+from stopgo.mission.document import Mission, stop_names, with_digest
+from stopgo.mission.files import mission_json
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.checking.claims import overclaims, recount
@@ -154,3 +158,24 @@ def test_a_follow_up_mission_may_leave_its_scans_apart(network: tuple[Mission, N
     mission, space = network
     followed = change(without_errors(mission), network=(), id="0" * 32)
     assert list(network_overclaims(followed, space)) == []
+
+
+@pytest.mark.parametrize(
+    "edited, text",
+    [
+        (lambda stops: stops[:-1], "which is not a stop"),
+        (lambda stops: (change(stops[0], id="mine"), *stops[1:]), "which is not a stop"),
+        (lambda stops: (), "$.stops: is empty"),
+        (lambda stops: (*stops[:-1], change(stops[-1], approach=())), "approach: is empty"),
+        (lambda stops: (*stops[:-1], change(stops[-1], x=9000.0)), "lies 89"),
+    ],
+    ids=["dropped", "renamed", "none", "no leg", "far"],
+)
+def test_the_command_checks_stops_that_were_edited_by_hand(
+    edited: Callable[[Any], Any], text: str, made: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The pairs of the network still name the stops as planned."""
+    mission = mission_json.read(made)
+    mission_json.write(with_digest(change(mission, stops=edited(mission.stops))), made)
+    assert main(["check", str(made), "--floor", str(made.with_name("floor.dxf"))]) == 1
+    assert text in capsys.readouterr().out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -231,12 +232,18 @@ def test_more_robots_start_where_they_are_put() -> None:
 
 def test_the_scans_of_all_robots_are_one_network_reported_by_mission_and_stop() -> None:
     made = settled("rooms", robots=2, overlap=0.1, d_sec=0.4)
-    report = shared_report(made, [PlanReport(part, {}, {}) for part in made.shares])
+    files = {name: Path(name) for name in ("mission", "recording", "picture", "coverage")}
+    report = shared_report(made, [PlanReport(part, files, {}) for part in made.shares])
     network = report.network
     assert network is not None
     assert len(network.pieces) == 1
     stops = {f"{k}:{stop.id}" for k, part in enumerate(made.shares, 1) for stop in part.mission.stops}
     assert set(network.stops) == stops
+    (line,) = [line for line in report.as_text().splitlines() if line.startswith("    error ")]
+    errors = {stop.id: stop.error.major_m for stop in made.whole.mission.stops if stop.error}
+    assert f": {1000 * max(errors.values()):.1f} mm" in line
+    frame, worst = re.findall(r"[0-9]+:s[0-9]+", line)
+    assert frame != worst and {frame, worst} <= stops
     own = [network_of(part.mission) for part in made.shares]
     for k, of_one in enumerate(own, 1):
         assert of_one is not None

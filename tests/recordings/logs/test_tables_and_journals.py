@@ -52,6 +52,18 @@ def test_a_table_is_read_by_its_header(
     assert np.allclose(track.heading, [heading])
 
 
+def test_robots_in_one_table_are_not_joined(tmp_path: Path) -> None:
+    """Two robots that drove a half each at one time were read as one that drove both halves."""
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "time,Robot,x,y,yaw\n" + "".join(f"{t},r{n},{n},{t},0\n" for t in range(9) for n in (1, 2))
+    )
+    tracks = {track.robot: track for track in read_log(path).poses}
+    assert {name: track.xy.tolist() for name, track in tracks.items()} == {
+        f"r{n}": [[n, t] for t in range(9)] for n in (1, 2)
+    }
+
+
 def test_eurocs_eight_columns_are_not_tums(tmp_path: Path) -> None:
     """Nanoseconds, commas, and w first; both begin with a comment, or with none."""
     half = math.sin(math.pi / 4)

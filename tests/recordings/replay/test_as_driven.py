@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,13 @@ from msgspec import UNSET, UnsetType
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import read, write
+from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.geometry import Polygon
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, as_driven, planned_floor, top_up
 from tests.planner.test_command import drawn
 from tests.recordings.replay.driving import Odd, driven, logged
 
+SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
 PLAN = [
     "--range",
     "3",
@@ -85,6 +88,40 @@ def test_a_top_up_keeps_clear_of_what_the_plan_did_not_know(planned: PlannedFloo
     assert further is not None
     for item in further.stops:
         assert max(abs(item.x - stop.x), abs(item.y - stop.y)) >= 0.2 + 0.69
+
+
+@pytest.fixture(scope="module")
+def follow_up(tmp_path_factory: pytest.TempPathFactory) -> PlannedFloor:
+    """A follow-up mission for three stops of an office."""
+    path = tmp_path_factory.mktemp("office")
+    floor = shutil.copy(SAMPLE, path / "floor.dxf")
+    assert main(["plan", str(floor), "-o", str(path), "--no-refine", "--no-register"]) == 0
+    office = planned_floor(path / "floor.dxf", read(path / "mission.json"))
+    assert not office.is_follow_up
+    mission = top_up(office, places(office, 2, 5, 8))
+    assert mission is not None and len(mission.stops) > 1
+    return PlannedFloor(office.floor, recorded_settings(mission.origin.parameters), mission)
+
+
+def test_a_follow_up_mission_is_followed_by_what_it_left_itself(follow_up: PlannedFloor) -> None:
+    """Any other part of the floor, which the first run has scanned, does not count instead."""
+    for number in range(len(follow_up.mission.stops)):
+        left = places(follow_up, number)
+        second = top_up(follow_up, left)
+        assert second is not None
+        more = np.array([(stop.x, stop.y, stop.heading) for stop in second.stops])
+        seen = as_driven(follow_up, np.concatenate([left, more]))
+        assert not (seen.planned & ~seen.driven).any()
+
+
+@pytest.mark.parametrize("by", [(0.01, 0.0), (-0.01, 0.0), (0.0, 0.01), (0.0, -0.01)])
+def test_a_follow_up_mission_driven_within_tolerance_leaves_nothing(
+    by: tuple[float, float], follow_up: PlannedFloor
+) -> None:
+    """Its required coverage is exactly what its stops see, of which a centimetre costs a little."""
+    poses = places(follow_up) + np.array([*by, 0.0])
+    assert as_driven(follow_up, poses).enough
+    assert top_up(follow_up, poses) is None
 
 
 def test_the_command_reports_coverage_and_writes_the_top_up(

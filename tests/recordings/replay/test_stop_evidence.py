@@ -15,6 +15,7 @@ from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import Remark, poses_of
 from stopgo.recordings.replay.drive_verdict import drive_verdict
+from stopgo.recordings.replay.heading_evidence import heading_answer
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
@@ -439,3 +440,40 @@ def test_a_gap_is_no_excuse_for_one_stop_that_was_missed(number: int) -> None:
     gap = (drive.halts[3].end_s + drive.halts[4].begin_s) / 2
     track = seen(drive, lambda seconds: np.abs(seconds - gap) > 1.0)
     assert drive_verdict(replay(log_of(track), mission, THERE)).answer == "no"
+
+
+@pytest.mark.parametrize(
+    "turns, heading, answer, text",
+    [
+        (0.0, lambda turn: turn, "yes", "9 of 9 stops"),
+        (np.pi, lambda turn: turn, "no", "s03: turned 180.0° from its heading; the scanner sees 180°."),
+        (0.0, lambda turn: np.full(len(turn), np.nan), "unknown", "the log has no headings"),
+        (0.0, np.degrees, "unknown", "not the directions of driving"),
+    ],
+    ids=["planned", "turned", "none", "degrees"],
+)
+def test_a_scanner_that_sees_a_half_needs_the_planned_heading(
+    turns: float, heading: Callable[[np.ndarray], np.ndarray], answer: str, text: str
+) -> None:
+    """Only a scanner that sees all round may face anywhere."""
+    stops = list(MISSION.stops)
+    stops[2] = changed(stops[2], heading=stops[2].heading + turns)
+    track = logged(driven(with_digest(changed(MISSION, stops=tuple(stops)))))
+    poses = poses_of("/odom", "map", track.ns, track.xy, heading(track.heading))
+    assert poses is not None
+    for fov, expected in ((180.0, answer), (360.0, "yes")):
+        mission = with_digest(changed(MISSION, scanner=changed(MISSION.scanner, fov_deg=fov)))
+        judged = drive_verdict(replay(held(poses), mission, THERE))
+        assert judged.answer == expected
+    mission = with_digest(changed(MISSION, scanner=changed(MISSION.scanner, fov_deg=180.0)))
+    assert text in drive_verdict(replay(held(poses), mission, THERE)).text
+
+
+@pytest.mark.parametrize("answer, wrong", [("no", slice(4, 5)), ("unknown", slice(0, None))])
+def test_a_heading_like_those_around_it_is_undecided_where_the_log_drifts(answer: str, wrong: slice) -> None:
+    stops = list(MISSION.stops)
+    stops[wrong] = [changed(stop, heading=stop.heading + 1.0) for stop in stops[wrong]]
+    mission = changed(MISSION, scanner=changed(MISSION.scanner, fov_deg=180.0), stops=tuple(stops))
+    found = replay(log_of(logged(driven(MISSION))), with_digest(mission), THERE)
+    assert heading_answer(found, 4, drifts=True)[0] == answer
+    assert heading_answer(found, 4, drifts=False)[0] == "no"

@@ -1,0 +1,78 @@
+"""Headings at the stops, for a scanner that does not see all round: a wrong one shows it another part.
+
+A heading is evidence against a stop only if the log's headings are those of the driving robot. A table in
+another unit, or with a compass that was not converted, has others.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from stopgo.mission.comparing.acquired import Certainty
+from stopgo.mission.comparing.comparison import StopComparison
+from stopgo.mission.run.run_log import Track
+from stopgo.mission.run.scans import HEADING_RAD, needs_heading
+from stopgo.recordings.replay.replayed import Replay
+
+NEIGHBOURS = 4
+"""Number of visited stops around one whose heading errors may be a drift that it has too."""
+MOST_POSES = 20_000
+STEP_M = 0.3
+"""Length of path over which a direction of driving is measured."""
+ALONG_RAD, MOSTLY = math.radians(20.0), 0.8
+"""Greatest angle between heading and driving, and the fraction of the path where it must hold."""
+
+
+def heading_answer(replay: Replay, number: int, *, drifts: bool) -> tuple[Certainty, str]:
+    """Return whether the robot faced as its scanner needs at a stop, and why if it is undecided.
+
+    `drifts`: the log's positions drift, or may.
+    """
+    item, scanner = replay.comparison.asked[number], replay.mission.scanner
+    if not needs_heading(scanner) or item.heading_rad is None:
+        return "yes", ""
+    if replay.inferred and not replay.placed.turns:
+        return "unknown", NO_HEADINGS.format(scanner.fov_deg)
+    if abs(item.heading_rad) <= HEADING_RAD:
+        return "yes", ""
+    if not replay.inferred:
+        return "no", ""
+    if not _are_of_driving(replay.run.poses):
+        return "unknown", OTHER_HEADINGS
+    return ("unknown", DRIFTS) if drifts and _is_alike(replay, item, number) else ("no", "")
+
+
+NO_HEADINGS = "its scanner sees {:g}°, and the log has no headings; give another source of poses"
+OTHER_HEADINGS = (
+    "its heading is not the planned one, but the log's headings are not the directions of driving either; "
+    "check their unit, or give another source of poses"
+)
+DRIFTS = "its heading is not the planned one, and the log drifts; give poses matched to a map"
+
+
+def _are_of_driving(track: Track) -> bool:
+    """True if the robot mostly drove where its headings point."""
+    rows = [0]
+    for k in range(0, len(track), max(1, len(track) // MOST_POSES)):
+        if math.dist(track.xy[k], track.xy[rows[-1]]) >= STEP_M:
+            rows.append(k)
+    along = []
+    for a, b in pairwise(rows):
+        x, y = track.xy[b] - track.xy[a]
+        away = math.remainder(float(track.heading[(a + b) // 2]) - math.atan2(y, x), math.tau)
+        along.append(abs(away) <= ALONG_RAD)
+    return bool(along) and float(np.mean(along)) >= MOSTLY
+
+
+def _is_alike(replay: Replay, item: StopComparison, number: int) -> bool:
+    """True if the visited stops around one have nearly its heading error, or there is none."""
+    others = [
+        (abs(k - number), math.remainder(other.heading_rad - (item.heading_rad or 0.0), math.tau))
+        for k, other in enumerate(replay.comparison.asked)
+        if k != number and other.heading_rad is not None
+    ]
+    near = [apart for _, apart in sorted(others)[:NEIGHBOURS]]
+    return not near or abs(float(np.median(near))) <= HEADING_RAD
