@@ -10,6 +10,7 @@ from stopgo.planner.selection.bound_by_parts import bound_by_parts, has_parts
 from stopgo.planner.selection.branching_bound import branching_bound
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.cover_relaxation import CoverRelaxation
+from stopgo.planner.selection.growing_relaxation import growing_bound
 from stopgo.planner.selection.knapsack_cuts import CHOSEN
 from stopgo.planner.selection.multiplier_bound import multiplier_bound, rounded_up
 
@@ -27,6 +28,10 @@ FIRST_WORK = 40_000_000
 """Entries evaluated in all of them together."""
 LONG_WORK = 600_000_000
 """Entries evaluated in all steps of the multiplier bound where the range is long: some 2 s."""
+WIDE = 6_000_000
+"""Entries above which the multiplier bound gets too few steps."""
+MOST_GROWN = 300
+"""Most rows of a selection that is bounded by a relaxation that grows: its time grows with their square."""
 
 
 def counting_bound(cover: Cover) -> int:
@@ -44,9 +49,10 @@ def _fewest(gains: IntArray, needed: int) -> int:
 def lower_bound(cover: Cover, *, found: int) -> int:
     """Lower bound on the rows of a selection; `found` rows are known to suffice.
 
-    Small problems use the linear relaxation, large ones that of one part after another, or the multiplier
-    bound where the range is long. For few rows a coarse relaxation comes first, which often proves them, and
-    branches come last.
+    Small problems use the linear relaxation, large ones that of one part after another. Where the range is
+    long, these use one to which rows are added, or the multiplier bound: that is as good if many rows meet
+    each demand and it gets enough steps. For few rows a coarse relaxation comes first, which often proves
+    them, and branches come last.
     """
     simple, entries = counting_bound(cover), cover.sees.nnz
     if simple >= found or not cover.needed.any():
@@ -54,6 +60,8 @@ def lower_bound(cover: Cover, *, found: int) -> int:
     if entries > LARGEST:
         if has_parts(cover):
             return max(simple, bound_by_parts(cover, found=found))
+        if found <= MOST_GROWN and (entries > WIDE or found <= len(cover.needed)):
+            return max(simple, growing_bound(cover))
         return max(simple, multiplier_bound(cover, found=found, work=LONG_WORK))
     coarse = coarse_bound(cover) if found <= FEW and entries > COARSE else 0
     bound = max(simple, coarse if coarse >= found else relaxation_bound(cover))

@@ -20,9 +20,9 @@ class CoverRelaxation:
 
     def __init__(self, cover: Cover, entries: int, *, unmet_cost: float = 0.0) -> None:
         self._cover = cover
-        self._fraction = _group_fractions(cover, -(-cover.sees.nnz // entries))
+        self._fraction = group_fractions(cover, -(-cover.sees.nnz // entries))
         self._groups = self._fraction.shape[1]
-        self._programme, self._scale = _programme(_grouped(cover, self._fraction), unmet_cost)
+        self._programme, self._scale = programme_of(grouped(cover, self._fraction), unmet_cost)
         self._demands = csr_array((0, cover.rows), dtype=float)
         self._least = np.empty(0)
 
@@ -66,7 +66,7 @@ class CoverRelaxation:
         return float(cover.needed @ demand_price + self._least @ price - beyond)
 
 
-def _grouped(cover: Cover, fraction: csr_array) -> Cover:
+def grouped(cover: Cover, fraction: csr_array) -> Cover:
     """The problem in which groups of columns are one, with views of a part of each."""
     of_group = csr_array((np.ones(cover.columns), fraction.indices, fraction.indptr), shape=fraction.shape)
     asks = np.zeros(fraction.shape[1], dtype=np.int64)
@@ -74,7 +74,7 @@ def _grouped(cover: Cover, fraction: csr_array) -> Cover:
     return Cover(csr_array(cover.sees @ fraction), csr_array(cover.worth @ of_group), cover.needed, asks)
 
 
-def _group_fractions(cover: Cover, size: int) -> csr_array:
+def group_fractions(cover: Cover, size: int) -> csr_array:
     """Fraction of its group that each column is by weight (columns, groups).
 
     Groups are up to `size` consecutive columns that add to the same demands and need as many views.
@@ -91,7 +91,7 @@ def _group_fractions(cover: Cover, size: int) -> csr_array:
     return csr_array((fraction, group, np.arange(cover.columns + 1)))
 
 
-def _programme(cover: Cover, unmet_cost: float) -> tuple[LinearProgramme, float]:
+def programme_of(cover: Cover, unmet_cost: float) -> tuple[LinearProgramme, float]:
     """The programme, of rows, columns, and what is left unmet; and the divisor of the problem's demands."""
     rows, columns = cover.rows, cover.columns
     seen = hstack([cover.sees.T, diags_array(-cover.asks.astype(float))])

@@ -105,7 +105,7 @@ def violated_cuts(cover: Cover, chosen: FloatArray) -> KnapsackCuts:
     is_in = level[column] <= last[demand]
     number = np.searchsorted(cut, demand[is_in])
     chosen_columns = csr_array((each[is_in], (column[is_in], number)), shape=(cover.columns, len(cut)))
-    adds, needed = csr_array((cover.sees.astype(np.int64) @ chosen_columns).T.tocsr()), rest[cut, last[cut]]
+    adds, needed = csr_array(cover.sums_of(chosen_columns).T.tocsr()), rest[cut, last[cut]]
     adds.data = np.minimum(adds.data, np.repeat(needed, np.diff(adds.indptr)))
     return KnapsackCuts(adds, needed)
 

@@ -23,7 +23,7 @@ class Solution:
 
 
 class LinearProgramme:
-    """The programme: least `cost` with `rows` @ x >= `least` and 0 <= x <= `most`; rows can be added.
+    """The programme: least `cost` with `rows` @ x >= `least` and 0 <= x <= `most`; both can be added.
 
     `rows` is a sparse matrix (rows, columns). The solver runs on one thread, so that it is reproducible.
     Without `presolve` it does not simplify the programme first.
@@ -56,6 +56,12 @@ class LinearProgramme:
         first, to = rows.indptr[:-1].astype(np.int32), rows.indices.astype(np.int32)
         infinite = np.full(len(least), highspy.kHighsInf)
         self._solver.addRows(len(least), least, infinite, rows.nnz, first, to, rows.data.astype(float))
+
+    def add_columns(self, columns: csr_array, cost: FloatArray, most: FloatArray) -> None:
+        """Offer more: a column (rows,) of each row of `columns`; the next solution begins at the last."""
+        first, to = columns.indptr[:-1].astype(np.int32), columns.indices.astype(np.int32)
+        added = len(cost), cost, np.zeros(len(cost)), most, columns.nnz, first, to, columns.data.astype(float)
+        self._solver.addCols(*added)
 
     def forget(self, many: int) -> None:
         """Take the last so many rows away."""

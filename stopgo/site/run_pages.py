@@ -6,9 +6,10 @@ import hashlib
 import secrets
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError, NegativeResult
@@ -22,6 +23,10 @@ from stopgo.site.planning import WorkLane
 from stopgo.site.planning_work import CommandTask
 from stopgo.site.site_folder import SiteFiles
 
+if TYPE_CHECKING:
+    from stopgo.recordings.page.reviewed import Review
+
+T = TypeVar("T")
 MergedFiles = tuple[tuple[str, int, int], ...]
 """Files, with the size and the last change of each."""
 SECRET_S = 600.0
@@ -79,13 +84,9 @@ class RunRoom:
     def report(self, key: str) -> bytes:
         """Return the report of a mission's plan and runs together, as one page."""
         from stopgo.recordings.page.from_recordings import subject_of
-        from stopgo.recordings.page.reviewed import review
 
         with self._one_at_a_time:
-            found = review([self._folder.root / name for name in self._files(key)])
-        if not found.recordings:
-            raise InputError("; ".join(found.faults))
-        return report_html(subject_of(found))
+            return report_html(subject_of(self._read(key, _reviewed)))
 
     def open_recording(self, key: str) -> str:
         """Return the secret name under which a mission's recording can be read for some minutes."""
@@ -106,20 +107,19 @@ class RunRoom:
     def recording(self, key: str) -> Path:
         """Return a mission's plan and runs as one recording; merged again if a file has changed."""
         from stopgo.recordings.catalog.merging import layout_of, merge
-        from stopgo.recordings.page.reviewed import review
 
-        with self._one_at_a_time:
-            paths = [self._folder.root / file for file in self._files(key)]
-            out = self._merged_folder / f"{key}.rrd"
+        out = self._merged_folder / f"{key}.rrd"
+
+        def read(paths: list[Path]) -> None:
             stamps = tuple((str(path), *stamp_of(path)) for path in paths)
             if self._merged.get(key) != stamps:
-                found = review(paths)
-                if not found.recordings:
-                    raise InputError("; ".join(found.faults))
-                read_ones = [item.recording for item in found.recordings]
+                read_ones = [item.recording for item in _reviewed(paths).recordings]
                 merge(read_ones, out)
                 write_atomic(out, layout_of(read_ones) + out.read_bytes())
                 self._merged[key] = stamps
+
+        with self._one_at_a_time:
+            self._read(key, read)
         return out
 
     def download(self, name: str, form: str) -> PageDownload:
@@ -194,12 +194,35 @@ class RunRoom:
         index = index_of(self._folder.root)
         return index_of(self._folder.root) if _has_gone(self._folder.root, index) else index
 
+    def _read(self, key: str, read: Callable[[list[Path]], T]) -> T:
+        """Read a mission's files, once more if one was renamed meanwhile, as at the end of a run."""
+        paths = self._paths(key)
+        try:
+            return read(paths)
+        except (InputError, OSError):
+            if all(path.exists() for path in paths):
+                raise
+        return read(self._paths(key))
+
+    def _paths(self, key: str) -> list[Path]:
+        return [self._folder.root / name for name in self._files(key)]
+
     def _files(self, key: str) -> list[str]:
         found = files_of(without_repeats(self._index()))
         files = next((files for mission, files in found.items() if name_of(mission) == key), None)
         if files is None:
             raise InputError("no such mission in the folder any more")
         return files
+
+
+def _reviewed(paths: list[Path]) -> Review:
+    """Return the review of files; raises `InputError` if one cannot be read: a run would be left out."""
+    from stopgo.recordings.page.reviewed import review
+
+    found = review(paths)
+    if found.faults:
+        raise InputError("; ".join(found.faults))
+    return found
 
 
 def _has_gone(root: Path, index: RunIndex) -> bool:

@@ -17,6 +17,7 @@ from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.mission_json import read
 from stopgo.planner.floors.ifc import loading
 from stopgo.planner.floors.ifc.extract import main as extract
+from stopgo.recordings.page import reviewed
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.kept_variants import kept_variants
 from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest, WorkLane
@@ -205,3 +206,38 @@ def test_saved_plans_are_listed_and_downloaded(room: PlanningRoom, place: Path, 
     assert back.recording_of_secret(secret).startswith(b"RRF2")
     with pytest.raises(InputError, match="too old"):
         back.recording_of_secret("guessed")
+
+
+def test_a_recording_that_is_renamed_while_it_is_read_is_read_again(
+    room: PlanningRoom, place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the run's that ends: its report had left it out."""
+    back = RunRoom(SiteFiles.at(place), tmp_path, room.files)
+    (mission,) = [one for one in back.listed()["missions"] if one["file"]]
+    plan, looks = (place / mission["file"]).with_name("plan.rrd"), []
+    read = reviewed.review
+
+    def renaming(paths: list[Path]) -> Any:
+        looks.append(paths)
+        if len(looks) == 1:
+            plan.rename(plan.with_name("renamed.rrd"))
+        return read(paths)
+
+    monkeypatch.setattr(reviewed, "review", renaming)
+    try:
+        assert b"<svg" in back.report(mission["key"])
+    finally:
+        plan.with_name("renamed.rrd").rename(plan)
+    assert [plan in paths for paths in looks] == [True, False]
+
+
+def test_a_report_that_would_lack_a_recording_is_refused(
+    room: PlanningRoom, place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    back = RunRoom(SiteFiles.at(place), tmp_path, room.files)
+    (mission,) = [one for one in back.listed()["missions"] if one["file"]]
+    monkeypatch.setattr(
+        back, "_files", lambda key: [mission["file"].replace("mission.json", "plan.rrd"), "house.dxf"]
+    )
+    with pytest.raises(InputError, match=r"house\.dxf"):
+        back.report(mission["key"])

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, weights_of
-from stopgo.planner.selection import METHODS, bound, bound_by_parts
+from stopgo.planner.selection import METHODS, bound, bound_by_parts, growing_relaxation
 from stopgo.planner.selection.bound import (
     coarse_bound,
     counting_bound,
@@ -25,6 +25,7 @@ from stopgo.planner.selection.bound import (
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of, needed_of
 from stopgo.planner.selection.greedy import greedy
+from stopgo.planner.selection.growing_relaxation import GrowingRelaxation, growing_bound
 from stopgo.planner.selection.multiplier_bound import multiplier_bound
 from tests.faults.sizes import size
 from tests.planner.selection.test_swaps import cover_of_rooms
@@ -111,11 +112,37 @@ def test_no_bound_is_above_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bound, "COARSE", 20)
     monkeypatch.setattr(bound, "FINE", 40)
     monkeypatch.setattr(bound_by_parts, "SIZE", 20)
+    monkeypatch.setattr(growing_relaxation, "FIRST", 2)
+    monkeypatch.setattr(growing_relaxation, "ENTRIES", 20)
     for _, cover, optimum in small_covers(range(size(short=3, full=300))):
         assert counting_bound(cover) <= optimum
         assert coarse_bound(cover) <= relaxation_bound(cover) <= optimum
         assert multiplier_bound(cover, found=len(greedy(cover))) <= optimum
         assert bound_by_parts.bound_by_parts(cover, found=len(greedy(cover))) <= optimum
+        assert growing_bound(cover) <= optimum
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_relaxation_grows_to_the_bound_of_all_rows(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    """It begins with a few rows, which do not meet the demands, and ends with a part of them all."""
+    monkeypatch.setattr(growing_relaxation, "FIRST", 12)
+    monkeypatch.setattr(growing_relaxation, "JOINING", 20)
+    cover = cover_of_rooms(seed, rows=300, columns=200, rooms=12)
+    relaxation = GrowingRelaxation(cover)
+    while relaxation.goes_on():
+        pass
+    assert relaxation.bound == pytest.approx(relaxation_bound(cover), abs=1.0)
+    assert growing_bound(cover) in (relaxation_bound(cover) - 1, relaxation_bound(cover))
+
+
+def test_a_long_range_is_bounded_by_a_relaxation_that_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bound, "LARGEST", 500)
+    monkeypatch.setattr(bound, "has_parts", lambda cover: False)
+    cover = cover_of_rooms(0, rows=60, columns=200, rooms=12)
+    found = len(greedy(cover))
+    assert lower_bound(cover, found=min(found, len(cover.needed))) == growing_bound(cover)
+    monkeypatch.setattr(bound, "MOST_GROWN", 0)
+    assert lower_bound(cover, found=found) <= growing_bound(cover)
 
 
 @pytest.mark.parametrize(("seed", "found"), [(102, 4), (1088, 2), (1088, 3)])
