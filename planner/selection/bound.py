@@ -31,7 +31,7 @@ LONG_WORK = 600_000_000
 WIDE = 6_000_000
 """Entries above which the multiplier bound gets too few steps."""
 MOST_GROWN = 300
-"""Most rows of a selection that is bounded by a relaxation that grows: its time grows with their square."""
+"""Most rows of a selection that is bounded by a relaxation that grows: 2 s for 44 rows, and 15 s for 256."""
 
 
 def counting_bound(cover: Cover) -> int:
