@@ -6,13 +6,11 @@ import gc
 import math
 import os
 import signal
-import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from functools import cache
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 
 import pytest
 from hypothesis import settings
@@ -80,24 +78,6 @@ def pytest_collection_finish() -> None:
     """
     gc.freeze()
     gc.set_threshold(7_000, 10, 10)
-    _compile_messages_once()
-
-
-def _compile_messages_once() -> None:
-    """Let rosbags compile what it writes for a message type once, and not anew for every log."""
-
-    @cache
-    def compiled(source: str) -> CodeType:
-        return compile(source, "<rosbags>", "exec")
-
-    def module_of(lines: Sequence[str]) -> ModuleType:
-        made = ModuleType("rosbags message")
-        exec(compiled("\n".join(lines)), vars(made))
-        return made
-
-    for name in ("rosbags.serde.cdr", "rosbags.serde.ros1"):
-        if name in sys.modules:
-            sys.modules[name].compile_lines = module_of  # type: ignore[attr-defined]
 
 
 WAITING = {TESTS / name for name in ("bridge", "faults", "journeys", "ros2")}
