@@ -91,7 +91,7 @@ class RunDriver:
         if outcome == "blocked":
             self._hold_blocked(run, f"the path to {stop.id}", here)
         elif outcome == "arrived":
-            self._store.advance(run, lambda now: runs.reached(now, mission, here, deviation(here, stop)))
+            self._store.advance(run, lambda now: runs.reached(now, mission, here))
 
     def _drive_home(self, run: Run, mission: Mission) -> None:
         """Drive one leg of the return, or one approach backwards."""
@@ -131,7 +131,7 @@ class RunDriver:
             self._store.advance(run, lambda now: runs.failed(now, mission, reason))
             return
         here = self._base.pose()
-        self._store.advance(run, lambda now: runs.settled(now, mission, here, deviation(here, stop)))
+        self._store.advance(run, lambda now: runs.settled(now, mission, here))
 
     def _stands_still(self, settle_s: float) -> bool | None:
         """True if the robot stood still for `settle_s`; `None` if interrupted."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import msgspec
@@ -18,7 +18,7 @@ from stopgo.bridge.station.station import Station
 from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.comparing.spans import paused_s
 from stopgo.mission.console.table import printable
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import OutcomeUnknown
 from stopgo.mission.run.decision import STATES
@@ -38,7 +38,7 @@ from stopgo.mission.run.events import (
     UnknownKind,
 )
 from stopgo.mission.run.health_text import health_text
-from stopgo.mission.run.tolerance import outside_tolerance_text, stops_outside_text
+from stopgo.mission.run.tolerance import StopErrors, stops_outside_text
 
 UNNUMBERED = PoseReport | Silence | PosesMissing | ReportsMissing | LoggedReport
 """Items that are of no revision."""
@@ -138,12 +138,12 @@ class EventLines:
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
-        self._stops: Mapping[str, Stop] = {}
+        self._errors = StopErrors()
         self._has_state = False
         self._lost_s = 0.0
 
     def mission(self, mission: Mission) -> None:
-        self._stops = {stop.id: stop for stop in mission.stops}
+        self._errors = StopErrors(mission)
         self._say(f"{mission.name}: {len(mission.stops)} stops")
 
     def show(self, report: Followed) -> None:
@@ -164,7 +164,7 @@ class EventLines:
         elif isinstance(report, PosesMissing):
             self._say(missing_line(report))
         elif not isinstance(report, PoseReport | LoggedReport):
-            self._say(event_line(report, self._stops))
+            self._say(event_line(report, self._errors))
             if isinstance(report, Held):
                 self._say(HINT)
 
@@ -176,15 +176,15 @@ class EventLines:
 
 
 class EventObjects:
-    """Display of one JSON object per event; `beside` describes a position error outside the tolerance."""
+    """Display of one JSON object per event; `beside` describes errors outside the tolerance."""
 
     def __init__(self, write: Callable[[dict[str, Any]], None]) -> None:
         self._write = write
-        self._stops: Mapping[str, Stop] = {}
+        self._errors = StopErrors()
 
     def mission(self, mission: Mission) -> None:
         """Take the stops of the mission; events and states name the mission themselves."""
-        self._stops = {stop.id: stop for stop in mission.stops}
+        self._errors = StopErrors(mission)
 
     def show(self, report: Followed) -> None:
         if isinstance(report, PosesMissing):
@@ -194,7 +194,7 @@ class EventObjects:
                 state = None if report.state is None else report.state.state
                 self._write({"stale": {"topics": report.topics, "state": state, "age_s": report.age_s}})
         elif not isinstance(report, StateReport | PoseReport | Silence | LoggedReport):
-            error = outside_tolerance_text(report, self._stops.get(getattr(report, "stop", "")))
+            error = self._errors.text(report)
             self._write(msgspec.to_builtins(report) | ({"beside": error} if error else {}))
 
 
@@ -275,8 +275,8 @@ def table_lines(
         ("time", f"{clock(elapsed)} run, {'-' if left is None else clock(left)} left as planned"),
         ("link", f"no data for {silent_s:.0f} s, retrying" if silent_s else "; ".join(told) or "alive"),
     ]
-    stops = {} if mission is None else {stop.id: stop for stop in mission.stops}
-    lines = [event_line(event, stops) for event in events]
+    errors = StopErrors(mission)
+    lines = [event_line(event, errors) for event in events]
     if state.state == "HELD":
         lines = [*lines[1 - LAST_EVENTS :], HINT]
     return [f"  {name:8} {value}" for name, value in rows] + lines + [""] * (LAST_EVENTS - len(lines))
@@ -316,8 +316,8 @@ def missing_line(gap: PosesMissing) -> str:
     return f"{gap.mission_time_s:8.1f} s  {gap.words}"
 
 
-def event_line(event: AnyEvent, stops: Mapping[str, Stop]) -> str:
-    """Return the line of an event; `stops` are those of its mission, as far as they are known."""
+def event_line(event: AnyEvent, errors: StopErrors) -> str:
+    """Return the line of an event; `errors` are those at the stops of its mission, as far as it is known."""
     name = type(event).__name__
     about = getattr(event, "stop", None) or ""
     detail = getattr(event, "reason", "") or getattr(event, "commander", "")
@@ -331,5 +331,5 @@ def event_line(event: AnyEvent, stops: Mapping[str, Stop]) -> str:
         detail = f"position error {event.deviation_m * 1000:.0f} mm"
     if isinstance(event, Scanned):
         detail = f"{event.file}, {event.points / 1e6:.1f} million points"
-    detail = "; ".join(word for word in (outside_tolerance_text(event, stops.get(about)), detail) if word)
+    detail = "; ".join(word for word in (errors.text(event), detail) if word)
     return f"{event.mission_time_s:8.1f} s  {name:15} {about:6} {detail}".rstrip()

@@ -16,7 +16,7 @@ from stopgo.mission.comparing.evidence import disputed_m, missing_events
 from stopgo.mission.comparing.path_deviation import cross_track_of
 from stopgo.mission.comparing.sighting import sighted_path
 from stopgo.mission.comparing.spans import spans_of
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, ScannerSpec, Stop
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.run.events import (
     Aborted,
@@ -31,6 +31,7 @@ from stopgo.mission.run.events import (
     Unconfirmed,
 )
 from stopgo.mission.run.run_log import RunLog
+from stopgo.mission.run.scans import heading_error
 from stopgo.mission.run.tolerance import deviation
 from stopgo.mission.stages.sight import Sight
 
@@ -44,7 +45,9 @@ OUTCOMES: dict[type[object], str] = {
 }
 
 
-def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = ()) -> Comparison:
+def compare(
+    log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = (), *, headings: bool = True
+) -> Comparison:
     """Compare a run with the schedule, stops, legs and sight of its mission.
 
     Parameters
@@ -56,9 +59,11 @@ def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = 
     last, and after them stops that only the run contains.
     sights
         Visibility data of stops, of any revisions.
+    headings
+        True if the headings of the poses show where the scanner looked.
     """
     followed = _followed(log, missions)
-    plans = [_Planned(item) for item in followed]
+    plans = [_Planned(item, headings=headings) for item in followed]
     visited = [event.stop for event in log.events if isinstance(event, VISITS)]
     ids = dict.fromkeys([*plans[-1].stops, *(stop for plan in plans for stop in plan.stops), *visited])
     held = held_reasons(log, [stop.id for stop in followed[-1].stops])
@@ -99,8 +104,9 @@ def _lost(item: StopComparison, acquired: Acquired | None, ended: bool) -> float
 class _Planned:
     """Stops of one revision, with planned arrivals."""
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, *, headings: bool) -> None:
         self.revision = mission.revision
+        self.scanner = mission.scanner if headings else None
         self.stops = {stop.id: stop for stop in mission.stops}
         arrivals = schedule(mission).arrival_s
         self.arrival_s = {stop.id: s for stop, s in zip(mission.stops, arrivals, strict=True)}
@@ -124,7 +130,7 @@ def _stop(stop: str, plans: list[_Planned], log: RunLog, held: str, *, conclusiv
         is_open=outcome in ("arrived", "failed", "not reached") and not conclusive,
     )
     pose = next((event.pose for event in reversed([*arrivals, *ends]) if event.pose is not None), None)
-    return item if plan is None or pose is None else _with_offset(item, pose, plan.stops[stop])
+    return item if plan is None or pose is None else _with_offset(item, pose, plan.stops[stop], plan.scanner)
 
 
 def _reached_by(stop: str, plans: list[_Planned], revision: int | None) -> _Planned | None:
@@ -134,8 +140,8 @@ def _reached_by(stop: str, plans: list[_Planned], revision: int | None) -> _Plan
     return found[-1] if found else None
 
 
-def _with_offset(item: StopComparison, pose: Pose, stop: Stop) -> StopComparison:
-    """Add the offset of a pose from the stop."""
+def _with_offset(item: StopComparison, pose: Pose, stop: Stop, scanner: ScannerSpec | None) -> StopComparison:
+    """Add the offset of a pose from the stop; without a scanner its heading does not matter."""
     x, y, ahead = pose.x - stop.x, pose.y - stop.y, arrival_direction(stop)
     return replace(
         item,
@@ -143,6 +149,7 @@ def _with_offset(item: StopComparison, pose: Pose, stop: Stop) -> StopComparison
         along_m=x * math.cos(ahead) + y * math.sin(ahead),
         across_m=y * math.cos(ahead) - x * math.sin(ahead),
         heading_rad=math.remainder(pose.heading - stop.heading, math.tau),
+        turned_rad=0.0 if scanner is None else heading_error(scanner, stop.heading, pose.heading),
         tolerance_m=stop.tolerance_m,
     )
 

@@ -15,7 +15,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.run.events import State
 from stopgo.mission.run.run_log import RunLog
-from stopgo.mission.run.tolerance import is_outside, position_error_text
+from stopgo.mission.run.tolerance import error_text, is_outside
 
 COLUMNS = (
     *("stop", "outcome", "planned s", "arrived s", "late s", "along mm", "across mm", "heading °"),
@@ -44,6 +44,8 @@ class StopComparison:
     """Its part to the left of that direction."""
     heading_rad: float | None = None
     """Heading error of the robot, positive to the left."""
+    turned_rad: float = 0.0
+    """Its size if the scanner does not allow it; else 0."""
     tolerance_m: float | None = None
     settle_s: float | None = None
     """Settle time: from the last arrival to the standstill."""
@@ -68,10 +70,15 @@ class StopComparison:
         return self.arrived_s - self.planned_s
 
     @property
-    def outside_tolerance(self) -> bool:
+    def is_beside(self) -> bool:
         """True if the position error is greater than the mission tolerates."""
         away, limit = self.deviation_m, self.tolerance_m
         return away is not None and limit is not None and is_outside(away, limit)
+
+    @property
+    def outside_tolerance(self) -> bool:
+        """True if the position error is greater than the mission tolerates, or the heading error."""
+        return self.is_beside or self.turned_rad > 0
 
     @property
     def is_doubtful(self) -> bool:
@@ -84,7 +91,7 @@ class StopComparison:
         if self.disputed_m is None:
             return False
         least_m = self.disputed_m - (self.deviation_m or 0.0)  # of the poses, from the stop
-        return not (self.outside_tolerance and is_outside(least_m, self.tolerance_m or 0.0))
+        return not (self.is_beside and is_outside(least_m, self.tolerance_m or 0.0))
 
     @property
     def disputed_text(self) -> str:
@@ -95,10 +102,11 @@ class StopComparison:
 
     @property
     def outside_text(self) -> str:
-        """Position error of a scanned or passed stop outside tolerance, in words; empty if within."""
+        """Errors of a scanned or passed stop that are outside tolerance, in words; empty if within."""
         if self.is_disputed or self.outcome not in DONE or not self.outside_tolerance:
             return ""
-        return f"{DONE[self.outcome]} {position_error_text(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
+        error = error_text(self.deviation_m or 0.0, self.tolerance_m or 0.0, self.turned_rad)
+        return f"{DONE[self.outcome]} {error}"
 
     @property
     def why(self) -> str:

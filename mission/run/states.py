@@ -34,7 +34,7 @@ from stopgo.mission.run.events import (
     StopState,
 )
 from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_fields
-from stopgo.mission.run.tolerance import deviation, is_outside
+from stopgo.mission.run.tolerance import deviation, stop_error_text
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
 DetailedState = State | Literal["PAUSED homing", "HELD homing"]
@@ -178,31 +178,28 @@ def leaving(run: Run) -> Change:
     return Change(changed(run, stop_state="NAVIGATING"))
 
 
-def reached(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:
+def reached(run: Run, mission: Mission, pose: Pose) -> Change:
     """Mark that the robot reached the end of the leg, or the stop after a correction."""
     if run.leg < run.at:
         return Change(changed(run, leg=run.leg + 1))
     stop = mission.stops[run.at]
-    if is_outside(deviation_m, stop.tolerance_m):
+    if error := stop_error_text(pose, stop, mission.scanner):
         if run.approaches < REAPPROACHES:
             return Change(
                 changed(run, leg=run.at + 1, stop_state="NAVIGATING", approaches=run.approaches + 1)
             )
-        return failed(
-            changed(run, leg=run.at + 1),
-            mission,
-            f"{deviation_m:.3f} m from the stop after {REAPPROACHES} corrections;"
-            f" tolerance is {stop.tolerance_m:g} m",
-        )
-    arrived = partial(Arrived, stop=stop.id, pose=pose, deviation_m=deviation_m)
+        reason = f"{error} after {REAPPROACHES} corrections"
+        return failed(changed(run, leg=run.at + 1), mission, reason)
+    arrived = partial(Arrived, stop=stop.id, pose=pose, deviation_m=deviation(pose, stop))
     return Change(changed(run, leg=run.at + 1, stop_state="SETTLING"), (arrived,))
 
 
-def settled(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:
+def settled(run: Run, mission: Mission, pose: Pose) -> Change:
     """Mark that the robot is stationary; outside the tolerance, it drives to the stop again."""
-    if is_outside(deviation_m, mission.stops[run.at].tolerance_m):
-        return reached(run, mission, pose, deviation_m)
-    event = partial(Settled, stop=mission.stops[run.at].id, pose=pose)
+    stop = mission.stops[run.at]
+    if stop_error_text(pose, stop, mission.scanner):
+        return reached(run, mission, pose)
+    event = partial(Settled, stop=stop.id, pose=pose)
     return Change(changed(run, stop_state="SCANNING", scans=run.scans + 1), (event,))
 
 
@@ -230,13 +227,14 @@ def verified(run: Run, mission: Mission, pose: Pose) -> Change:
         Scanned, stop=stop.id, pose=pose,
         file=scan.file, size=scan.size, sha256=scan.sha256, points=scan.points,
     )  # fmt: skip
-    done = next_stop(with_done(run, stop, pose), mission)
+    done = next_stop(with_done(run, mission, pose), mission)
     return Change(done.run, (event, *done.events))
 
 
-def with_done(run: Run, stop: Stop, pose: Pose | None) -> Run:
+def with_done(run: Run, mission: Mission, pose: Pose | None) -> Run:
     """Mark the stop as done; outside its tolerance, if the robot was there."""
-    outside = pose is not None and is_outside(deviation(pose, stop), stop.tolerance_m)
+    stop = mission.stops[run.at]
+    outside = pose is not None and stop_error_text(pose, stop, mission.scanner)
     return changed(
         run, done=(*run.done, stop.id), outside=(*run.outside, stop.id) if outside else run.outside
     )

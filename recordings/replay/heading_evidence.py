@@ -14,7 +14,7 @@ import numpy as np
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import StopComparison
 from stopgo.mission.run.run_log import Track
-from stopgo.mission.run.scans import HEADING_RAD, needs_heading
+from stopgo.mission.run.scans import HEADING_RAD, heading_error, needs_heading
 from stopgo.recordings.replay.replayed import Replay
 
 NEIGHBOURS = 4
@@ -36,7 +36,7 @@ def heading_answer(replay: Replay, number: int, *, drifts: bool) -> tuple[Certai
         return "yes", ""
     if replay.inferred and not replay.placed.turns:
         return "unknown", NO_HEADINGS.format(scanner.fov_deg)
-    if abs(item.heading_rad) <= HEADING_RAD:
+    if not heading_error(scanner, 0.0, item.heading_rad):
         return "yes", ""
     if not replay.inferred:
         return "no", ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from stopgo.recordings.replay.replay_text import (
     uncertainty_lines,
 )
 from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.stop_evidence import stop_evidence
 
 RunLines = tuple[str, tuple[str, ...]]
 """Title and its lines."""
@@ -103,6 +105,10 @@ def to_do(replay: Replay) -> Iterator[str]:
         yield f"{item.stop}: scan it; {item.reason or 'the robot did not reach it'}"
     for item in outside(replay):
         yield f"{item.stop}: scan it again, {1000 * (item.deviation_m or 0):.0f} mm nearer to its position"
+    for one in stop_evidence(replay):
+        if one.turned:
+            degrees = -math.degrees(one.item.heading_rad or 0.0)
+            yield f"{one.item.stop}: scan it again, turned by {degrees:+.1f}°"
     for absent in absent_of(replay):
         yield f"inspect {absent.id}: {percent(absent.empty)} of its visible part has no point"
     for found in replay.measured.unplanned if replay.measured is not None else ():

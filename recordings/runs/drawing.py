@@ -35,7 +35,7 @@ from stopgo.mission.run.events import (
 )
 from stopgo.mission.run.health_text import health_text, health_words
 from stopgo.mission.run.run_log import Track
-from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
+from stopgo.mission.run.tolerance import StopErrors, deviation
 from stopgo.mission.stages.sight import Sight, required_of
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
@@ -71,7 +71,7 @@ class RunDrawing:
         self.names = entities.RunEntities(run_id)
         self.mission = mission
         self.revisions = [mission]
-        self.stops = {stop.id: stop for stop in mission.stops}
+        self._errors = StopErrors(mission)
         self.records: dict[str, StopRecord] = {}
         self._began_ns: int | None = None
         self._last_xy: FloatArray | None = None
@@ -94,7 +94,7 @@ class RunDrawing:
         draw_change(self.canvas, change, names, partial(self._at, robot_ns=report.robot_ns))
         self.mission = mission
         self.revisions.append(mission)
-        self.stops = {stop.id: stop for stop in mission.stops}
+        self._errors = StopErrors(mission)
         self._describe()
 
     def poses(self, track: Track, boot_id: str = "") -> None:
@@ -188,10 +188,10 @@ class RunDrawing:
         fields = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
         fields["body"] = msgspec.json.encode(event).decode()
         self._at(self.names.events, rr.DynamicArchetype("Event", components=fields), event.robot_ns)
-        stop = self.stops.get(getattr(event, "stop", ""))
-        off_stop = outside_tolerance_text(event, stop)
+        stop = self._errors.stops.get(getattr(event, "stop", ""))
+        off_stop = self._errors.text(event)
         level = "WARN" if isinstance(event, WARNINGS) or off_stop else "INFO"
-        line = rr.TextLog(f"{type(event).__name__} {_details(event, stop)}".rstrip(), level=level)
+        line = rr.TextLog(f"{type(event).__name__} {_details(event, off_stop)}".rstrip(), level=level)
         self._at(self.names.log, line, event.robot_ns)
         if isinstance(event, Arrived):
             self._plot_deviation(event.deviation_m, stop, event.robot_ns)
@@ -296,7 +296,7 @@ class RunDrawing:
             self._columns(self.names.metric(entities.METRIC_CROSS_TRACK), ns[known], values)
 
     def _mark(self, event: AnyEvent) -> None:
-        stop = self.stops.get(getattr(event, "stop", ""))
+        stop = self._errors.stops.get(getattr(event, "stop", ""))
         if type(event) not in MARKS or stop is None:
             return
         name, meaning, order = MARKS[type(event)]
@@ -305,7 +305,7 @@ class RunDrawing:
             [self.canvas.local(np.array([position.x, position.y]))],
             class_ids=meaning.number,
             radii=on_screen(3),
-            labels=[f"{type(event).__name__} {_details(event, stop)}"],
+            labels=[f"{type(event).__name__} {_details(event, self._errors.text(event))}"],
             show_labels=False,
             draw_order=order,
         )
@@ -323,7 +323,8 @@ class RunDrawing:
     def _report(self, event: AnyEvent) -> None:
         stop = getattr(event, "stop", None)
         if stop is not None:
-            self.records[stop] = self.records.get(stop, StopRecord()).after(event, self.stops.get(stop))
+            planned, error = self._errors.stops.get(stop), self._errors.text(event)
+            self.records[stop] = self.records.get(stop, StopRecord()).after(event, planned, error)
         coverage = "" if self._acquired is None else self._acquired.sentence()
         text = run_report(self.revisions, self.run_id, self.records, event, coverage)
         document = rr.TextDocument(text, media_type="text/markdown")
@@ -372,10 +373,10 @@ _LIMITED = {entities.METRIC_DEVIATION: (1,), entities.METRIC_CROSS_TRACK: (-1, 1
 """Metrics with a tolerance, and the sides that it applies to."""
 
 
-def _details(event: AnyEvent, stop: Stop | None) -> str:
-    """Return the event's details in a few words; `stop` is the event's stop."""
+def _details(event: AnyEvent, error: str) -> str:
+    """Return the event's details in a few words; `error` is what is outside tolerance."""
     words = [getattr(event, name, "") for name in ("stop", "reason", "commander", "kind")]
-    words.append(outside_tolerance_text(event, stop))
+    words.append(error)
     if isinstance(event, Arrived):
         words.append(f"{event.deviation_m * 1000:.0f} mm deviation")
     if isinstance(event, Scanned):

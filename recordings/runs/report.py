@@ -17,7 +17,7 @@ from stopgo.mission.run.events import (
     Skipped,
     Unconfirmed,
 )
-from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
+from stopgo.mission.run.tolerance import deviation
 
 
 @dataclass(frozen=True)
@@ -30,18 +30,18 @@ class StopRecord:
     """`arrived`, `scanned`, `unconfirmed`, `skipped` or `failed`, with the reason."""
     scanned: bool = False
 
-    def after(self, event: AnyEvent, stop: Stop | None) -> StopRecord:
-        """Return the record after an event at the stop."""
+    def after(self, event: AnyEvent, stop: Stop | None, error: str) -> StopRecord:
+        """Return the record after an event at the stop; `error` is what is outside tolerance, in words."""
         if isinstance(event, Arrived):
             return replace(
                 self, arrived_s=event.mission_time_s, deviation_m=event.deviation_m, outcome="arrived"
             )
         if isinstance(event, Scanned):
             deviation_m = self.deviation_m if stop is None else deviation(event.pose, stop)
-            outcome = f"scanned {outside_tolerance_text(event, stop)}".rstrip()
+            outcome = f"scanned {error}".rstrip()
             return replace(self, deviation_m=deviation_m, outcome=outcome, scanned=True)
         if isinstance(event, Unconfirmed | Skipped | Failed):
-            details = (outside_tolerance_text(event, stop), event.reason)
+            details = (error, event.reason)
             words = "; ".join(word for word in details if word)
             return replace(self, outcome=f"{type(event).__name__.lower()}: {words}", scanned=False)
         return self

@@ -6,7 +6,6 @@ checked here against the stop. Only the vehicle's camera or scanner can confirm 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,9 +16,9 @@ from stopgo.mission.document import Stop
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, StopItems
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import JUMPED_OVER, Pose, Settled, Unconfirmed
-from stopgo.mission.run.scans import ScanFailed, ScanResult, heading_error
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 from stopgo.mission.run.states import Change, Run, changed
-from stopgo.mission.run.tolerance import deviation, is_outside
+from stopgo.mission.run.tolerance import stop_error_text
 
 SOMEBODY = "somebody (not known who)"
 """Commander of commands that were not sent from here, and whose sender was not heard."""
@@ -148,7 +147,7 @@ def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopI
         return _passed(run, listed, observed)
     if observed.pose is None:
         return None
-    wrong = stop_error_text(observed.pose, run, listed)
+    wrong = arrival_error_text(observed.pose, run, listed)
     if not wrong:
         return _reached(run, listed, observed.pose)
     if observed.still or observed.place >= items.scan:
@@ -163,15 +162,14 @@ def _passed(run: Run, listed: ListedMission, observed: Observation) -> Change | 
     if observed.stood is None:
         over = observed.report_overdue and observed.is_ours
         return _unconfirmed(run, listed, None, "no pose of the vehicle at the stop") if over else None
-    wrong = stop_error_text(observed.stood, run, listed)
+    wrong = arrival_error_text(observed.stood, run, listed)
     if wrong:
         return runs.failed(_last_try(run, listed.mission.stops[run.at]), listed.mission, wrong)
     return _reached(run, listed, observed.stood)
 
 
 def _reached(run: Run, listed: ListedMission, pose: Pose) -> Change:
-    stop = listed.mission.stops[run.at]
-    return runs.reached(changed(run, leg=run.at), listed.mission, pose, deviation(pose, stop))
+    return runs.reached(changed(run, leg=run.at), listed.mission, pose)
 
 
 def _settled(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
@@ -181,7 +179,7 @@ def _settled(run: Run, listed: ListedMission, observed: Observation, items: Stop
         return None
     if observed.place >= items.after or observed.pose is None:
         return Change(changed(run, stop_state="SCANNING")) if observed.place >= items.after else None
-    wrong = stop_error_text(observed.pose, run, listed)
+    wrong = arrival_error_text(observed.pose, run, listed)
     if wrong:
         return runs.failed(run, listed.mission, f"moved while it settled: {wrong}")
     settled = partial(Settled, stop=items.stop, pose=observed.pose)
@@ -238,9 +236,9 @@ def _verified(run: Run, listed: ListedMission, observed: Observation) -> Change 
 
 def _unconfirmed(run: Run, listed: ListedMission, pose: Pose | None, reason: str) -> Change:
     """Complete the stop without a confirmed scan."""
-    stop = listed.mission.stops[run.at]
-    behind = runs.next_stop(runs.with_done(changed(run, leg=run.at + 1), stop, pose), listed.mission)
-    event = partial(Unconfirmed, stop=stop.id, pose=pose, reason=reason)
+    mission = listed.mission
+    behind = runs.next_stop(runs.with_done(changed(run, leg=run.at + 1), mission, pose), mission)
+    event = partial(Unconfirmed, stop=mission.stops[run.at].id, pose=pose, reason=reason)
     return Change(behind.run, (event, *behind.events))
 
 
@@ -300,14 +298,7 @@ def run_on_vehicle(run: Run, items: int | None) -> Run:
     return Run() if run.state == "READY" and items == 0 else run
 
 
-def stop_error_text(pose: Pose, run: Run, listed: ListedMission) -> str:
-    """Return the position or heading error outside tolerance, in words; empty if within."""
-    stop, away = listed.mission.stops[run.at], deviation(pose, listed.mission.stops[run.at])
-    if is_outside(away, stop.tolerance_m):
-        return (
-            f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle reports it reached"
-        )
-    error = heading_error(listed.mission.scanner, stop.heading, pose.heading)
-    if error:
-        return f"turned {math.degrees(error):.1f}° from the heading that its scanner needs"
-    return ""
+def arrival_error_text(pose: Pose, run: Run, listed: ListedMission) -> str:
+    """Return the errors outside tolerance of a stop that the vehicle reports as reached; empty if within."""
+    error = stop_error_text(pose, listed.mission.stops[run.at], listed.mission.scanner)
+    return error and f"{error}; the vehicle reports it reached"

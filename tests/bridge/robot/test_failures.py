@@ -117,7 +117,7 @@ def test_a_stop_that_is_never_reached_fails() -> None:
     field = started(corridor(retries=0), *slips)
     field.work()
     assert field.controller.run.state == "HELD"
-    assert "tolerance is 0.05 m" in field.controller.run.reason
+    assert "(50 mm are tolerated) after 3 corrections" in field.controller.run.reason
 
 
 def test_a_blocked_leg_holds_the_robot_and_retry_drives_the_rest() -> None:

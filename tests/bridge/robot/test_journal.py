@@ -23,6 +23,7 @@ from stopgo.bridge.station.watch import event_line
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Started, UnknownKind, event_of
 from stopgo.mission.run.run_commands import Verb
+from stopgo.mission.run.tolerance import StopErrors
 from tests.bridge.world import Field, corridor
 
 
@@ -199,7 +200,7 @@ def test_an_event_of_a_newer_stopgo_is_reported_by_its_kind() -> None:
     event = event_of(body)
     assert isinstance(event, UnknownKind)
     assert (event.kind, event.number, event.run_id) == ("Recharged", 1, "run")
-    assert "Recharged: unknown to this stopgo" in event_line(event, {})
+    assert "Recharged: unknown to this stopgo" in event_line(event, StopErrors())
 
 
 def test_missions_that_no_run_needs_are_retired_and_their_names_kept() -> None:

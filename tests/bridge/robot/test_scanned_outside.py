@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import msgspec
@@ -11,7 +12,9 @@ from stopgo.bridge.commands.run_control_commands import state_line, status_json
 from stopgo.bridge.commands.watch_commands import print_comparison
 from stopgo.bridge.station.watch import EventLines, EventObjects, event_line, table_lines, watch_with
 from stopgo.mission.comparing.run_collector import RunCollector
-from stopgo.mission.run.events import Scanned
+from stopgo.mission.document import Mission, with_digest
+from stopgo.mission.run.events import Arrived, Failed, Scanned
+from stopgo.mission.run.tolerance import StopErrors
 from tests.bridge.world import Field, corridor
 
 BESIDE = "120 mm from its stop (50 mm are tolerated)"
@@ -86,9 +89,9 @@ def test_a_stop_scanned_within_its_tolerance_is_reported_as_before() -> None:
     field.station().push(corridor())
     field.order("start")
     field.work()
-    stops = {stop.id: stop for stop in corridor().stops}
+    errors = StopErrors(corridor())
     scans = [event for event in field.journal.events() if isinstance(event, Scanned)]
-    assert len(scans) == 3 and not [event for event in scans if "beside" in event_line(event, stops)]
+    assert len(scans) == 3 and not [event for event in scans if "beside" in event_line(event, errors)]
     assert "3 done;" in state_line(field.report())
 
 
@@ -96,3 +99,49 @@ def test_status_names_the_skipped_stops_of_a_finished_run(field: Field) -> None:
     state = msgspec.structs.replace(field.report(), skipped=("s2",), skipped_count=1)
     assert state.state == "FINISHED"
     assert ", 1 skipped (s2: stopgo start --again repeats the mission);" in state_line(state)
+
+
+def narrow() -> Mission:
+    """A mission whose scanner sees 90°."""
+    mission = corridor()
+    return with_digest(
+        msgspec.structs.replace(mission, scanner=msgspec.structs.replace(mission.scanner, fov_deg=90.0))
+    )
+
+
+@pytest.mark.parametrize(("degrees", "outside"), [(14.0, ("s2",)), (4.0, ())])
+def test_a_scanner_that_sees_90_degrees_must_have_faced_as_planned(
+    degrees: float, outside: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    field = Field()
+    field.station().push(narrow())
+    field.order("start")
+    field.work_until(lambda run: (run.at, run.stop_state) == (1, "VERIFYING"))
+    here = field.base.pose()
+    field.base.stand_at(msgspec.structs.replace(here, heading=here.heading + math.radians(degrees)))
+    field.work()
+    assert field.report().outside == field.station().status().outside == outside
+    said: list[str] = []
+    heard = RunCollector()
+    state = watch_with(field.station(), heard, EventLines(said.append), run_id=field.controller.run.run_id)
+    words = f"turned {degrees:.1f}° from its heading (5° are tolerated)"
+    assert any("Scanned         s2" in line and words in line for line in said) == bool(outside)
+    assert print_comparison(heard, state, as_json=False) == len(outside)
+    assert (f"s2 was scanned {words}." in capsys.readouterr().out) == bool(outside)
+
+
+def test_a_robot_that_does_not_turn_scans_nothing_with_a_scanner_that_sees_90_degrees() -> None:
+    field = Field()
+    turned = field.base.goto
+
+    def goto(path: Any, *, heading: float | None, **others: Any) -> Any:
+        return turned(path, heading=None if heading is None else heading + 0.25, **others)
+
+    field.base.goto = goto  # type: ignore[method-assign]
+    field.station().push(narrow())
+    field.order("start")
+    field.work()
+    failed = [event for event in field.journal.events() if isinstance(event, Failed)]
+    words = "turned 14.3° from its heading (5° are tolerated) after 3 corrections"
+    assert failed and {event.reason for event in failed} == {words}
+    assert not [event for event in field.journal.events() if isinstance(event, Arrived | Scanned)]

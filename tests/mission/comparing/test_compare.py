@@ -8,6 +8,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.comparison import Comparison
@@ -160,6 +161,27 @@ def test_a_scan_from_outside_the_tolerance_is_none_of_the_plan() -> None:
     away = run(*visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1.2), (Finished, 133.0, {}))
     assert judge(away).answer == "no"
     assert "S2 was scanned 200 mm from its stop (50 mm are tolerated)." in judge(away).text
+
+
+@pytest.mark.parametrize(("degrees", "answer"), [(14.0, "no"), (-4.9, "yes")])
+def test_a_scanner_that_sees_90_degrees_must_have_faced_as_planned(degrees: float, answer: str) -> None:
+    mission, sight = planned()
+    narrow = with_digest(changed(mission, scanner=changed(mission.scanner, fov_deg=90.0)))
+    heading = next(stop.heading for stop in mission.stops if stop.id == "S2") + math.radians(degrees)
+    visits = [
+        (
+            kind,
+            s,
+            {**fields, "pose": changed(fields["pose"], heading=heading)} if "pose" in fields else fields,
+        )
+        for kind, s, fields in visit("S2", 70, 3.2, 1)
+    ]
+    events = (START, *visit("S1", 0, 1, 1), *visits, (Finished, 133.0, {}))
+    around, ahead = (compare(told(one, *events), [one], [sight]) for one in (mission, narrow))
+    assert (judge(around).answer, judge(ahead).answer) == ("yes", answer)
+    words = f"S2 was scanned turned {abs(degrees):.1f}° from its heading (5° are tolerated)."
+    assert (words in judge(ahead).text) == (answer == "no")
+    assert [item["outside_tolerance"] for item in comparison_json(ahead)["stops"]] == [False, answer == "no"]
 
 
 def test_a_stop_passed_outside_its_tolerance_was_not_acquired_whether_it_was_scanned_or_not() -> None:

@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace as changed
 
 from stopgo.bridge.robot.journal_file import open_journal
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Arrived, Finished, Scanned, Skipped, Started
 from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replay_page import to_do
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.runs.field import FieldRecording
@@ -26,11 +28,11 @@ MISSION = wandering(1)
 SKIPPED = MISSION.stops[3].id
 
 
-def run_of(mission: Mission) -> RunLog:
+def run_of(mission: Mission, *, turned: float = 0.0) -> RunLog:
     """Every stop 12 mm from its stop and scanned, except for one that was skipped."""
     events: list[tuple[type, float, dict[str, Any]]] = [(Started, 0.0, {"commander": "me"})]
     for number, stop in enumerate(mission.stops):
-        seconds, pose = 60.0 * (number + 1), at(stop.x + 0.012, stop.y, stop.heading)
+        seconds, pose = 60.0 * (number + 1), at(stop.x + 0.012, stop.y, stop.heading + turned)
         if stop.id == SKIPPED:
             events.append((Skipped, seconds, {"stop": stop.id, "reason": "blocked"}))
             continue
@@ -114,3 +116,15 @@ def test_another_revision_and_another_version_are_refused_with_their_differences
         replay(log, later, Placing())
     with pytest.raises(InputError, match=rf"another version of mission room, revision 1 \(changed: {name}\)"):
         replay(log, with_digest(replace(MISSION, stops=wider)), Placing())
+
+
+def test_a_scan_turned_from_its_heading_is_named_as_such_and_to_be_repeated(tmp_path: Path) -> None:
+    mission = with_digest(changed(MISSION, scanner=changed(MISSION.scanner, fov_deg=180.0)))
+    with open_journal(tmp_path / "state", "r1") as journal:
+        for event in run_of(mission, turned=-0.25).events:
+            journal.append(event)
+    found = replay(read_log(tmp_path / "state"), mission, Placing())
+    name, judgement = mission.stops[0].id, drive_verdict(found)
+    assert judgement.answer == "no" and "position error" not in judgement.text
+    assert f"{name}: turned 14.3° from its heading; the scanner sees 180°." in judgement.text
+    assert f"{name}: scan it again, turned by +14.3°" in list(to_do(found))

@@ -64,8 +64,8 @@ def test_a_stop_that_is_missed_has_failed_however_often_it_is_called_reached(tmp
         until(site, lambda events, run: run.state == "HELD")
         (failed,) = [event for event in site.events if isinstance(event, Failed)]
         assert failed.stop == "S2"
-        assert 0.5 < float(failed.reason.split()[0]) < 0.8
-        assert "tolerance is 0.3 m" in failed.reason
+        assert 500 < float(failed.reason.split()[0]) < 800
+        assert "(300 mm are tolerated); the vehicle reports it reached" in failed.reason
         assert "Arrived S2" not in told(site.events)
         assert isinstance(site.events[-1], Held)
         with site.reached() as station:

@@ -136,4 +136,4 @@ def test_five_centimetres_are_not_kept_by_it(log: list[Any]) -> None:
     events = followed(log, mission(tolerance_m=0.05))
     failed = [event for event in events if isinstance(event, Failed)]
     first = next(i for i, away in enumerate(stood(log)) if away > 0.05)
-    assert failed[0].stop == f"S{first}" and f"{stood(log)[first]:.2f}"[:3] in failed[0].reason
+    assert failed[0].stop == f"S{first}" and failed[0].reason.startswith(f"{1000 * stood(log)[first]:.0f}"[0])

@@ -97,10 +97,10 @@ def test_a_stop_that_is_missed_and_left_out_is_not_done(
         state = watch_with(station, heard, EventLines(said.append))
     failed = [event for event in site.events if isinstance(event, Failed)]
     assert [event.stop for event in failed] == ["S1", "S2", "S3"]
-    away = [float(re.findall(r"([0-9.]+) m from the stop", event.reason)[0]) for event in failed]
-    assert min(away) > 0.05 and max(away) < 0.25
-    assert all("tolerance is 0.05 m" in event.reason for event in failed)
-    assert sum("m from the stop" in line for line in said) >= 3
+    away = [int(re.findall(r"([0-9]+) mm from its stop", event.reason)[0]) for event in failed]
+    assert min(away) > 50 and max(away) < 250
+    assert all("(50 mm are tolerated)" in event.reason for event in failed)
+    assert sum("mm from its stop" in line for line in said) >= 3
     assert (state.done, state.skipped) == ((), ("S1", "S2", "S3"))
     assert print_comparison(heard, state, as_json=False) == 1
     assert "0 of 3 stops scanned" in capsys.readouterr().out
