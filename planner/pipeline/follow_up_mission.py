@@ -23,8 +23,8 @@ from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
-from stopgo.mission.run.scans import heading_error
-from stopgo.mission.run.tolerance import is_outside
+from stopgo.mission.run.events import Pose
+from stopgo.mission.run.tolerance import stop_error_text
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
@@ -154,12 +154,9 @@ def _poses_of(stops: Sequence[Stop]) -> ScanPoses:
 
 
 def _is_scanned(mission: Mission, stop: Stop, poses: ScanPoses) -> bool:
-    """True if a pose is within the stop's tolerance, with the heading that the scanner needs."""
-    return any(
-        not is_outside(math.dist((x, y), (stop.x, stop.y)), stop.tolerance_m)
-        and not heading_error(mission.scanner, stop.heading, heading)
-        for x, y, heading in poses.tolist()
-    )
+    """True if a pose is within the stop's tolerance."""
+    found = (Pose(x=x, y=y, heading=heading) for x, y, heading in poses.tolist())
+    return any(not stop_error_text(pose, stop, mission.scanner) for pose in found)
 
 
 def _seen_by(views: Iterable[IntArray], totals: CoverageTotals) -> BoolArray:
