@@ -60,7 +60,7 @@ def compare(
     sights
         Visibility data of stops, of any revisions.
     headings
-        True if the headings of the poses show where the scanner looked.
+        True if the poses have headings that were measured.
     """
     followed = _followed(log, missions)
     plans = [_Planned(item, headings=headings) for item in followed]
@@ -102,7 +102,7 @@ def _lost(item: StopComparison, acquired: Acquired | None, ended: bool) -> float
 
 
 class _Planned:
-    """Stops of one revision, with planned arrivals."""
+    """Stops of one revision, with planned arrivals; the scanner, if poses have measured headings."""
 
     def __init__(self, mission: Mission, *, headings: bool) -> None:
         self.revision = mission.revision
@@ -141,14 +141,14 @@ def _reached_by(stop: str, plans: list[_Planned], revision: int | None) -> _Plan
 
 
 def _with_offset(item: StopComparison, pose: Pose, stop: Stop, scanner: ScannerSpec | None) -> StopComparison:
-    """Add the offset of a pose from the stop; without a scanner its heading does not matter."""
+    """Add the offset of a pose from the stop; without a scanner the pose has no measured heading."""
     x, y, ahead = pose.x - stop.x, pose.y - stop.y, arrival_direction(stop)
     return replace(
         item,
         deviation_m=deviation(pose, stop),
         along_m=x * math.cos(ahead) + y * math.sin(ahead),
         across_m=y * math.cos(ahead) - x * math.sin(ahead),
-        heading_rad=math.remainder(pose.heading - stop.heading, math.tau),
+        heading_rad=None if scanner is None else math.remainder(pose.heading - stop.heading, math.tau),
         turned_rad=0.0 if scanner is None else heading_error(scanner, stop.heading, pose.heading),
         tolerance_m=stop.tolerance_m,
     )

@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from stopgo.mission.comparing.acquired import Certainty
-from stopgo.mission.comparing.comparison import StopComparison
+from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.run.run_log import Track
-from stopgo.mission.run.scans import HEADING_RAD, heading_error, needs_heading
+from stopgo.mission.run.scans import HEADING_RAD, needs_heading
 from stopgo.recordings.replay.replayed import Replay
 
 NEIGHBOURS = 4
@@ -32,25 +32,41 @@ def heading_answer(replay: Replay, number: int, *, drifts: bool) -> tuple[Certai
     `drifts`: the log's positions drift, or may.
     """
     item, scanner = replay.comparison.asked[number], replay.mission.scanner
-    if not needs_heading(scanner) or item.heading_rad is None:
+    if not needs_heading(scanner):
         return "yes", ""
-    if replay.inferred and not replay.placed.turns:
+    if item.heading_rad is None:
         return "unknown", NO_HEADINGS.format(scanner.fov_deg)
-    if not heading_error(scanner, 0.0, item.heading_rad):
-        return "yes", ""
-    if not replay.inferred:
-        return "no", ""
+    if replay.inferred and not _is_measured(replay, number):
+        return "unknown", NO_HEADING_THERE.format(scanner.fov_deg)
+    if not item.turned_rad or not replay.inferred:
+        return ("no" if item.turned_rad else "yes"), ""
     if not _are_of_driving(replay.run.poses):
         return "unknown", OTHER_HEADINGS
     return ("unknown", DRIFTS) if drifts and _is_alike(replay, item, number) else ("no", "")
 
 
+def unknown_headings(replay: Replay) -> str:
+    """Return why the log does not show where the scanner looked at a visited stop; empty if it does."""
+    visited = [number for number, item in enumerate(replay.comparison.asked) if item.outcome in DONE]
+    answers = (heading_answer(replay, number, drifts=False) for number in visited)
+    return next((why for answer, why in answers if answer == "unknown"), "")
+
+
 NO_HEADINGS = "its scanner sees {:g}°, and the log has no headings; give another source of poses"
+NO_HEADING_THERE = "its scanner sees {:g}°, and the log has no heading there; give another source of poses"
 OTHER_HEADINGS = (
     "its heading is not the planned one, but the log's headings are not the directions of driving either; "
     "check their unit, or give another source of poses"
 )
 DRIFTS = "its heading is not the planned one, and the log drifts; give poses matched to a map"
+
+
+def _is_measured(replay: Replay, number: int) -> bool:
+    """True if the log has a heading of a standstill at the stop; those between others are interpolated."""
+    source, offset_ns = replay.placed.source, replay.placed.alignment.time_offset_ns
+    known = source.ns[np.isfinite(source.heading)] + offset_ns
+    found = [match.standstill for match in replay.at(number)]
+    return any(((known >= item.begin_ns) & (known <= item.end_ns)).any() for item in found)
 
 
 def _are_of_driving(track: Track) -> bool:

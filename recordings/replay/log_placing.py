@@ -31,6 +31,8 @@ FIRST_NS = 3 * 10**8
 
 DIRECTION_M = 0.5
 """Length of the path that gives the first direction of driving."""
+LONGEST_TURN_S = 1.0
+"""Time without headings during which the robot counts as turning from one to the next."""
 BY_EARTH = "georeference"
 EMPTY_TRACK = Track.of((), (), ())
 
@@ -141,10 +143,17 @@ def _track(source: Poses) -> tuple[Track, bool]:
 
 
 def _filled_headings(source: Poses, measured: np.ndarray | None) -> FloatArray:
-    """Return headings between measured ones; without any, the directions of driving."""
+    """Return headings between measured ones; without any, the directions of driving.
+
+    In a long time without headings the last one stays: a turn that nobody saw ends no standstill.
+    """
     seconds = (source.ns - source.ns[0]) / 1e9
     if measured is not None:
-        return np.interp(seconds, seconds[measured], np.unwrap(source.heading[measured]))
+        times, headings = seconds[measured], np.unwrap(source.heading[measured])
+        late = np.flatnonzero(np.diff(times) > LONGEST_TURN_S)
+        ends = np.nextafter(times[late + 1], -np.inf)
+        times, headings = np.insert(times, late + 1, ends), np.insert(headings, late + 1, headings[late])
+        return np.interp(seconds, times, headings)
     step = np.diff(source.xy, axis=0, prepend=source.xy[:1])
     moving = np.hypot(*step.T) > 1e-3
     if not moving.any():

@@ -92,7 +92,7 @@ def _compared(
         placed=placed_log,
         matches=matches,
         run=run,
-        comparison=compare(run, [mission], sights, headings=bool(events)),
+        comparison=compare(run, [mission], sights, headings=bool(events) or placed_log.turns),
         uploads=differences_of(log, mission),
         inferred=not events,
     )

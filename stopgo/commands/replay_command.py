@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from stopgo.commands.replay_on_floor import follow_up_of, on_floor, write_follow_up
+from stopgo.commands.replay_on_floor import on_floor, write_follow_up
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError
@@ -226,7 +226,7 @@ class _ReplayFiles:
         ]
         if self.follow_up is not None:
             first, *others = missions
-            write_follow_up(follow_up_of(found, planned[first.digest], others), self.follow_up)
+            write_follow_up(found, planned[first.digest], others, self.follow_up)
         return found
 
     def write(self, replays: list[Replay], plans: Review | None) -> None:

@@ -19,8 +19,13 @@ if TYPE_CHECKING:
 def on_floor(replays: list[Replay], planned: PlannedFloor, clouds: Path | None) -> list[Replay]:
     """Return the replays with what was visible from the robot's stationary poses, and what scans measured."""
     from stopgo.planner.pipeline.follow_up_mission import as_driven
+    from stopgo.recordings.replay.heading_evidence import unknown_headings
 
-    found = [item.with_sight(as_driven(planned, item.scanned_from)) for item in replays]
+    found = []
+    for item in replays:
+        if why := unknown_headings(item):
+            typer.echo(f"{item.log.path}: what was visible is undecided: {why}", err=True)
+        found.append(item if why else item.with_sight(as_driven(planned, item.scanned_from)))
     return [item.with_measured(_measured(planned, item, clouds)) for item in found]
 
 
@@ -36,7 +41,7 @@ def _measured(planned: PlannedFloor, replay: Replay, clouds: Path | None) -> Mea
     return found if found.points else None
 
 
-def follow_up_of(replays: list[Replay], planned: PlannedFloor, others: list[Mission]) -> Mission | None:
+def _follow_up_of(replays: list[Replay], planned: PlannedFloor, others: list[Mission]) -> Mission | None:
     """Plan a mission for what all replays together missed; None if they missed nothing required.
 
     `others` are the missions that divide the floor with the planned one.
@@ -61,10 +66,15 @@ def follow_up_of(replays: list[Replay], planned: PlannedFloor, others: list[Miss
     return top_up(planned, scanned_from, obstacles=obstacles, evidence=evidence, measured=done, others=others)
 
 
-def write_follow_up(mission: Mission | None, path: Path) -> None:
-    """Write the follow-up mission, and print its number of stops."""
+def write_follow_up(replays: list[Replay], planned: PlannedFloor, others: list[Mission], path: Path) -> None:
+    """Write the follow-up mission, and print its number of stops, or why there is none."""
     from stopgo.mission.files.mission_json import write
 
+    by_clouds = any(item.measured is not None and item.measured.decides for item in replays)
+    if not by_clouds and any(item.sight is None for item in replays):
+        typer.echo(f"{path}: not written: it is not known what was visible", err=True)
+        return
+    mission = _follow_up_of(replays, planned, others)
     if mission is None:
         typer.echo(f"{path}: not written: all required targets were visible, or measured", err=True)
         return

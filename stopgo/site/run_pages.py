@@ -150,7 +150,7 @@ class RunRoom:
         InputError
             If the folder has no floor or no mission file of it.
         NegativeResult
-            If nothing is left.
+            If nothing is left, or it is not known what is.
         """
         listed = next((one for one in self.listed()["missions"] if one["key"] == key), None)
         if listed is None or listed["file"] is None:
@@ -166,16 +166,18 @@ class RunRoom:
         log = self._run(
             ["replay", *runs, "--mission", str(path), "--floor", str(floor), "--top-up", str(out)]
         )
-        if "not written" in log or not out.is_file():
-            raise NegativeResult("nothing is left to scan: all required targets were visible")
+        lines = (line.partition(" not written: ")[2] for line in log.splitlines())
+        reasons = [line for line in lines if line]
+        if reasons or not out.is_file():
+            raise NegativeResult(f"no follow-up mission was planned: {'; '.join(reasons) or 'no file'}")
         made = read(out)
         return {"file": self._folder.name_of(out), "stops": len(made.stops)}
 
     def _run(self, arguments: list[str]) -> str:
-        """Run a command in a process, and return what it reported; code 1 is an answer, too."""
+        """Run a command in a process, and return what it reported; no and undecided are answers, too."""
         answer = self._lane.answer(CommandTask(arguments))
         lines = answer["log"].strip().splitlines()
-        if answer["code"] > 1:
+        if answer["code"] not in (0, 1, 3):
             raise InputError((lines or ["the command failed"])[-1].removeprefix("stopgo: "))
         return "\n".join(lines)
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from multiprocessing import get_context
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,7 +23,15 @@ from stopgo.site.event_feed import EventFeed
 from stopgo.site.kept_variants import kept_variants
 from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest, WorkLane
 from stopgo.site.planning_routes import options_json
-from stopgo.site.planning_work import DRAWING, ReadTask, VariantTask, read_work, settings_of, variant_work
+from stopgo.site.planning_work import (
+    DRAWING,
+    CommandTask,
+    ReadTask,
+    VariantTask,
+    read_work,
+    settings_of,
+    variant_work,
+)
 from stopgo.site.run_pages import RunRoom
 from stopgo.site.site_folder import SiteFiles
 from tests.planner.floors.ifc.house import two_rooms as house_model
@@ -241,3 +250,37 @@ def test_a_report_that_would_lack_a_recording_is_refused(
     )
     with pytest.raises(InputError, match=r"house\.dxf"):
         back.report(mission["key"])
+
+
+@pytest.mark.parametrize(
+    ("code", "why"), [(3, ""), (1, "all required targets were visible"), (2, "no floor")]
+)
+def test_a_follow_up_mission_is_planned_for_an_undecided_run_too(
+    code: int, why: str, room: PlanningRoom, place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a run with doubtful stops `replay` ends with 3; what it did not write it names, with the reason."""
+    back = RunRoom(SiteFiles.at(place), tmp_path, room.files)
+    (mission,) = [one for one in back.listed()["missions"] if one["file"]]
+    out = (place / mission["file"]).parent / "follow-up" / "mission.json"
+
+    def answer(task: CommandTask) -> dict[str, Any]:
+        if not why:
+            out.write_bytes((place / mission["file"]).read_bytes())
+        log = (
+            f"stopgo: {why}"
+            if code == 2
+            else f"{out}: not written: {why}\nAcquired."
+            if why
+            else "Undecided."
+        )
+        return {"code": code, "log": log}
+
+    monkeypatch.setattr(back, "_lane", SimpleNamespace(answer=answer))
+    try:
+        if why:
+            with pytest.raises(InputError if code == 2 else NegativeResult, match=why):
+                back.follow_up(mission["key"])
+        else:
+            assert back.follow_up(mission["key"])["stops"] == mission["stops"]
+    finally:
+        out.unlink(missing_ok=True)

@@ -204,3 +204,25 @@ def test_a_floor_of_another_mission_is_refused(
     assert "--floor" in capsys.readouterr().err
     with pytest.raises(InputError, match="is not the floor"):
         planned_floor(other, read(folder / "mission.json"))
+
+
+def test_where_a_narrow_scanner_looked_is_not_made_up(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The directions of driving, in a log without headings, say nothing of it: nor of what was visible."""
+    floor = str(drawn(tmp_path / "floor.dxf"))
+    assert main(["plan", floor, "-o", str(tmp_path), *PLAN, "--fov", "180"]) == 0
+    track = logged(driven(read(tmp_path / "mission.json")))
+    rows = zip(track.ns.tolist(), track.xy.tolist(), strict=True)
+    table = "".join(f"{ns},{x},{y}\n" for ns, (x, y) in rows)
+    (tmp_path / "run.csv").write_text("time_ns,x,y\n" + table)
+    further = tmp_path / "next.json"
+    given = ["replay", str(tmp_path / "run.csv"), "--mission", str(tmp_path / "mission.json")]
+    capsys.readouterr()
+    assert main([*given, "--map", "0,0,0", "--floor", floor, "--top-up", str(further), "--json"]) == 3
+    told, said = capsys.readouterr()
+    found = json.loads(told)
+    assert found["coverage"] is None and {stop["heading_rad"] for stop in found["run"]["stops"]} == {None}
+    why = "its scanner sees 180°, and the log has no headings; give another source of poses"
+    assert f"what was visible is undecided: {why}" in said and not further.exists()
+    assert f"{further}: not written: it is not known what was visible" in said

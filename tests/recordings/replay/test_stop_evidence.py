@@ -15,7 +15,7 @@ from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import Remark, poses_of
 from stopgo.recordings.replay.drive_verdict import drive_verdict
-from stopgo.recordings.replay.heading_evidence import heading_answer
+from stopgo.recordings.replay.heading_evidence import heading_answer, unknown_headings
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
@@ -467,6 +467,23 @@ def test_a_scanner_that_sees_a_half_needs_the_planned_heading(
         assert judged.answer == expected
     mission = with_digest(changed(MISSION, scanner=changed(MISSION.scanner, fov_deg=180.0)))
     assert text in drive_verdict(replay(held(poses), mission, THERE)).text
+
+
+def test_a_heading_between_others_is_not_one_of_a_stop() -> None:
+    """A compass that is silent while the robot stands at a stop."""
+    drive = driven(MISSION)
+    track, halt = logged(drive), drive.halts[3]
+    seconds = (track.ns - BEGIN_NS) / 1e9
+    silent = (seconds > halt.begin_s - 1) & (seconds < halt.end_s + 1)
+    poses = poses_of("/odom", "map", track.ns, track.xy, np.where(silent, np.nan, track.heading))
+    mission = with_digest(changed(MISSION, scanner=changed(MISSION.scanner, fov_deg=180.0)))
+    assert poses is not None
+    found = replay(held(poses), mission, THERE)
+    judged = drive_verdict(found)
+    assert judged.answer == "unknown"
+    assert "s04 is undecided: its scanner sees 180°, and the log has no heading there" in judged.text
+    assert "no heading there" in unknown_headings(found)
+    assert drive_verdict(replay(held(poses), MISSION, THERE)).answer == "yes"  # it stood all the time
 
 
 @pytest.mark.parametrize("answer, wrong", [("no", slice(4, 5)), ("unknown", slice(0, None))])
