@@ -16,7 +16,12 @@ BAND_M = 1.0
 
 
 def placed_sweeps(replay: Replay) -> Iterator[FloatArray]:
-    """Yield points (n, 2) of each scan made during a standstill; of all scans if there is no standstill."""
+    """Yield points (n, 2) of each scan made during a standstill; of all scans if there is no standstill.
+
+    Nobody knows which way the scanner of a log without headings was turned: it yields none.
+    """
+    if not replay.placed.turns:
+        return
     offset = replay.placed.alignment.time_offset_ns
     mounts = {name: Transform(x=x, y=y, heading=heading) for name, x, y, heading in replay.log.mounts}
     for sweep in replay.log.sweeps():

@@ -54,7 +54,9 @@ def notes_of(replay: Replay) -> tuple[str, ...]:
     """Return anomalies of the log, and differences between missions in it and ours."""
     lost = (f"DAMAGED: {replay.log.lost}",) if replay.log.lost else ()
     headings_note = (
-        () if replay.placed.turns else ("no headings in the log; the direction of driving is used",)
+        ()
+        if replay.placed.turns
+        else ("no headings in the log: the direction of driving is used, and no laser scan",)
     )
     return (*lost, *replay.log.oddities, *replay.placed.source.oddities, *headings_note, *replay.uploads)
 

@@ -18,12 +18,12 @@ from stopgo.mission.files.mission_json import read
 from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, as_driven, planned_floor, top_up
 from stopgo.planner.pipeline.measuring import measured
-from stopgo.recordings.logs.field_log import FieldLog, Sweep
+from stopgo.recordings.logs.field_log import FieldLog, Sweep, poses_of
 from stopgo.recordings.replay.drive_verdict import DriveJudgement, drive_verdict
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.placed_sweeps import placed_sweeps
 from stopgo.recordings.replay.replay_page import to_do
-from stopgo.recordings.replay.replay_text import measured_lines
+from stopgo.recordings.replay.replay_text import measured_lines, notes_of
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.replay.standstills import find_standstills
@@ -31,7 +31,7 @@ from tests.planner.test_command import drawn
 from tests.recordings.clouds.test_clouds import ply
 from tests.recordings.replay.driving import driven, logged
 from tests.recordings.replay.test_as_driven import PLAN
-from tests.recordings.replay.test_replaying import log_of
+from tests.recordings.replay.test_replaying import held
 
 HEAP = (2.6, 0.9, 3.0, 1.3)
 MOUNT = ("laser", 0.2, 0.1, 0.5)
@@ -51,7 +51,9 @@ def planned(folder: Path) -> PlannedFloor:
     return planned_floor(folder / "floor.dxf", read(folder / "mission.json"))
 
 
-def scanned(planned: PlannedFloor, *heaps: tuple[float, float, float, float], off: float = 0.0) -> Replay:
+def scanned(
+    planned: PlannedFloor, *heaps: tuple[float, float, float, float], off: float = 0.0, headings: bool = True
+) -> Replay:
     """A drive of the whole mission with a laser, turned on its mount, that meets walls moved by `off`."""
     mission: Mission = planned.mission
     track = logged(driven(mission))
@@ -66,7 +68,10 @@ def scanned(planned: PlannedFloor, *heaps: tuple[float, float, float, float], of
                 xyz = seen_by_laser(solid, (halt.x, halt.y, halt.heading))
                 yield Sweep(halt.begin_ns + (k + 1) * 10**9, "/scan", "laser", xyz)
 
-    log: FieldLog = replace(log_of(track), sweeps=sweeps, mounts=(MOUNT,))
+    heading = track.heading if headings else np.full(len(track), np.nan)
+    poses = poses_of("/odom", "map", track.ns, track.xy, heading)
+    assert poses is not None
+    log: FieldLog = replace(held(poses), sweeps=sweeps, mounts=(MOUNT,))
     return replay(log, mission, Placing(align="first"))
 
 
@@ -102,6 +107,13 @@ def test_a_wall_that_stands_elsewhere_is_reported_by_its_side(planned: PlannedFl
     assert min(means) < -0.02
     as_planned = measured(planned, placed_sweeps(scanned(planned)), tolerance=0.02)
     assert (found.coverage.whole.coverage or 0) < 0.75 * (as_planned.coverage.whole.coverage or 0)
+
+
+def test_scans_of_which_nobody_knows_the_heading_measure_nothing(planned: PlannedFloor) -> None:
+    """Turned as the robot drove, they would show walls elsewhere, and objects that nobody planned."""
+    found = scanned(planned, headings=False)
+    assert list(placed_sweeps(found)) == []
+    assert "no headings in the log: the direction of driving is used, and no laser scan" in notes_of(found)
 
 
 def test_what_nobody_planned_is_found_and_driven_round(planned: PlannedFloor) -> None:
