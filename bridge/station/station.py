@@ -163,7 +163,7 @@ class Station:
             who = "no robot" if self.keys.every else f"robot {self.keys.robot} not"
             reason = why() or "is it running, under this name and site?"
             return RobotUnreachable(
-                f"{endpoint}: {who} found within {self.timeout_s:g} s"
+                f"{endpoint}: {who} found within {round(self.timeout_s, 1):g} s"
                 f" (key expression {self.keys.alive}); nothing was sent: {reason}"
             )
 

@@ -233,6 +233,12 @@ def test_a_stop_that_nobody_could_receive_was_not_sent(time: StoppedTime) -> Non
     assert time.now == pytest.approx(5.0, abs=0.1)
 
 
+def test_a_timeout_that_was_partly_used_is_reported_in_tenths(time: StoppedTime) -> None:
+    station = Station(Switchboard().link(), KeyExpressions("r1"), commander="test", timeout_s=4.96271)
+    not_found = station.look_for("tcp/robot:7447")
+    assert "not found within 5 s (" in str(not_found())
+
+
 def test_a_stop_that_may_have_arrived_is_unknown_though_the_robot_was_never_found(time: StoppedTime) -> None:
     station, _ = deaf(Field(), time, "/cmd/")
     station.look_for("tcp/robot:7447")
