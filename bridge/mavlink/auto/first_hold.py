@@ -62,7 +62,7 @@ class FirstHold:
                 due_s = time.monotonic() + AGAIN_S
 
     def _meet(self, heartbeat: Message) -> None:
-        """Send HOLD at a vehicle's first heartbeat; on a port that listens, its address was unknown before."""
+        """Send HOLD at a vehicle's first heartbeat: on a port that listens, its address was unknown."""
         who = sender(heartbeat)
         if who not in self._holds and self._is_meant(heartbeat):
             self._holds[who] = autopilot_of(heartbeat.autopilot).modes.hold
@@ -95,7 +95,8 @@ class FirstHold:
         return not self._recorded and self._vehicle in (None, heartbeat.get_srcSystem())
 
     def _send(self, who: Who) -> None:
-        self._wire.send(command_long(who, Command.DO_SET_MODE, *self._holds[who].params))
+        """Send HOLD to every address: if two vehicles have that system id, both are to stand."""
+        self._wire.send(command_long(who, Command.DO_SET_MODE, *self._holds[who].params), everywhere=True)
 
 
 @contextmanager

@@ -411,12 +411,14 @@ def found(
     RobotUnreachable
         If none is found.
     InputError
-        If several are found, and none was named.
+        If several are found, and none was named; or if two have the same system id.
     """
     with wire.waiting("HEARTBEAT") as waiting:
         wire.beat(beat or station_beat)
         beats = _heartbeats(waiting, vehicle, timeout_s, lambda: _knock(wire, vehicle, beat or station_beat))
     heartbeat = _selected(wire, beats, vehicle, timeout_s)
+    _check_alone(wire, heartbeat.get_srcSystem())
+    wire.report_doubled(heartbeat.get_srcSystem())
     newest = Newest(sender(heartbeat))
     newest.put(heartbeat)
     autopilot = autopilot_of(heartbeat.autopilot)
@@ -474,6 +476,17 @@ def _selected(wire: Wire, beats: dict[int, Message], vehicle: int | None, timeou
         f"{wire.name}: {whom} within {timeout_s:g} s{others}{_why_none(wire)}; nothing was sent. "
         "Is it on, and does it send there?"
     )
+
+
+def _check_alone(wire: Wire, system: int) -> None:
+    """Refuse to take two vehicles for one."""
+    doubled = wire.doubled(system)
+    if doubled:
+        raise InputError(
+            f"{wire.name}: two vehicles have the system id {system}, at {doubled}; nothing was sent. Give one"
+            " another id (ArduPilot MAV_SYSID, before 4.7 SYSID_THISMAV; PX4 MAV_SYS_ID). If it is one"
+            " vehicle over two links, use one of them"
+        )
 
 
 def _why_none(wire: Wire) -> str:

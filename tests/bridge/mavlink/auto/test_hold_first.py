@@ -208,13 +208,15 @@ class Beating:
 
 def test_frequent_heartbeats_do_not_hold_up_the_next_hold(monkeypatch: pytest.MonkeyPatch) -> None:
     sent: list[Message] = []
-    line = SimpleNamespace(send=lambda message, **how: sent.append(message))
+    ways: list[dict[str, Any]] = []
+    line = SimpleNamespace(send=lambda message, **how: (sent.append(message), ways.append(how)))
     hold = FirstHold(cast(Any, line), None)
     beating = Beating(hold)
     monkeypatch.setattr(first_hold, "time", beating)
     hold.begin([(1, Mode(4))])
     hold.repeat(cast(Any, beating))
     assert all(map(is_hold, sent))
+    assert all(how == {"everywhere": True} for how in ways)  # another vehicle may have the same id
     assert len(sent) == 8  # the first, one at the first heartbeat, and one with every second heartbeat
 
 
