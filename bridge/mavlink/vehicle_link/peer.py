@@ -297,8 +297,11 @@ class Peer:
                 return held
         return None
 
-    def why_silent(self) -> str:
-        """Possible reason why a vehicle that was found does not answer, as a part of a sentence."""
+    def why_silent(self, *, answers: bool = False) -> str:
+        """Possible reason why a vehicle that was found does not answer, as a part of a sentence.
+
+        `answers`: it has answered before, so that neither signing nor a one-way link is the reason.
+        """
         if self.wire.disconnected:
             return f" ({self.wire.disconnected})"
         if self.wire.dropped[SIGNATURE]:
@@ -307,9 +310,12 @@ class Peer:
             return f" (no data for {self.silent_s:.0f} s)"
         if self._newest.text_s > time.monotonic() - self.patience_s - OTHERS_S:
             return f' (it last said "{self._newest.text}")'
-        if is_signed(self.heartbeat):
-            return " (it signs its messages, and may want ours signed: --signing-key FILE)"
-        return " (its heartbeats come: does it want signed messages, or is the link one-way?)"
+        guess = (
+            "it signs its messages, and may want ours signed: --signing-key FILE"
+            if is_signed(self.heartbeat)
+            else "its heartbeats come: does it want signed messages, or is the link one-way?"
+        )
+        return "" if answers else f" ({guess})"
 
     def _commanded(
         self, number: int, message: Callable[[int], Message], patience_s: float | None, unheard: int
