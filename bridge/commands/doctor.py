@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 LEAST_FREE = 500_000_000
 """Free bytes that a long run's recording and the robot's journal need."""
 CLOCKS_APART_S = 2.0
-"""Largest difference of clocks; commands are valid for some seconds on the robot's clock."""
+"""Largest difference of clocks. Commands go by the robot's own clock, which each station asks for."""
 EXTRAS = {
     "plan": "shapely", "bim": "ifcopenshell", "record": "rerun", "clouds": "laspy", "prove": "embreex",
 }  # fmt: skip
@@ -280,7 +280,9 @@ def robot_checks(info: Info, now_ns: int) -> Iterator[Check]:
     yield Check("can", True, told_of_capabilities(info.capabilities))
     difference_s = (info.clock_ns - now_ns) / 1e9
     ok = abs(difference_s) <= CLOCKS_APART_S
-    action = "" if ok else "set both clocks by NTP; commands are refused as too old or too early"
+    action = (
+        "" if ok else "set both clocks by NTP; keys are valid by them, and the times of runs are the robot's"
+    )
     yield Check("clock", ok, f"the robot's clock is {difference_s:+.1f} s from this one", action)
     if info.to_map is None:
         yield Check("origin", True, "on the robot's map as each mission says (frame.to_map)")

@@ -64,6 +64,8 @@ PAUSE_S = 0.02
 """Pause between tries: a query just after a reconnect may return nothing at once."""
 COMMITS = 3
 """Largest number of commits of a push; each restart of the robot needs a new one."""
+BEGINNINGS = 5
+"""Largest number of transfers of a push; each push of another mission ends the one before."""
 PATIENCE_S = 20.0
 """Longest time of a push without an answer: on a lossy link, the connection may be opened again."""
 
@@ -161,7 +163,7 @@ class Station:
             who = "no robot" if self.keys.every else f"robot {self.keys.robot} not"
             reason = why() or "is it running, under this name and site?"
             return RobotUnreachable(
-                f"{endpoint}: {who} found within {self.timeout_s:g} s"
+                f"{endpoint}: {who} found within {round(self.timeout_s, 1):g} s"
                 f" (key expression {self.keys.alive}); nothing was sent: {reason}"
             )
 
@@ -275,13 +277,30 @@ class Station:
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
             sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
         )  # fmt: skip
-        began = time.monotonic()
-        ready = self._step(manifest, "begin", encode(manifest), Ready)
-        window = Window(time.monotonic() - began)
-        self._send_chunks(manifest, document, set(ready.held), window, progress)
-        accepted = self._commit(manifest, take_over=take_over)
+        accepted = self._transferred(manifest, document, progress, take_over=take_over)
         self._read_back(manifest)
         return accepted
+
+    def _transferred(
+        self, manifest: Manifest, document: bytes, progress: Progress, *, take_over: bool
+    ) -> Accepted:
+        """Send and commit the chunks, from the beginning again if another push has ended the transfer."""
+        for _ in range(BEGINNINGS):
+            began = time.monotonic()
+            ready = self._step(manifest, "begin", encode(manifest), Ready)
+            window = Window(time.monotonic() - began)
+            try:
+                self._send_chunks(manifest, document, set(ready.held), window, progress)
+                return self._commit(manifest, take_over=take_over)
+            except NegativeResult as no:
+                if no.reason != "incomplete":
+                    raise
+                rejection = no
+        raise NegativeResult(
+            f"{rejection}. The transfer was begun {BEGINNINGS} times: another station may be pushing too;"
+            " push again when it has finished",
+            reason="incomplete",
+        )
 
     def _commit(self, manifest: Manifest, *, take_over: bool) -> Accepted:
         """Commit the chunks that were sent; with a new commit if the robot was restarted meanwhile."""

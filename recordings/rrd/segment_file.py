@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import struct
 from collections import deque
 from collections.abc import Callable
@@ -32,7 +34,7 @@ class SegmentFile:
     """File to which recordings are added one after another; together they form one recording without an end.
 
     Segments that find no room on the disk wait in memory in their order, up to MOST_WAITING bytes. The file
-    contains whole segments only.
+    contains whole segments only. If it is deleted or moved meanwhile, it is written again.
     """
 
     def __init__(self, path: Path, say: Callable[[str], None]) -> None:
@@ -68,7 +70,9 @@ class SegmentFile:
 
     def _write(self) -> None:
         if self._file is None:
-            self._file = self.path.open("xb", buffering=0)
+            self._file = self.path.open("x+b", buffering=0)
+        elif not self._is_at_its_path(self._file):
+            self._file = self._copied_back(self._file)
         try:
             self._file.seek(self._written)
             while self._waiting:
@@ -79,6 +83,27 @@ class SegmentFile:
                 self._waiting.popleft()
         finally:
             self._file.truncate(self._written)  # remove an incomplete segment
+
+    def _is_at_its_path(self, file: FileIO) -> bool:
+        """False if somebody has deleted or moved the file; its open descriptor still has what was written."""
+        try:
+            return os.path.samestat(os.fstat(file.fileno()), self.path.stat())
+        except FileNotFoundError:
+            return False
+
+    def _copied_back(self, lost: FileIO) -> FileIO:
+        """Copy what was written to a new file at the path, and return it; raises OSError on failure."""
+        copy = self.path.open("x+b", buffering=0)
+        try:
+            lost.seek(0)
+            with open(copy.fileno(), "wb", closefd=False) as out:
+                shutil.copyfileobj(lost, out)
+        except OSError:
+            copy.close()
+            self.path.unlink(missing_ok=True)
+            raise
+        lost.close()
+        return copy
 
     def _report(self, fault: str | None) -> None:
         """Report once that the disk is full, and once that it has room again."""

@@ -13,7 +13,7 @@ from stopgo.bridge.commands.doctor import robot_checks
 from stopgo.bridge.profile import NAMES, read_profile
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
-from tests.bridge.world import Field
+from tests.bridge.world import Field, corridor
 
 NOTHING = {
     "robot": None,
@@ -148,6 +148,17 @@ def test_doctor_compares_the_clocks() -> None:
     late = {check.name: check for check in robot_checks(info, info.clock_ns + 3_000_000_000)}
     assert (late["clock"].ok, late["clock"].result) == (False, "the robot's clock is -3.0 s from this one")
     assert "NTP" in late["clock"].action
+
+
+def test_doctor_does_not_claim_that_a_wrong_clock_makes_commands_fail() -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.clock.jump(-3e7)
+    late = {check.name: check for check in robot_checks(station.info(), 1_700_000_000_000_000_000)}
+    assert not late["clock"].ok
+    assert "refused" not in late["clock"].action
+    assert station.command("start").outcome == "ok"
 
 
 def test_doctor_reports_what_a_robot_can_and_what_it_lacks() -> None:

@@ -7,6 +7,7 @@ as soon as its heartbeat shows the kind of its autopilot.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -33,6 +34,8 @@ class FirstHold:
         self._wire = wire
         self._holds: dict[Who, Mode] = {}
         self._vehicle = vehicle
+        self._met: set[Who] = set()
+        """Vehicles whose heartbeat was heard."""
         self._recorded = False
         self._closing = threading.Event()
 
@@ -48,14 +51,24 @@ class FirstHold:
 
     def repeat(self, heartbeats: MessageQueue) -> None:
         """Send HOLD again and again until closed, and to each further vehicle at its first heartbeat."""
+        due_s = time.monotonic() + AGAIN_S
         while not self._closing.is_set():
-            message = heartbeats.get(AGAIN_S)
-            if message is None:
+            message = heartbeats.get(due_s - time.monotonic())
+            if message is not None:
+                self._meet(message)
+            if time.monotonic() >= due_s:
                 for who in self._holds:
                     self._send(who)
-            elif sender(message) not in self._holds and self._is_meant(message):
-                self._holds[sender(message)] = autopilot_of(message.autopilot).modes.hold
-                self._send(sender(message))
+                due_s = time.monotonic() + AGAIN_S
+
+    def _meet(self, heartbeat: Message) -> None:
+        """Send HOLD at a vehicle's first heartbeat: on a port that listens, its address was unknown."""
+        who = sender(heartbeat)
+        if who not in self._holds and self._is_meant(heartbeat):
+            self._holds[who] = autopilot_of(heartbeat.autopilot).modes.hold
+        if who in self._holds and who not in self._met:
+            self._met.add(who)
+            self._send(who)
 
     def close(self) -> None:
         self._closing.set()
@@ -82,7 +95,8 @@ class FirstHold:
         return not self._recorded and self._vehicle in (None, heartbeat.get_srcSystem())
 
     def _send(self, who: Who) -> None:
-        self._wire.send(command_long(who, Command.DO_SET_MODE, *self._holds[who].params))
+        """Send HOLD to every address: if two vehicles have that system id, both are to stand."""
+        self._wire.send(command_long(who, Command.DO_SET_MODE, *self._holds[who].params), everywhere=True)
 
 
 @contextmanager

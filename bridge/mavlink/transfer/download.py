@@ -92,7 +92,7 @@ class _Reading:
             self._ask_count()
             while self._count is None or len(self.items) < self._count:
                 if self._silence.over:
-                    raise RobotUnreachable(f"{self._peer} did not send its mission{self._peer.why_silent()}")
+                    raise RobotUnreachable(self._incomplete())
                 message = waiting.get(self._pace.again_s if self._count is None else self._due_s())
                 if message is None:
                     self._again()
@@ -103,6 +103,12 @@ class _Reading:
         for _ in range(END_REPEATS):
             self._peer.send(ack_message(MissionResult.ACCEPTED, self._peer.who))
         return None
+
+    def _incomplete(self) -> str:
+        if self._count is None or not self.items:
+            return f"{self._peer} did not send its mission{self._peer.why_silent()}"
+        sent = f"{len(self.items)} of the {self._count} items that it announced"
+        return f"{self._peer} sent {sent}, and no more{self._peer.why_silent(answers=True)}"
 
     @property
     def _stuck(self) -> bool:

@@ -297,8 +297,11 @@ class Peer:
                 return held
         return None
 
-    def why_silent(self) -> str:
-        """Possible reason why a vehicle that was found does not answer, as a part of a sentence."""
+    def why_silent(self, *, answers: bool = False) -> str:
+        """Possible reason why a vehicle that was found does not answer, as a part of a sentence.
+
+        `answers`: it has answered before, so that neither signing nor a one-way link is the reason.
+        """
         if self.wire.disconnected:
             return f" ({self.wire.disconnected})"
         if self.wire.dropped[SIGNATURE]:
@@ -307,9 +310,12 @@ class Peer:
             return f" (no data for {self.silent_s:.0f} s)"
         if self._newest.text_s > time.monotonic() - self.patience_s - OTHERS_S:
             return f' (it last said "{self._newest.text}")'
-        if is_signed(self.heartbeat):
-            return " (it signs its messages, and may want ours signed: --signing-key FILE)"
-        return " (its heartbeats come: does it want signed messages, or is the link one-way?)"
+        guess = (
+            "it signs its messages, and may want ours signed: --signing-key FILE"
+            if is_signed(self.heartbeat)
+            else "its heartbeats come: does it want signed messages, or is the link one-way?"
+        )
+        return "" if answers else f" ({guess})"
 
     def _commanded(
         self, number: int, message: Callable[[int], Message], patience_s: float | None, unheard: int
@@ -411,12 +417,14 @@ def found(
     RobotUnreachable
         If none is found.
     InputError
-        If several are found, and none was named.
+        If several are found, and none was named; or if two have the same system id.
     """
     with wire.waiting("HEARTBEAT") as waiting:
         wire.beat(beat or station_beat)
         beats = _heartbeats(waiting, vehicle, timeout_s, lambda: _knock(wire, vehicle, beat or station_beat))
     heartbeat = _selected(wire, beats, vehicle, timeout_s)
+    _check_alone(wire, heartbeat.get_srcSystem())
+    wire.report_doubled(heartbeat.get_srcSystem())
     newest = Newest(sender(heartbeat))
     newest.put(heartbeat)
     autopilot = autopilot_of(heartbeat.autopilot)
@@ -474,6 +482,17 @@ def _selected(wire: Wire, beats: dict[int, Message], vehicle: int | None, timeou
         f"{wire.name}: {whom} within {timeout_s:g} s{others}{_why_none(wire)}; nothing was sent. "
         "Is it on, and does it send there?"
     )
+
+
+def _check_alone(wire: Wire, system: int) -> None:
+    """Refuse to take two vehicles for one."""
+    doubled = wire.doubled(system)
+    if doubled:
+        raise InputError(
+            f"{wire.name}: two vehicles have the system id {system}, at {doubled}; nothing was sent. Give one"
+            " another id (ArduPilot MAV_SYSID, before 4.7 SYSID_THISMAV; PX4 MAV_SYS_ID). If it is one"
+            " vehicle over two links, use one of them"
+        )
 
 
 def _why_none(wire: Wire) -> str:

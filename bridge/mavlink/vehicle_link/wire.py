@@ -20,6 +20,7 @@ from typing import NamedTuple, TypeVar
 
 from stopgo.bridge.console import say
 from stopgo.bridge.mavlink.vehicle_link.frames import UNREADABLE, Frames, dialect
+from stopgo.bridge.mavlink.vehicle_link.sender_addresses import SenderAddresses
 from stopgo.bridge.mavlink.vehicle_link.transport import Address, End, Transport, open_transport
 from stopgo.bridge.mavlink.vehicle_link.url import Url, check_guarded, read_url
 from stopgo.mission.errors import InputError
@@ -38,6 +39,8 @@ SIGNATURE = "wrong or no signature"
 """Reason by which `dropped` counts messages without a signature by our key, and replays."""
 SLOW_BAUD = 57_600
 """Highest rate of a slow link: eight mission items take 70 ms; telemetry radios are not faster."""
+DOUBLED = "from another vehicle with the same system id"
+"""Reason by which `dropped` counts messages of a second vehicle."""
 UNSIGNED_ALLOWED = (MessageId.RADIO_STATUS,)
 """Radios cannot sign."""
 LEAST_PASSPHRASE = 8
@@ -118,7 +121,8 @@ class Wire:
         self._seen = SeenStreams()
         self._sending = self._mav()
         self._frames = Frames(self.dropped, self._mav)
-        self._routes: dict[tuple[int, int], Address] = {}
+        self._addresses = SenderAddresses()
+        self._watched: set[int] = set()
         self._queues: list[MessageQueue] = []
         self._lock = threading.Lock()
         self._closing = threading.Event()
@@ -132,8 +136,25 @@ class Wire:
         """Reason why no data pass now; empty if they pass."""
         return self._ended or self._transport.disconnected
 
-    def send(self, message: Message, *, component: int | None = None) -> None:
-        """Send to the receiver of the message, if its address is known; else to all.
+    def doubled(self, system: int) -> str:
+        """The addresses that send as one and the same vehicle, in words; empty if there is only one."""
+        return " and ".join(map(_named, self._addresses.doubled(system)))
+
+    def report_doubled(self, system: int) -> None:
+        """Print a line if from now on another vehicle with this system id is heard."""
+        self._watched.add(system)
+
+    def _note_doubled(self, system: int) -> None:
+        self.dropped[DOUBLED] += 1
+        if system in self._watched and (doubled := self.doubled(system)):
+            self._watched.discard(system)
+            say(
+                f"note: two vehicles have the system id {system}, at {doubled}: only the first is heard and"
+                " commanded; give the other one another id"
+            )
+
+    def send(self, message: Message, *, component: int | None = None, everywhere: bool = False) -> None:
+        """Send to the receiver of the message, if its address is known; else, or `everywhere`, to all.
 
         `component`: the sender within our system, if not `me`.
         """
@@ -143,7 +164,7 @@ class Wire:
             self._sending.srcComponent = self.me.component if component is None else component
             data = bytes(message.pack(self._sending))
             self._sending.seq = (self._sending.seq + 1) % 256
-            self._transport.write(data, self._route(*target))
+            self._transport.write(data, None if everywhere else self._route(*target))
 
     def packed_apart(self, message: Message, count: int) -> list[bytes]:
         """Frames of a message that another process may send later, each as if it were new.
@@ -191,11 +212,7 @@ class Wire:
     def _route(self, system: int, component: int) -> Address | None:
         if system == 0:
             return None
-        exact = self._routes.get((system, component))
-        if exact is not None:
-            return exact
-        known = self._routes.copy()  # at once: the thread that reads adds some
-        return next((at for (number, _), at in known.items() if number == system), None)
+        return self._addresses.address(system, component)
 
     def _beats(self) -> None:
         while not self._closing.wait(1.0):
@@ -217,7 +234,10 @@ class Wire:
         if name == "BAD_DATA" or name.startswith("UNKNOWN"):
             self.dropped[_why_dropped(message)] += 1
             return
-        self._routes[message.get_srcSystem(), message.get_srcComponent()] = address
+        system = message.get_srcSystem()
+        if not self._addresses.accepts(system, message.get_srcComponent(), address, time.monotonic()):
+            self._note_doubled(system)
+            return
         for_us = self._for_us(message)
         if not for_us:
             self.dropped["for others"] += 1
@@ -239,6 +259,11 @@ class Wire:
             mav.signing.allow_unsigned_callback = lambda _, number: number in UNSIGNED_ALLOWED
             mav.signing.timestamp = signing_time()
         return mav
+
+
+def _named(address: Address) -> str:
+    """An address in words."""
+    return f"{address[0]}:{address[1]}" if isinstance(address, tuple) else str(address)
 
 
 def _why_dropped(message: Message) -> str:

@@ -56,9 +56,9 @@ def statuses(model: Model, *, day: str, since: str | None, schedule: Tasks) -> S
     on = {guid: status_on(day, own) for guid, own in tasks.items()}
     standing = {guid for guid, own in tasks.items() if since and status_on(since, own) == "built"}
     without = frozenset(guid for guid, own in tasks.items() if not own)
-    known = {*tasks, *(name for item in model.described.products for name in item.phases)}
-    named = {name.casefold() for name in known}
-    unrelated = 0 if any(name in named for name in of_phase) else len(schedule)
+    phases = {name.casefold() for item in model.described.products for name in item.phases}
+    related = any(name in tasks or name.casefold() in phases for name in schedule)
+    unrelated = 0 if related else len(schedule)
     return Statuses(day, since, on, frozenset(standing), without, unrelated)
 
 
@@ -156,7 +156,10 @@ def _status_findings(found: Statuses, counts: Counter[str], counted: list[Produc
     since = f"; {sum(item.global_id in found.standing for item in counted)} were built by {found.since}"
     findings = [Finding("status", f"on {found.day}: {words}{since if found.since else ''}")]
     if found.unrelated:
-        text = f"none of the schedule's {found.unrelated} GlobalIds is in the model: is it another model's?"
+        text = (
+            f"none of the schedule's {found.unrelated} GlobalIds is in the model: is it another model's, "
+            "or were its capitals changed?"
+        )
         findings.append(Finding("schedule_unrelated", text))
     without = sorted(item.global_id for item in counted if item.global_id in found.without_task)
     if without:

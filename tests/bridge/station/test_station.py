@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.memory_link import MemoryLink, Switchboard
-from stopgo.bridge.link.protocol import VERSION, KeyExpressions, encode
+from stopgo.bridge.link.protocol import VERSION, KeyExpressions, Manifest, encode
 from stopgo.bridge.station import station as stations
 from stopgo.bridge.station.follow import PoseHistory
-from stopgo.bridge.station.station import LEAST_S, PATIENCE_S, Station
+from stopgo.bridge.station.station import BEGINNINGS, LEAST_S, PATIENCE_S, Station
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from tests.bridge.world import Field, corridor
 
@@ -119,6 +119,41 @@ def test_a_push_goes_on_for_as_long_as_its_pieces_are_answered(time: StoppedTime
     assert not any(key.endswith("/chunk/0") for key in link.asked[sent:])
 
 
+class CrossedLink(MemoryLink):
+    """Another station begins a push of another mission before each of the first chunks that are sent."""
+
+    def __init__(self, field: Field, times: int) -> None:
+        super().__init__(field.board)
+        field.serve()
+        self.keys, self.times = field.keys, times
+        self.crossed = 0
+
+    def ask(self, key: str, payload: bytes = b"", **details: Any) -> bytes | None:
+        if "/chunk/" in key and self.crossed < self.times:
+            self.crossed += 1
+            other = Manifest(
+                mission_id="other", revision=1, digest="0" * 64, size=9, sha256="0" * 64, chunk_bytes=1024
+            )
+            super().ask(self.keys.mission("other", "begin"), encode(other), timeout_s=1.0)
+        return super().ask(key, payload, **details)
+
+
+def test_a_push_that_another_push_has_ended_begins_again() -> None:
+    field = Field()
+    station = Station(CrossedLink(field, 2), field.keys, commander="test")
+    assert station.push(corridor()).revision == 1
+    assert station.info().state.mission_id == corridor().id
+
+
+def test_a_push_that_others_end_again_and_again_gives_up_and_says_why() -> None:
+    field = Field()
+    link = CrossedLink(field, 1000)
+    with pytest.raises(NegativeResult, match="another station may be pushing too") as raised:
+        Station(link, field.keys, commander="test").push(corridor())
+    assert raised.value.reason == "incomplete"
+    assert link.crossed == BEGINNINGS
+
+
 def test_a_command_may_be_waited_for_longer_than_it_may_be_valid() -> None:
     field = Field()
     field.station().push(corridor())
@@ -196,6 +231,12 @@ def test_a_stop_that_nobody_could_receive_was_not_sent(time: StoppedTime) -> Non
     with pytest.raises(RobotUnreachable, match=r"tcp/robot:7447: robot r1 not found .*nothing listens there"):
         station.command("pause")
     assert time.now == pytest.approx(5.0, abs=0.1)
+
+
+def test_a_timeout_that_was_partly_used_is_reported_in_tenths(time: StoppedTime) -> None:
+    station = Station(Switchboard().link(), KeyExpressions("r1"), commander="test", timeout_s=4.96271)
+    not_found = station.look_for("tcp/robot:7447")
+    assert "not found within 5 s (" in str(not_found())
 
 
 def test_a_stop_that_may_have_arrived_is_unknown_though_the_robot_was_never_found(time: StoppedTime) -> None:

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -299,14 +300,34 @@ def test_how_a_run_ended_is_not_hidden_by_what_became_of_its_recording(
 def test_a_recording_whose_folder_went_away_is_reported(tmp_path: Path, mission: Mission) -> None:
     folder = tmp_path / "usb"
     folder.mkdir()
+    said: list[str] = []
+    why = r"field\.rrd: could not be written completely \(No such file or directory\); the file was not saved"
     with (
-        pytest.raises(InputError, match=r"field\.partial\.rrd: no such file"),
-        FieldRecording(folder / "field.rrd", mission) as recording,
+        pytest.raises(InputError, match=why),
+        FieldRecording(folder / "field.rrd", mission, say=said.append) as recording,
     ):
         tell(recording, next(iter(run.reports(mission))))
         shutil.rmtree(folder)
         for report in run.reports(mission):
             tell(recording, report)
+        assert len(said) == 1  # while the run goes on, and not only when it is over
+        assert "field.partial.rrd: cannot be written (No such file or directory)" in said[0]
+
+
+@pytest.mark.parametrize("away", [Path.unlink, lambda path: path.rename(path.with_name("moved.rrd"))])
+def test_a_recording_that_is_deleted_or_moved_meanwhile_is_written_again(
+    away: Callable[[Path], object], tmp_path: Path, mission: Mission, field: Path
+) -> None:
+    reports = list(run.reports(mission))
+    path, partial = tmp_path / "field.rrd", tmp_path / "field.partial.rrd"
+    with FieldRecording(path, mission) as recording:
+        for number, report in enumerate(reports):
+            if number == len(reports) // 2:
+                away(partial)
+            tell(recording, report)
+    held, whole = check(path), check(field)
+    assert held.complete
+    assert held.rows == whole.rows
 
 
 def test_without_room_for_two_the_recording_stays_as_it_is(tmp_path: Path, mission: Mission) -> None:
@@ -333,6 +354,7 @@ def test_a_recording_that_was_cut_is_left_under_its_partial_name(tmp_path: Path,
 
 KILLED = """
 import os, signal, sys
+from collections.abc import Callable
 from pathlib import Path
 from stopgo.recordings.runs.field import FieldRecording
 from tests.recordings import run, world

@@ -6,9 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from subprocess import CompletedProcess
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
+from stopgo.bridge.mavlink.auto import first_hold
+from stopgo.bridge.mavlink.auto.first_hold import FirstHold
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
@@ -16,6 +20,7 @@ from stopgo.bridge.mavlink.vehicle_link.messages import position_setpoint
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.bridge.mavlink.vehicle_link.wire import GROUND_STATION, Who, Wire
+from stopgo.mission.mavlink.autopilots.kind import Mode
 from stopgo.mission.mavlink.telemetry import Message, local_speed
 from stopgo.mission.run.events import Paused
 from tests.bridge.mavlink.auto.site import Site, until, watched
@@ -41,10 +46,10 @@ def frames(monkeypatch: pytest.MonkeyPatch) -> list[Message]:
     sent: list[Message] = []
     send = Wire.send
 
-    def noted(wire: Wire, message: Message, *, component: int | None = None) -> None:
+    def noted(wire: Wire, message: Message, **how: Any) -> None:
         if wire.me.system == GROUND_STATION.system:
             sent.append(message)
-        send(wire, message, component=component)
+        send(wire, message, **how)
 
     monkeypatch.setattr(Wire, "send", noted)
     return sent
@@ -180,6 +185,39 @@ class Deaf(Scripted):
 
 class Unwilling(Deaf):
     result = dialect.MAV_RESULT_FAILED
+
+
+class Beating:
+    """A clock, and heartbeats of vehicle 1 four times a second, for three seconds."""
+
+    def __init__(self, hold: FirstHold) -> None:
+        self.hold = hold
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def get(self, timeout_s: float) -> Message:
+        self.now_s += 0.25
+        if self.now_s >= 3.0:
+            self.hold.close()
+        heartbeat = dialect.MAVLink_heartbeat_message(10, 3, 129, 10, 4, 3)
+        heartbeat._header.srcSystem = heartbeat._header.srcComponent = 1
+        return heartbeat
+
+
+def test_frequent_heartbeats_do_not_hold_up_the_next_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[Message] = []
+    ways: list[dict[str, Any]] = []
+    line = SimpleNamespace(send=lambda message, **how: (sent.append(message), ways.append(how)))
+    hold = FirstHold(cast(Any, line), None)
+    beating = Beating(hold)
+    monkeypatch.setattr(first_hold, "time", beating)
+    hold.begin([(1, Mode(4))])
+    hold.repeat(cast(Any, beating))
+    assert all(map(is_hold, sent))
+    assert all(how == {"everywhere": True} for how in ways)  # another vehicle may have the same id
+    assert len(sent) == 8  # the first, one at the first heartbeat, and one with every second heartbeat
 
 
 def test_a_vehicle_that_drives_on_is_reported_and_its_stop_is_unknown(tmp_path: Path) -> None:

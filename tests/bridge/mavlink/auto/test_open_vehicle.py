@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -43,10 +44,10 @@ def sent(monkeypatch: pytest.MonkeyPatch) -> list[Message]:
     found: list[Message] = []
     send = Wire.send
 
-    def noted(wire: Wire, message: Message, *, component: int | None = None) -> None:
+    def noted(wire: Wire, message: Message, **how: Any) -> None:
         if wire.me.system == GROUND_STATION.system:
             found.append(message)
-        send(wire, message, component=component)
+        send(wire, message, **how)
 
     monkeypatch.setattr(Wire, "send", noted)
     return found

@@ -282,6 +282,21 @@ def test_a_vehicle_that_reports_nothing_was_not_touched() -> None:
         assert vehicle.heard["MISSION_COUNT"] == 0
 
 
+class AnnouncesMore(Scripted):
+    def on_mission_request_list(self, message: Message, to: Who) -> None:
+        self.send(dialect.MAVLink_mission_count_message(to.system, to.component, len(self.held) + 2, 0))
+
+    def on_mission_request_int(self, message: Message, to: Who) -> None:
+        if message.seq < len(self.held):
+            super().on_mission_request_int(message, to)
+
+
+def test_a_vehicle_that_sends_fewer_items_than_it_announced_is_quoted() -> None:
+    said = "sent 6 of the 8 items that it announced, and no more$"
+    with AnnouncesMore(held(OLD)) as vehicle, pytest.raises(RobotUnreachable, match=said):
+        pushed(vehicle, timeout_s=0.5)
+
+
 # A vehicle that replaces its mission item by item.
 
 

@@ -8,7 +8,7 @@ from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.messages import station_beat
 from stopgo.bridge.mavlink.vehicle_link.peer import Newest, found, reached
 from stopgo.bridge.mavlink.vehicle_link.url import read_url
-from stopgo.bridge.mavlink.vehicle_link.wire import Who, wire
+from stopgo.bridge.mavlink.vehicle_link.wire import DOUBLED, Who, wire
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots.generic import GENERIC
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
@@ -73,6 +73,44 @@ def test_of_several_vehicles_one_must_be_named() -> None:
         unheard = pytest.raises(RobotUnreachable, match=r"no vehicle 3 within .*found: 1")
         with unheard, found(station, 3, timeout_s=1.2):
             pass
+
+
+def test_two_vehicles_with_one_system_id_are_not_taken_for_one() -> None:
+    port = free_port()
+    out = read_url(f"udpout:127.0.0.1:{port}")
+    with (
+        wire(read_url(f"udpin:127.0.0.1:{port}")) as station,
+        wire(out, me=Who(1, 1)) as one,
+        wire(out, me=Who(1, 1)) as other,
+    ):
+        one.beat(vehicle_beat)
+        while not station.doubled(1):
+            other.send(vehicle_beat())
+            one.send(vehicle_beat())
+        names = r"two vehicles have the system id 1, at 127.0.0.1:\d+ and 127.0.0.1:\d+; nothing was sent"
+        with pytest.raises(InputError, match=names), found(station):
+            pass
+
+
+def test_a_second_vehicle_with_the_same_id_is_ignored_and_reported_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    port = free_port()
+    out = read_url(f"udpout:127.0.0.1:{port}")
+    with (
+        wire(read_url(f"udpin:127.0.0.1:{port}")) as station,
+        wire(out, me=Who(1, 1)) as one,
+        wire(out, me=Who(1, 1)) as other,
+    ):
+        one.beat(vehicle_beat)
+        with found(station) as peer:
+            armed = vehicle_beat()
+            armed.base_mode = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+            while station.dropped[DOUBLED] < 5:
+                other.send(armed)
+                one.send(vehicle_beat())
+            assert not peer.armed
+    assert capsys.readouterr().err.count("note: two vehicles have the system id 1, at 127.0.0.1:") == 1
 
 
 def vehicle_beat() -> Message:

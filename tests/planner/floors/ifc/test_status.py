@@ -247,6 +247,18 @@ def test_a_schedule_of_another_model_is_reported_as_a_warning(read: Read, tmp_pa
     assert "none of the schedule's 1 GlobalIds is in the model" in told.message
 
 
+def test_a_schedule_whose_global_ids_lost_their_capitals_is_reported_as_unrelated(
+    read: Read, tmp_path: Path
+) -> None:
+    house = two_rooms()
+    path = tmp_path / "work.csv"
+    rows = [f"{thing.GlobalId.swapcase()},2024-01-01" for thing in house.things.values()]
+    path.write_text("\n".join(["guid,finish", *rows]))
+    floor = read(house, date="2023-03-01", schedule=path)
+    (told,) = [item for item in floor.findings if item.code == "schedule_unrelated"]
+    assert "or were its capitals changed?" in told.message
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
