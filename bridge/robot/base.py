@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from threading import Event
 from typing import Literal, Protocol, runtime_checkable
 
@@ -87,6 +87,19 @@ class WayFinder(Protocol):
 def finds_way(base: object) -> bool:
     """Return True if a base finds its own way; most drive along the path that they are given."""
     return isinstance(base, WayFinder) and base.finds_way()
+
+
+@runtime_checkable
+class SharedBase(Protocol):
+    """A base that somebody else may take from the robot's program, as an autopilot by its remote control."""
+
+    def watch_takeover(self) -> Callable[[], str]:
+        """Return a function that reports who has taken the base since now; empty if nobody has."""
+
+
+def watch_takeover(base: object) -> Callable[[], str]:
+    """Return what reports who takes a base from now on; others than the robot command few bases."""
+    return base.watch_takeover() if isinstance(base, SharedBase) else lambda: ""
 
 
 class Scanner(Protocol):

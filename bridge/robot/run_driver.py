@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from stopgo.bridge.link.clock import Clock
-from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.base import Base, Scanner, watch_takeover
 from stopgo.bridge.robot.current_task import faces, has_work, label, moved
 from stopgo.bridge.robot.run_store import RunStore
 from stopgo.bridge.robot.scan_standstill import ScanStandstill
@@ -121,10 +121,13 @@ class RunDriver:
         self._store.advance(run, lambda now: runs.held(now, reason))
 
     def _settle(self, run: Run, mission: Mission) -> None:
-        """Wait until the robot stands still at the stop."""
-        stop = mission.stops[run.at]
-        still = self._stands_still(stop.settle_s)
+        """Wait until the robot stands still at the stop; hold the run if somebody takes it meanwhile."""
+        stop, taken_by = mission.stops[run.at], watch_takeover(self._base)
+        still = self._stands_still(stop.settle_s, taken_by)
         if still is None:
+            return
+        if taken := taken_by():
+            self._store.advance(run, lambda now: runs.held(now, f"while it settled at {stop.id}: {taken}"))
             return
         if not still:
             reason = f"not still within {stop.settle_s + SETTLE_LIMIT_S:g} s"
@@ -133,11 +136,11 @@ class RunDriver:
         here = self._base.pose()
         self._store.advance(run, lambda now: runs.settled(now, mission, here))
 
-    def _stands_still(self, settle_s: float) -> bool | None:
-        """True if the robot stood still for `settle_s`; `None` if interrupted."""
+    def _stands_still(self, settle_s: float, taken_by: Callable[[], str]) -> bool | None:
+        """True if the robot stood still for `settle_s`; False also if it is taken; `None` if interrupted."""
         waited, still_for, resting = 0.0, 0.0, self._base.pose()
         while still_for < settle_s:
-            if waited > settle_s + SETTLE_LIMIT_S:
+            if waited > settle_s + SETTLE_LIMIT_S or taken_by():
                 return False
             pause = min(SETTLE_SAMPLE_S, settle_s - still_for)
             if self._clock.wait(pause, self._control.interrupt):

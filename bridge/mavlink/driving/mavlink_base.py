@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from threading import Event
 
 from stopgo.bridge.link.clock import Clock
@@ -11,6 +11,7 @@ from stopgo.bridge.mavlink.driving.mission_frame import MissionFrame
 from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
 from stopgo.bridge.mavlink.driving.path_driver import PathDriver
 from stopgo.bridge.mavlink.driving.straight_drive import Patience
+from stopgo.bridge.mavlink.driving.takeover_watch import TakeoverWatch
 from stopgo.bridge.robot.base import BaseHealth, Outcome, Rest
 from stopgo.mission.document import Mission, Point, RobotSpec
 from stopgo.mission.mavlink.local_frame import apart
@@ -91,6 +92,18 @@ class MavlinkBase:
         self._blocked_by = why
         self._autopilot.control.accept_mode()
         return True
+
+    def watch_takeover(self) -> Callable[[], str]:
+        """Return what reports who takes the vehicle from now on, also by putting it on hold."""
+        watch, known = TakeoverWatch(self._autopilot, by_hold=True), [""]
+
+        def taken() -> str:
+            if not known[0] and (why := watch.taken() or watch.steered()):
+                known[0] = self._blocked_by = why
+                self._autopilot.control.accept_mode()
+            return known[0]
+
+        return taken
 
     def blocked_by(self) -> str:
         return self._blocked_by

@@ -7,8 +7,6 @@ the scanner reports: another station may have driven it.
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Callable
 from threading import Event
 from typing import Literal
@@ -16,6 +14,7 @@ from typing import Literal
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.command_refusal import COMMAND_S, refusal
 from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
+from stopgo.bridge.mavlink.driving.takeover_watch import TakeoverWatch
 from stopgo.bridge.mavlink.vehicle_link.messages import every_component, request
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who, sender
 from stopgo.mission.document import Mission, Scan
@@ -38,8 +37,6 @@ TRIGGERS: tuple[ScanTrigger, ...] = ("camera", "script")
 
 TOLERANCE_M = 0.05
 """Tolerance of a position during the scan of a stop that no mission has."""
-BOOT_SHOWS_S = 1.0
-"""Time within which a restart, which also changes the mode, shows in the autopilot's clock."""
 LOOK_S = 0.2
 """Interval at which interruption and motion are checked."""
 AGAIN_S = 3.0
@@ -60,24 +57,16 @@ class StandstillWatch:
     def __init__(self, autopilot: OnboardAutopilot, tolerance_m: float) -> None:
         self._autopilot = autopilot
         self._motion = ScanMotion(tolerance_m)
-        self._boots = autopilot.peer.boots
-        self._began_s = time.monotonic()
-        self._was_taken = bool(autopilot.control.other_control())
-        """True if it was in such a mode before: a restarted autopilot may be scanned from as it is."""
-        self._taken_s: float | None = None
-        """Time since when a mode is reported in which somebody else drives, or that a restart brought."""
+        self._takeover = TakeoverWatch(autopilot, by_hold=False)
         self._look()
 
     def why(self) -> str:
         """Look at the vehicle once more."""
-        if self._autopilot.peer.boots != self._boots:
+        if self._takeover.is_restarted:
             return "the autopilot was restarted during the scan"
-        taken = "" if self._was_taken else self._autopilot.control.other_control()
-        self._taken_s = (self._taken_s or time.monotonic()) if taken else None
-        if taken and time.monotonic() - (self._taken_s or math.inf) >= BOOT_SHOWS_S:
+        if taken := self._takeover.taken():
             return f"the vehicle was taken during the scan: {taken}"
-        steered = self._autopilot.control.other_hands(time.monotonic() - self._began_s)
-        if steered:
+        if steered := self._takeover.steered():
             return f"{steered} during the scan"
         self._look()
         return self._motion.why
