@@ -126,7 +126,7 @@ def _stop(stop: str, plans: list[_Planned], log: RunLog, held: str, *, conclusiv
         tries=_tries(mine),
         outcome=outcome,
         reason="; ".join(dict.fromkeys(why for why in (held, _reason(mine)) if why)),
-        disputed_m=None if plan is None else disputed_m(plan.stops[stop], mine, log.poses),
+        disputed_m=None if plan is None else disputed_m(plan.stops[stop], mine, log),
         is_open=outcome in ("arrived", "failed", "not reached") and not conclusive,
     )
     pose = next((event.pose for event in reversed([*arrivals, *ends]) if event.pose is not None), None)

@@ -66,6 +66,18 @@ def test_a_pose_in_an_event_is_compared_with_the_poses_sent(x: float, answer: st
         assert "3500 mm apart" in comparison_table(run)
 
 
+@pytest.mark.parametrize(("since_s", "answer"), [(0, "unknown"), (66, "yes")])
+def test_events_made_later_are_compared_with_all_poses_or_with_none(since_s: int, answer: str) -> None:
+    """Of a run that nobody watched: the camera says where it scanned, once somebody asks."""
+    late = [(kind, 68.0 + 0.01 * s, fields) for kind, s, fields in visit("S1", 0, 4, 0)]
+    events = (*late, *visit("S2", 70, 4, 3), END)
+    run = compared(*events, poses=line(since_s, (4, 3), (4, 3), 140))
+    assert judge(run).answer == answer
+    assert (run.stops[0].disputed_m is None) == (answer == "yes")
+    passed_by = compared(*events, poses=[*line(0, (4, 0), (4, 3), 66), *line(66, (4, 3), (4, 3), 140)])
+    assert judge(passed_by).answer == "yes"
+
+
 def test_a_scan_that_both_sources_place_outside_tolerance_is_a_no() -> None:
     """The event says 0.2 m off S1, the poses 3.5 m: one of both is wrong, and neither is within."""
     events = (*visit("S1", 0, 4.2, 0), *visit("S2", 70, 4, 3), END)
