@@ -16,7 +16,7 @@ from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.selection.demands import Demands
-from stopgo.planner.selection.worth_kernel import add_views, sum_by_row
+from stopgo.planner.selection.worth_kernel import add_views, add_worth_of_rows, sum_by_row
 from stopgo.planner.selection.worths import Transposed, Worths
 
 BLOCK = 1_000_000
@@ -97,7 +97,17 @@ class Cover:
     @cached_property
     def adds(self) -> csr_array:
         """Worth that each row adds to each demand before any is chosen (rows, demands)."""
-        return self.sums_of(self.adds_to)
+        kernel = compiled(add_worth_of_rows, large=False)
+        if kernel is None:
+            return self.sums_of(self.adds_to)
+        demands, parts = len(self.needed), []
+        some = max(1, BLOCK // max(1, demands))
+        for low in range(0, max(1, self.rows), some):
+            high = min(low + some, self.rows)
+            sums = np.zeros((high - low, demands), dtype=np.int64)
+            kernel(low, high, *self.seen_columns, *self.worths.added, demands, sums.ravel())
+            parts.append(csr_array(sums))
+        return csr_array(vstack(parts, format="csr"))
 
     def sums_of(self, values: csr_array) -> csr_array:
         """Sums of values of the columns (columns, n) that each row sees (rows, n)."""
@@ -125,6 +135,8 @@ class Cover:
     @cached_property
     def most_demands(self) -> int:
         """Most demands to which the columns of one row add."""
+        if self.worth.data.all():
+            return int(np.diff(self.adds.indptr).max(initial=0))
         adds = _pattern(self.adds_to)
         most = [np.diff(csr_array(_pattern(part) @ adds).indptr).max(initial=0) for part in self._parts()]
         return int(max(most))
@@ -213,20 +225,17 @@ class Cover:
             return self
         worth = self.usual_worth
         sizes = [len(rows) for rows in sets]
-        entries = (
-            np.ones(sum(sizes), np.int8),
-            (np.concatenate(sets).astype(np.int32), np.repeat(np.arange(len(sets), dtype=np.int32), sizes)),
-        )
-        chosen = csr_array(entries, shape=(self.rows, len(sets)))  # as `sees` is: else both are made anew
+        rows, numbers = np.concatenate(sets).astype(np.int64), np.repeat(np.arange(len(sets)), sizes)
+        adds = csr_array((np.full(len(rows), worth), (rows, numbers)), shape=(self.rows, len(sets)))
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
         made = Cover(
-            _sorted(hstack([self.sees, chosen])),
+            _with_columns(self.sees, rows, numbers, len(sets)),
             _sorted(worths.astype(np.int64)),
             np.concatenate([self.needed, np.full(len(sets), worth)]),
             np.concatenate([self.asks, np.ones(len(sets), np.int64)]),
         )
-        vars(made)["adds"] = hstack([self.adds, chosen.astype(np.int64) * worth], format="csr")
+        vars(made)["adds"] = hstack([self.adds, adds], format="csr")
         return made
 
 
@@ -316,6 +325,19 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
     entries = np.repeat(stays, many)
     pointer = np.concatenate([[0], np.cumsum(np.where(stays, many, 0))]).astype(np.int32)
     return _sorted(csr_array((sees.data[entries], sees.indices[entries], pointer), shape=sees.shape))
+
+
+def _with_columns(sees: csr_array, rows: IntArray, numbers: IntArray, more: int) -> csr_array:
+    """The matrix and `more` columns, of which these rows see those of these numbers (n,).
+
+    Each entry is copied once, since a matrix may have many millions.
+    """
+    order, many = np.lexsort((numbers, rows)), np.bincount(rows, minlength=sees.shape[0])
+    added = (sees.shape[1] + numbers[order]).astype(sees.indices.dtype)
+    to = np.insert(sees.indices, sees.indptr[rows[order] + 1], added)
+    pointer = sees.indptr + np.concatenate([[0], np.cumsum(many)])
+    shape = (sees.shape[0], sees.shape[1] + more)
+    return csr_array((np.ones(len(to), np.int8), to, pointer.astype(sees.indptr.dtype)), shape=shape)
 
 
 def _pattern(matrix: csr_array) -> csr_array:
