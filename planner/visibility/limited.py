@@ -67,6 +67,15 @@ def _clipped(in_sight: Visibility, limits: ViewLimits) -> Visibility:
     return replace(in_sight, pointer=pointer, segment=segment, first=first, last=last, in_sight=in_sight)
 
 
+def keep_only_visible(in_sight: Visibility) -> None:
+    """Forget who sees each unit, but not which units are visible: long ranges have many millions of runs."""
+    _ = in_sight.visible  # which is kept
+    none = np.empty(0, dtype=in_sight.first.dtype)
+    vars(in_sight).update(
+        pointer=frozen(np.zeros(len(in_sight.pointer)), np.int64), segment=none, first=none, last=none
+    )
+
+
 def _row_of(pointer: IntArray, run: IntArray) -> IntArray:
     """Row of each run (n,)."""
     return np.searchsorted(pointer, run, side="right") - 1
