@@ -289,7 +289,7 @@ class _Runs:
             note(self.begin, self.end, before, to)
         small = pointer.astype(np.int32) if pointer[-1] < np.iinfo(np.int32).max else pointer
         shape = (len(pointer) - 1, len(columns))
-        return csr_array((np.ones(len(to), dtype=np.int8), to, small), shape=shape)
+        return csr_array((_ones(len(to)), to, small), shape=shape)
 
     def numbers_of(self, number: NDArray[np.uint64]) -> NDArray[np.uint64]:
         """Sum of the numbers of the rows that see each stretch, modulo 2**64 (stretches,)."""
@@ -350,7 +350,7 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
     stays[rows] = False
     entries = np.repeat(stays, many)
     pointer = np.concatenate([[0], np.cumsum(np.where(stays, many, 0))]).astype(np.int32)
-    return _sorted(csr_array((sees.data[entries], sees.indices[entries], pointer), shape=sees.shape))
+    return _sorted(csr_array((_ones(int(pointer[-1])), sees.indices[entries], pointer), shape=sees.shape))
 
 
 def _with_columns(sees: csr_array, rows: IntArray, numbers: IntArray, more: int) -> csr_array:
@@ -363,7 +363,12 @@ def _with_columns(sees: csr_array, rows: IntArray, numbers: IntArray, more: int)
     to = np.insert(sees.indices, sees.indptr[rows[order] + 1], added)
     pointer = sees.indptr + np.concatenate([[0], np.cumsum(many)])
     shape = (sees.shape[0], sees.shape[1] + more)
-    return csr_array((np.ones(len(to), np.int8), to, pointer.astype(sees.indptr.dtype)), shape=shape)
+    return csr_array((_ones(len(to)), to, pointer.astype(sees.indptr.dtype)), shape=shape)
+
+
+def _ones(many: int) -> NDArray[np.int8]:
+    """So many ones that take no memory."""
+    return np.broadcast_to(np.int8(1), many)
 
 
 def _pattern(matrix: csr_array) -> csr_array:
