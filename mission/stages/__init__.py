@@ -346,7 +346,9 @@ class Visibility(InSpace):
         """Number of units that each candidate sees (rows,)."""
         counts = np.zeros(self.rows, dtype=np.int64)
         for row, _, first, last in self.runs_apart_by_rows():
-            np.add.at(counts, row, last - first + 1)
+            before = np.concatenate([[0], np.cumsum(last - first + 1, dtype=np.int64)])
+            begin, end = int(row.min(initial=self.rows)), int(row.max(initial=-1)) + 1
+            counts[begin:end] += np.diff(before[np.searchsorted(row, np.arange(begin, end + 1))])
         return frozen(counts, np.int64)
 
     @cached_property

@@ -55,16 +55,32 @@ def registers(pairs: Pairs, settings: Settings) -> IntArray:
 @instance_cached
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register, by the overlap ratio of the settings (rows, rows)."""
+    return _symmetric(_pairs_of(candidates), len(candidates.kept))
+
+
+def _pairs_of(candidates: Candidates) -> list[tuple[NDArray[np.int32], ...]]:
+    """Rows that register with later rows, and these, by row, in blocks."""
     settings, rows = candidates.settings, np.arange(len(candidates.kept))
     overlaps = Overlaps(shown(candidates, rows, only_wide=settings.least_overlap == 0))  # large, so not kept
     half, end = overlaps.rows // 2, overlaps.rows
     if end >= MANY:
         overlaps = overlaps.with_tables()
     with SideWork(lambda: _links(overlaps, settings, range(half, end)), forked=end >= MANY) as others:
-        pairs = _links(overlaps, settings, range(half)) + others.result()
-    ends = tuple(np.concatenate([np.empty(0, np.int32), *ends]) for ends in zip(*pairs, strict=True))
-    later = csr_array((np.ones(len(ends[0]), np.int8), ends), shape=(overlaps.rows,) * 2)
-    return (later + later.T).tocsr()
+        return _links(overlaps, settings, range(half)) + others.result()
+
+
+def _symmetric(pairs: list[tuple[NDArray[np.int32], ...]], rows: int) -> csr_array:
+    """The links of pairs in both directions (rows, rows); the pairs, by row, are as large, and forgotten."""
+    pointer = np.zeros(rows + 1, dtype=np.int64)
+    for row, _ in pairs:
+        pointer[1:] += np.bincount(row, minlength=rows)
+    np.cumsum(pointer, out=pointer)
+    other = np.concatenate([np.empty(0, np.int32), *(other for _, other in pairs)])
+    pairs.clear()
+    small = pointer.astype(np.int32) if pointer[-1] < np.iinfo(np.int32).max // 2 else pointer
+    later = csr_array((np.ones(len(other), np.int8), other, small), shape=(rows, rows))
+    later.sort_indices()
+    return csr_array((later + later.T.tocsr()).tocsr())
 
 
 PairsFound = tuple[csr_array, BaseGeometry, Mesh]

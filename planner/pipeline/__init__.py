@@ -109,9 +109,14 @@ class _Prepared:
 
     def __init__(self, seen: Visibility, planned: frozenset[int]) -> None:
         from stopgo.planner.geometry.side_work import SideWork
+        from stopgo.planner.visibility.limited import keep_only_visible
 
         self._seen, self._planned = seen, planned
-        self._work = SideWork(self._found, forked=seen.rows >= MANY)
+        self._work = SideWork(
+            lambda: self._found(seen), forked=seen.rows >= MANY, again=lambda: self._found(self._seen_again())
+        )
+        if self._work.is_apart and seen.in_sight is not None:
+            keep_only_visible(seen.in_sight)
 
     def __enter__(self) -> _Prepared:
         return self
@@ -119,13 +124,19 @@ class _Prepared:
     def __exit__(self, *error: Any) -> None:
         self._work.__exit__(*error)
 
-    def _found(self) -> tuple[FiguresBefore, tuple[Mesh, IntArray] | None]:
+    def _seen_again(self) -> Visibility:
+        """The visibility with all lines of sight, where those of its own are forgotten."""
+        from stopgo.planner.visibility import visibility
+
+        return self._seen if self._seen.in_sight is None else visibility(self._seen.in_sight.candidates)
+
+    def _found(self, seen: Visibility) -> tuple[FiguresBefore, tuple[Mesh, IntArray] | None]:
         from stopgo.planner.appraisal.figures_of_route import FiguresBefore
         from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
 
-        space = self._seen.space
-        needed = self._seen.rows >= MANY and space.settings.graph == "exact"
-        figures = FiguresBefore.of(self._seen, self._planned)
+        space = seen.space
+        needed = seen.rows >= MANY and space.settings.graph == "exact"
+        figures = FiguresBefore.of(seen, self._planned)
         return figures, (drive_mesh(space), corner_pieces(space)) if needed else None
 
     def keep_graph(self) -> None:

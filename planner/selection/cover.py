@@ -16,7 +16,8 @@ from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.selection.demands import Demands
-from stopgo.planner.selection.worth_kernel import add_views, sum_by_row
+from stopgo.planner.selection.stretch_kernel import count_columns, note_columns
+from stopgo.planner.selection.worth_kernel import add_views, add_worth_of_rows, sum_by_row
 from stopgo.planner.selection.worths import Transposed, Worths
 
 BLOCK = 1_000_000
@@ -97,7 +98,17 @@ class Cover:
     @cached_property
     def adds(self) -> csr_array:
         """Worth that each row adds to each demand before any is chosen (rows, demands)."""
-        return self.sums_of(self.adds_to)
+        kernel = compiled(add_worth_of_rows, large=False)
+        if kernel is None:
+            return self.sums_of(self.adds_to)
+        demands, parts = len(self.needed), []
+        some = max(1, BLOCK // max(1, demands))
+        for low in range(0, max(1, self.rows), some):
+            high = min(low + some, self.rows)
+            sums = np.zeros((high - low, demands), dtype=np.int64)
+            kernel(low, high, *self.seen_columns, *self.worths.added, demands, sums.ravel())
+            parts.append(csr_array(sums))
+        return csr_array(vstack(parts, format="csr"))
 
     def sums_of(self, values: csr_array) -> csr_array:
         """Sums of values of the columns (columns, n) that each row sees (rows, n)."""
@@ -105,10 +116,9 @@ class Cover:
 
     def _parts(self) -> Iterator[csr_array]:
         """The matrix by some rows at a time (n, columns): products are computed in 64 bits for each entry."""
-        begins = np.searchsorted(self.sees.indptr, np.arange(0, self.sees.nnz, BLOCK)).tolist()
-        rows = np.unique([0, *begins, self.rows]).tolist()
-        yield from (self.sees[low:high] for low, high in pairwise(rows) if len(rows) > 2)
-        if len(rows) <= 2:
+        blocks = list(_blocks(self.sees.indptr))
+        yield from (self.sees[low:high] for low, high in blocks if len(blocks) > 1)
+        if len(blocks) <= 1:
             yield self.sees
 
     @cached_property
@@ -125,6 +135,8 @@ class Cover:
     @cached_property
     def most_demands(self) -> int:
         """Most demands to which the columns of one row add."""
+        if self.worth.data.all():
+            return int(np.diff(self.adds.indptr).max(initial=0))
         adds = _pattern(self.adds_to)
         most = [np.diff(csr_array(_pattern(part) @ adds).indptr).max(initial=0) for part in self._parts()]
         return int(max(most))
@@ -213,20 +225,17 @@ class Cover:
             return self
         worth = self.usual_worth
         sizes = [len(rows) for rows in sets]
-        entries = (
-            np.ones(sum(sizes), np.int8),
-            (np.concatenate(sets).astype(np.int32), np.repeat(np.arange(len(sets), dtype=np.int32), sizes)),
-        )
-        chosen = csr_array(entries, shape=(self.rows, len(sets)))  # as `sees` is: else both are made anew
+        rows, numbers = np.concatenate(sets).astype(np.int64), np.repeat(np.arange(len(sets)), sizes)
+        adds = csr_array((np.full(len(rows), worth), (rows, numbers)), shape=(self.rows, len(sets)))
         priced = diags_array(np.full(len(sets), float(worth))).astype(np.int64)
         worths = block_diag([self.worth, priced])
         made = Cover(
-            _sorted(hstack([self.sees, chosen])),
+            _with_columns(self.sees, rows, numbers, len(sets)),
             _sorted(worths.astype(np.int64)),
             np.concatenate([self.needed, np.full(len(sets), worth)]),
             np.concatenate([self.asks, np.ones(len(sets), np.int64)]),
         )
-        vars(made)["adds"] = hstack([self.adds, chosen.astype(np.int64) * worth], format="csr")
+        vars(made)["adds"] = hstack([self.adds, adds], format="csr")
         return made
 
 
@@ -251,28 +260,46 @@ class _Runs:
         self.stretch_first = np.flatnonzero(begins[:-1])
         """First unit of each stretch (stretches,)."""
         stretch = np.cumsum(begins, dtype=np.int32) - 1
-        parts: list[list[NDArray[np.int32]]] = [[], [], []]
+        self.first = np.zeros(visibility.rows + 1, dtype=np.int64)
+        """First run of each row, and their end (rows + 1,)."""
+        parts: list[list[NDArray[np.int32]]] = [[np.empty(0, np.int32)], [np.empty(0, np.int32)]]
         for row, _, first, last in visibility.runs_apart_by_rows():
-            found = (row.astype(np.int32), stretch[first], stretch[last + 1])
-            for part, array in zip(parts, found, strict=True):
-                part.append(array)
-        self.row, self.begin, self.end = (np.concatenate([np.empty(0, np.int32), *part]) for part in parts)
-        """Of each run, by row and then by stretch: its row, its first stretch and the one after its last."""
-        self._rows = visibility.rows
+            begin, end = stretch[first], stretch[last + 1]
+            apart = np.ones(len(row) + 1, dtype=bool)  # runs that go on on the next segment become one
+            apart[1:-1] = (np.diff(row) != 0) | (begin[1:] != end[:-1])
+            parts[0].append(begin[apart[:-1]])
+            parts[1].append(end[apart[1:]])
+            self.first[1:] += np.bincount(row[apart[:-1]], minlength=visibility.rows)
+        np.cumsum(self.first, out=self.first)
+        self.begin, self.end = (_joined(part) for part in parts)
+        """Of each run, by row and then by stretch: its first stretch, and the one after its last."""
 
     def matrix(self, columns: IntArray) -> csr_array:
         """1 where the row sees the stretch (rows, columns), of these stretches, ascending."""
         before = np.searchsorted(columns, np.arange(len(self.stretch_first) + 1)).astype(np.int32)
-        begin, many = before[self.begin], before[self.end] - before[self.begin]
-        pointer = np.concatenate([[0], np.cumsum(np.bincount(self.row, many, self._rows))]).astype(np.int64)
-        blocks = np.searchsorted(np.cumsum(many), np.arange(0, pointer[-1], BLOCK), side="left").tolist()
-        parts = [
-            ranges(begin[low:high].astype(np.int64), many[low:high]).astype(np.int32)
-            for low, high in pairwise(np.unique([0, *blocks, len(many)]).tolist())
-        ]
-        to = np.concatenate([np.empty(0, np.int32), *parts])
+        count, note = compiled(count_columns, large=False), compiled(note_columns, large=False)
+        if count is None or note is None:
+            many = before[self.end] - before[self.begin]
+            pointer = np.concatenate([[0], np.cumsum(many, dtype=np.int64)])[self.first]
+            to = ranges(before[self.begin].astype(np.int64), many).astype(np.int32)
+        else:
+            pointer = np.zeros(len(self.first), dtype=np.int64)
+            count(self.first, self.begin, self.end, before, pointer)
+            to = np.empty(int(pointer[-1]), dtype=np.int32)
+            note(self.begin, self.end, before, to)
         small = pointer.astype(np.int32) if pointer[-1] < np.iinfo(np.int32).max else pointer
-        return csr_array((np.ones(len(to), dtype=np.int8), to, small), shape=(self._rows, len(columns)))
+        shape = (len(pointer) - 1, len(columns))
+        return csr_array((_ones(len(to)), to, small), shape=shape)
+
+    def numbers_of(self, number: NDArray[np.uint64]) -> NDArray[np.uint64]:
+        """Sum of the numbers of the rows that see each stretch, modulo 2**64 (stretches,)."""
+        change = np.zeros(len(self.stretch_first) + 1, dtype=np.uint64)
+        for low, high in _blocks(self.first):
+            each = np.repeat(number[low:high], np.diff(self.first[low : high + 1]))
+            own = slice(self.first[low], self.first[high])
+            np.add.at(change, self.begin[own], each)
+            np.subtract.at(change, self.end[own], each)
+        return np.cumsum(change)[:-1]
 
 
 def _alike(runs: _Runs, rows: int, weighs: BoolArray) -> tuple[IntArray, IntArray]:
@@ -281,21 +308,29 @@ def _alike(runs: _Runs, rows: int, weighs: BoolArray) -> tuple[IntArray, IntArra
     The group is -1 where no row sees the stretch, or where it does not weigh. Sets of rows are compared by
     the sums of two random numbers of each row, which take no memory to speak of.
     """
-    many = len(weighs)
-    seen = np.cumsum(np.bincount(runs.begin, minlength=many + 1) - np.bincount(runs.end, minlength=many + 1))
-    sums = np.zeros((2, many + 1), dtype=np.uint64)
     numbers = np.random.default_rng(0).integers(0, 2**64, (2, rows), dtype=np.uint64)
-    for sum_, number in zip(sums, numbers, strict=True):
-        np.add.at(sum_, runs.begin, number[runs.row])
-        np.subtract.at(sum_, runs.end, number[runs.row])
-        np.cumsum(sum_, out=sum_)
-    asked = np.flatnonzero((seen[:-1] > 0) & weighs)
-    _, first, which = np.unique(sums[:, asked].T, axis=0, return_index=True, return_inverse=True)
+    seen = runs.numbers_of(np.ones(rows, dtype=np.uint64))
+    asked = np.flatnonzero((seen > 0) & weighs)
+    sums = np.stack([runs.numbers_of(number)[asked] for number in numbers], axis=1)
+    _, first, which = np.unique(sums, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.argsort(order)
-    group = np.full(many, -1, dtype=np.int64)
+    group = np.full(len(weighs), -1, dtype=np.int64)
     group[asked] = rank[which.reshape(-1)]
     return group, asked[first[order]]
+
+
+def _blocks(pointer: IntArray) -> Iterator[tuple[int, int]]:
+    """The first row and the row after the last one, of the rows of some entries at a time."""
+    begins = np.searchsorted(pointer, np.arange(0, pointer[-1], BLOCK)).tolist()
+    return pairwise(np.unique([0, *begins, len(pointer) - 1]).tolist())
+
+
+def _joined(parts: list[NDArray[np.int32]]) -> NDArray[np.int32]:
+    """The parts in one array; they are forgotten."""
+    whole = np.concatenate(parts)
+    parts.clear()
+    return whole
 
 
 def _worth(demands: Demands, column: IntArray) -> csr_array:
@@ -315,7 +350,25 @@ def _without(sees: csr_array, rows: IntArray) -> csr_array:
     stays[rows] = False
     entries = np.repeat(stays, many)
     pointer = np.concatenate([[0], np.cumsum(np.where(stays, many, 0))]).astype(np.int32)
-    return _sorted(csr_array((sees.data[entries], sees.indices[entries], pointer), shape=sees.shape))
+    return _sorted(csr_array((_ones(int(pointer[-1])), sees.indices[entries], pointer), shape=sees.shape))
+
+
+def _with_columns(sees: csr_array, rows: IntArray, numbers: IntArray, more: int) -> csr_array:
+    """The matrix and `more` columns, of which these rows see those of these numbers (n,).
+
+    Each entry is copied once, since a matrix may have many millions.
+    """
+    order, many = np.lexsort((numbers, rows)), np.bincount(rows, minlength=sees.shape[0])
+    added = (sees.shape[1] + numbers[order]).astype(sees.indices.dtype)
+    to = np.insert(sees.indices, sees.indptr[rows[order] + 1], added)
+    pointer = sees.indptr + np.concatenate([[0], np.cumsum(many)])
+    shape = (sees.shape[0], sees.shape[1] + more)
+    return csr_array((_ones(len(to)), to, pointer.astype(sees.indptr.dtype)), shape=shape)
+
+
+def _ones(many: int) -> NDArray[np.int8]:
+    """So many ones that take no memory."""
+    return np.broadcast_to(np.int8(1), many)
 
 
 def _pattern(matrix: csr_array) -> csr_array:

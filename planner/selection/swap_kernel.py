@@ -6,7 +6,8 @@ compiled, with the same result; `repair` is compiled as one loop and therefore s
 Data, for the rows, columns and demands of one covering problem
 ---------------------------------------------------------------
 - `row_first`, `seen`: row i sees the columns `seen[row_first[i]]` to `seen[row_first[i + 1] - 1]`.
-- `seer_first`, `seer`: the rows that see a column, in the same way.
+- `run_first`, `run`: runs of rows that see a column, in the same way. Run k is of the rows from `run[2 k]` to
+  before `run[2 k + 1]`.
 - `adds_first`, `demand`, `worth`: the demands that a column adds to, and what it adds.
 - `left`: views that each column still needs, below 1 where it counts.
 - `asked`: worth that each demand still needs, below 1 where it is met. `weight`: its penalty per unit.
@@ -14,13 +15,13 @@ Data, for the rows, columns and demands of one covering problem
 - `chosen`: the rows of the selection, each in a place. `free`: 1 for each row that may be added, else 0.
 - `tabu`: a ring of the rows removed last, which may not return.
 - `stale`: 1 for each row whose leaving has other effects than when they were last computed, else 0.
-- `counts`: of each place, the demands that change when its row leaves, and the rows near it; two numbers.
+- `counts`: of each place, the demands that change when its row leaves, the first row that sees a column of
+  it, and the one after the last; three numbers.
 - `touched`, `lost`: these demands and their loss, `most` of each place.
-- `near`: the rows that see a column of it, as many of each place as there are rows.
 - `regained`: what it adds to a row's gain for such a demand, at `(place * most + demand) * rows + row`.
 - `common`: weighted shortfall with each row added and none removed.
 - `found`: least shortfall, most coverage, and the place and the new row of that swap.
-- Scratch: `where`, -1 for each demand; `is_near`, 0 for each row; `open_`, three numbers for each demand.
+- Scratch: `where`, -1 for each demand; `open_`, three numbers for each demand.
 
 What a row sees of what another leaves is part of the loss, so no demand is shorter without the leaving. A
 sum of shortfalls therefore ends as soon as it exceeds the least one. All numbers are sums of worth, times
@@ -36,10 +37,10 @@ NEVER = 2**62
 
 
 def repair(
-    swaps: int, most: int, row_first: Any, seen: Any, seer_first: Any, seer: Any, adds_first: Any,
+    swaps: int, most: int, row_first: Any, seen: Any, run_first: Any, run: Any, adds_first: Any,
     demand: Any, worth: Any, left: Any, asked: Any, weight: Any, gain: Any, chosen: Any, free: Any,
-    tabu: Any, stale: Any, counts: Any, touched: Any, lost: Any, near: Any, regained: Any, common: Any,
-    found: Any, where: Any, is_near: Any, open_: Any,
+    tabu: Any, stale: Any, counts: Any, touched: Any, lost: Any, regained: Any, common: Any,
+    found: Any, where: Any, open_: Any,
 ) -> int:  # fmt: skip
     """Swap rows until every demand is met; return 1 if fewer than so many swaps do, else 0."""
     held = 0
@@ -54,8 +55,8 @@ def repair(
         for place in range(len(chosen)):
             if stale[chosen[place]] == 1:
                 leave(
-                    place, most, row_first, seen, seer_first, seer, adds_first, demand, worth, left, chosen,
-                    stale, counts, touched, lost, near, regained, where, is_near,
+                    place, most, row_first, seen, run_first, run, adds_first, demand, worth, left, chosen,
+                    stale, counts, touched, lost, regained, where,
                 )  # fmt: skip
             try_swaps(
                 place, most, asked, weight, gain, chosen, free, counts, touched, lost, regained, common,
@@ -64,8 +65,8 @@ def repair(
         for k in range(len(asked)):
             weight[k] += asked[k] > 0
         out, into = chosen[found[2]], found[3]
-        see(out, 1, row_first, seen, seer_first, seer, adds_first, demand, worth, left, asked, gain, stale)
-        see(into, -1, row_first, seen, seer_first, seer, adds_first, demand, worth, left, asked, gain, stale)
+        see(out, 1, row_first, seen, run_first, run, adds_first, demand, worth, left, asked, gain, stale)
+        see(into, -1, row_first, seen, run_first, run, adds_first, demand, worth, left, asked, gain, stale)
         chosen[found[2]], free[into], stale[into] = into, 0, 1
         if held == len(tabu):
             free[tabu[swap % len(tabu)]] = 1
@@ -92,33 +93,31 @@ def add_up(asked: Any, weight: Any, gain: Any, common: Any, open_: Any) -> int:
 
 
 def leave(
-    place: int, most: int, row_first: Any, seen: Any, seer_first: Any, seer: Any, adds_first: Any,
+    place: int, most: int, row_first: Any, seen: Any, run_first: Any, run: Any, adds_first: Any,
     demand: Any, worth: Any, left: Any, chosen: Any, stale: Any, counts: Any, touched: Any, lost: Any,
-    near: Any, regained: Any, where: Any, is_near: Any,
+    regained: Any, where: Any,
 ) -> None:  # fmt: skip
     """Compute the effects of the row in a place leaving: losses, and what other rows then gain.
 
     They gain the columns that only it covers, and lose those that need two more views once it has left.
     """
     row, rows, first = chosen[place], len(stale), place * most
-    for k in range(counts[2 * place + 1]):
-        for at in range(first, first + counts[2 * place]):
-            regained[at * rows + near[place * rows + k]] = 0
-    demands, others = 0, 0
+    for at in range(first, first + counts[3 * place]):
+        for to in range(at * rows + counts[3 * place + 1], at * rows + counts[3 * place + 2]):
+            regained[to] = 0
+    demands, counts[3 * place + 1], counts[3 * place + 2] = 0, rows, 0
     for at in range(row_first[row], row_first[row + 1]):
         if left[seen[at]] == 0 or left[seen[at]] == 1:
             demands = lose(
                 seen[at], first, demands, adds_first, demand, worth, left, touched, lost, where
             )  # fmt: skip
-            others = regain(
-                seen[at], first, place * rows, others, seer_first, seer, adds_first, demand, worth, left,
-                near, regained, where, is_near,
+            regain(
+                seen[at], place, first, rows, run_first, run, adds_first, demand, worth, left, counts,
+                regained, where,
             )  # fmt: skip
-    counts[2 * place], counts[2 * place + 1], stale[row] = demands, others, 0
+    counts[3 * place], stale[row] = demands, 0
     for k in range(demands):
         where[touched[first + k]] = -1
-    for k in range(others):
-        is_near[near[place * rows + k]] = 0
 
 
 def lose(
@@ -137,19 +136,20 @@ def lose(
 
 
 def regain(
-    column: int, first: int, begin: int, others: int, seer_first: Any, seer: Any, adds_first: Any,
-    demand: Any, worth: Any, left: Any, near: Any, regained: Any, where: Any, is_near: Any,
-) -> int:  # fmt: skip
-    """Note the rows that see a column, and what their gain changes; return the number of rows noted."""
-    rows = len(is_near)
-    for k in range(seer_first[column], seer_first[column + 1]):
-        if is_near[seer[k]] == 0:
-            is_near[seer[k]], near[begin + others] = 1, seer[k]
-            others += 1
-        for entry in range(adds_first[column], adds_first[column + 1]):
-            to = (first + where[demand[entry]]) * rows + seer[k]
-            regained[to] += worth[entry] if left[column] == 0 else -worth[entry]
-    return others
+    column: int, place: int, first: int, rows: int, run_first: Any, run: Any, adds_first: Any,
+    demand: Any, worth: Any, left: Any, counts: Any, regained: Any, where: Any,
+) -> None:  # fmt: skip
+    """Note between which rows those are that see a column, and what their gain changes."""
+    low, high = run_first[column], run_first[column + 1]
+    if low < high:
+        counts[3 * place + 1] = min(counts[3 * place + 1], run[2 * low])
+        counts[3 * place + 2] = max(counts[3 * place + 2], run[2 * high - 1])
+    for entry in range(adds_first[column], adds_first[column + 1]):
+        begin = (first + where[demand[entry]]) * rows
+        value = worth[entry] if left[column] == 0 else -worth[entry]
+        for k in range(low, high):
+            for to in range(begin + run[2 * k], begin + run[2 * k + 1]):
+                regained[to] += value
 
 
 def try_swaps(
@@ -161,7 +161,7 @@ def try_swaps(
     The least shortfall is the best; of equal ones the most coverage, then the lowest rows.
     """
     demands, rows, first, whole_at, opened = len(asked), len(free), place * most, -1, 0
-    for k in range(first, first + counts[2 * place]):
+    for k in range(first, first + counts[3 * place]):
         if touched[k] == 0:
             whole_at = k
         if asked[touched[k]] + lost[k] > 0:
@@ -203,7 +203,7 @@ def is_better(place: int, covered: int, chosen: Any, found: Any) -> int:
 
 
 def see(
-    row: int, more: int, row_first: Any, seen: Any, seer_first: Any, seer: Any, adds_first: Any,
+    row: int, more: int, row_first: Any, seen: Any, run_first: Any, run: Any, adds_first: Any,
     demand: Any, worth: Any, left: Any, asked: Any, gain: Any, stale: Any,
 ) -> None:  # fmt: skip
     """Let the columns of a row need one view more (1, as it leaves) or less (-1, as it comes)."""
@@ -217,10 +217,12 @@ def see(
         if short == 1:
             for entry in range(adds_first[column], adds_first[column + 1]):
                 asked[demand[entry]] += more * worth[entry]
-        for k in range(seer_first[column], seer_first[column + 1]):
-            stale[seer[k]] = 1
+        for k in range(run_first[column], run_first[column + 1]):
+            for seer in range(run[2 * k], run[2 * k + 1]):
+                stale[seer] = 1
             if short == 0:
                 continue
-            begin = seer[k] * demands
             for entry in range(adds_first[column], adds_first[column + 1]):
-                gain[begin + demand[entry]] += more * worth[entry] if short == 1 else -more * worth[entry]
+                value = more * worth[entry] if short == 1 else -more * worth[entry]
+                for seer in range(run[2 * k], run[2 * k + 1]):
+                    gain[seer * demands + demand[entry]] += value

@@ -9,12 +9,11 @@ cdef whole NEVER
 @cython.locals(held=whole, into=whole, k=whole, out=whole, place=whole, swap=whole)
 cpdef whole repair(
     whole swaps, whole most, const whole[::1] row_first, const index[::1] seen,
-    const whole[::1] seer_first, const index[::1] seer, const whole[::1] adds_first,
+    const whole[::1] run_first, const index[::1] run, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, whole[::1] left, whole[::1] asked,
     whole[::1] weight, whole[::1] gain, whole[::1] chosen, whole[::1] free, whole[::1] tabu,
-    whole[::1] stale, whole[::1] counts, whole[::1] touched, whole[::1] lost, whole[::1] near,
-    whole[::1] regained, whole[::1] common, whole[::1] found, whole[::1] where, whole[::1] is_near,
-    whole[::1] open_
+    whole[::1] stale, whole[::1] counts, whole[::1] touched, whole[::1] lost, whole[::1] regained,
+    whole[::1] common, whole[::1] found, whole[::1] where, whole[::1] open_
 ) noexcept nogil
 
 @cython.locals(demands=whole, k=whole, row=whole, short=whole, total=whole, unmet=whole)
@@ -22,13 +21,13 @@ cdef whole add_up(
     whole[::1] asked, whole[::1] weight, whole[::1] gain, whole[::1] common, whole[::1] open_
 ) noexcept nogil
 
-@cython.locals(at=whole, demands=whole, first=whole, k=whole, others=whole, row=whole, rows=whole)
+@cython.locals(at=whole, demands=whole, first=whole, k=whole, row=whole, rows=whole, to=whole)
 cdef void leave(
     whole place, whole most, const whole[::1] row_first, const index[::1] seen,
-    const whole[::1] seer_first, const index[::1] seer, const whole[::1] adds_first,
+    const whole[::1] run_first, const index[::1] run, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, whole[::1] left, whole[::1] chosen,
-    whole[::1] stale, whole[::1] counts, whole[::1] touched, whole[::1] lost, whole[::1] near,
-    whole[::1] regained, whole[::1] where, whole[::1] is_near
+    whole[::1] stale, whole[::1] counts, whole[::1] touched, whole[::1] lost, whole[::1] regained,
+    whole[::1] where
 ) noexcept nogil
 
 @cython.locals(entry=whole)
@@ -37,12 +36,11 @@ cdef whole lose(
     const whole[::1] worth, whole[::1] left, whole[::1] touched, whole[::1] lost, whole[::1] where
 ) noexcept nogil
 
-@cython.locals(entry=whole, k=whole, rows=whole, to=whole)
-cdef whole regain(
-    whole column, whole first, whole begin, whole others, const whole[::1] seer_first,
-    const index[::1] seer, const whole[::1] adds_first, const whole[::1] demand,
-    const whole[::1] worth, whole[::1] left, whole[::1] near, whole[::1] regained, whole[::1] where,
-    whole[::1] is_near
+@cython.locals(begin=whole, entry=whole, high=whole, k=whole, low=whole, to=whole, value=whole)
+cdef void regain(
+    whole column, whole place, whole first, whole rows, const whole[::1] run_first, const index[::1] run,
+    const whole[::1] adds_first, const whole[::1] demand, const whole[::1] worth, whole[::1] left,
+    whole[::1] counts, whole[::1] regained, whole[::1] where
 ) noexcept nogil
 
 @cython.locals(
@@ -63,10 +61,12 @@ cdef whole shortfall(
 
 cdef whole is_better(whole place, whole covered, whole[::1] chosen, whole[::1] found) noexcept nogil
 
-@cython.locals(at=whole, begin=whole, column=whole, demands=whole, entry=whole, k=whole, short=whole)
+@cython.locals(
+    at=whole, column=whole, demands=whole, entry=whole, k=whole, seer=whole, short=whole, value=whole
+)
 cdef void see(
     whole row, whole more, const whole[::1] row_first, const index[::1] seen,
-    const whole[::1] seer_first, const index[::1] seer, const whole[::1] adds_first,
+    const whole[::1] run_first, const index[::1] run, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, whole[::1] left, whole[::1] asked,
     whole[::1] gain, whole[::1] stale
 ) noexcept nogil

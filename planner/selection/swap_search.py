@@ -47,11 +47,11 @@ def by_kernel(kernel: Callable[..., int], cover: Cover, rows: list[int], swaps: 
 
     many = len(rows)
     state = [*board.state(), chosen, free, scratch(TENURE), np.ones(cover.rows, dtype=np.int64)]
-    tables = [scratch(size) for size in (2 * many, many * most, many * most, many * cover.rows)]
+    tables = [scratch(size) for size in (3 * many, many * most, many * most)]
     tables += [scratch(many * cover.rows * most), scratch(cover.rows), scratch(4)]
     demands = len(cover.needed)
-    others = [np.full(demands, -1, dtype=np.int64), scratch(cover.rows), scratch(3 * demands)]
-    problem = (*cover.seen_columns, *cover.worths.rows_of, *cover.worths.added)
+    others = [np.full(demands, -1, dtype=np.int64), scratch(3 * demands)]
+    problem = (*cover.seen_columns, *cover.worths.runs_of_rows, *cover.worths.added)
     met = kernel(swaps, most, *problem, *state, *tables, *others)
     return np.sort(chosen) if met else None
 

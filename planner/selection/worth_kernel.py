@@ -30,7 +30,7 @@ def add_worth(columns: Any, adds_first: Any, demand: Any, worth: Any, sums: Any)
 
 
 def add_worth_by_row(
-    columns: Any, seen_first: Any, seer: Any, adds_first: Any, demand: Any, worth: Any, place: Any,
+    columns: Any, run_first: Any, run: Any, adds_first: Any, demand: Any, worth: Any, place: Any,
     rows: int, sums: Any,
 ) -> None:  # fmt: skip
     """Add the worth of columns to each demand, for each row that sees them.
@@ -39,8 +39,9 @@ def add_worth_by_row(
     ----------
     columns, adds_first, demand, worth
         As for `add_worth`.
-    seen_first, seer
-        First entry of each column in `seer`, and their end (columns + 1,); rows that see it.
+    run_first, run
+        First run of each column, and their end (columns + 1,). Run k is of the rows from `run[2 k]` to before
+        `run[2 k + 1]`, which see the column.
     place
         Place of each demand in the result, -1 where it is not asked for (demands,).
     rows
@@ -53,9 +54,49 @@ def add_worth_by_row(
         for entry in range(adds_first[column], adds_first[column + 1]):
             if place[demand[entry]] < 0:
                 continue
-            begin = place[demand[entry]] * rows
-            for pair in range(seen_first[column], seen_first[column + 1]):
-                sums[begin + seer[pair]] += worth[entry]
+            begin, value = place[demand[entry]] * rows, worth[entry]
+            for at in range(run_first[column], run_first[column + 1]):
+                for to in range(begin + run[2 * at], begin + run[2 * at + 1]):
+                    sums[to] += value
+
+
+def add_worth_of_rows(
+    low: int, high: int, row_first: Any, seen: Any, adds_first: Any, demand: Any, worth: Any, demands: int,
+    sums: Any,
+) -> None:  # fmt: skip
+    """Add the worth of the columns that each row from `low` to before `high` sees to each demand.
+
+    The sums are flat, by row ((high - low) * demands,); the others are as for `count_views`.
+    """
+    for row in range(low, high):
+        begin = (row - low) * demands
+        for at in range(row_first[row], row_first[row + 1]):
+            for entry in range(adds_first[seen[at]], adds_first[seen[at] + 1]):
+                sums[begin + demand[entry]] += worth[entry]
+
+
+def count_runs(row_first: Any, seen: Any, last: Any, many: Any) -> None:
+    """Count the runs of successive rows that see each column, from -2 as the `last` row (columns,)."""
+    for row in range(len(row_first) - 1):
+        for at in range(row_first[row], row_first[row + 1]):
+            if last[seen[at]] != row - 1:
+                many[seen[at]] += 1
+            last[seen[at]] = row
+
+
+def note_runs(row_first: Any, seen: Any, last: Any, place: Any, run: Any) -> None:
+    """Note these runs: of each its first row, and the one after its last (2 * runs,).
+
+    `place` is that of the first run of each column, and receives that after its last one (columns,).
+    """
+    for row in range(len(row_first) - 1):
+        for at in range(row_first[row], row_first[row + 1]):
+            column = seen[at]
+            if last[column] != row - 1:
+                run[2 * place[column]] = row
+                place[column] += 1
+            run[2 * place[column] - 1] = row + 1
+            last[column] = row
 
 
 def count_views(

@@ -11,10 +11,26 @@ cpdef void add_worth(
     whole[::1] sums
 ) noexcept nogil
 
-@cython.locals(begin=whole, column=whole, entry=whole, k=whole, pair=whole)
+@cython.locals(at=whole, begin=whole, column=whole, entry=whole, k=whole, to=whole, value=whole)
 cpdef void add_worth_by_row(
-    const whole[::1] columns, const whole[::1] seen_first, const index[::1] seer, const whole[::1] adds_first,
+    const whole[::1] columns, const whole[::1] run_first, const index[::1] run, const whole[::1] adds_first,
     const whole[::1] demand, const whole[::1] worth, const whole[::1] place, whole rows, whole[::1] sums
+) noexcept nogil
+
+@cython.locals(at=whole, begin=whole, entry=whole, row=whole)
+cpdef void add_worth_of_rows(
+    whole low, whole high, const whole[::1] row_first, const index[::1] seen, const whole[::1] adds_first,
+    const whole[::1] demand, const whole[::1] worth, whole demands, whole[::1] sums
+) noexcept nogil
+
+@cython.locals(at=whole, row=whole)
+cpdef void count_runs(
+    const whole[::1] row_first, const index[::1] seen, index[::1] last, whole[::1] many
+) noexcept nogil
+
+@cython.locals(at=whole, column=whole, row=whole)
+cpdef void note_runs(
+    const whole[::1] row_first, const index[::1] seen, index[::1] last, whole[::1] place, index[::1] run
 ) noexcept nogil
 
 @cython.locals(at=whole, column=whole, entry=whole, k=whole)

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.geometry.index_ranges import ranges
-from stopgo.planner.selection.worth_kernel import add_worth, add_worth_by_row, take_gain
+from stopgo.planner.selection.worth_kernel import (
+    add_worth,
+    add_worth_by_row,
+    count_runs,
+    note_runs,
+    take_gain,
+)
 
 
 class _Entries(NamedTuple):
-    """Demands (in 64-bit integers) or rows (in 32 bits) of each column of the covering problem."""
+    """Demands (in 64-bit integers), or runs of rows (in 32 bits), of each column of the covering problem."""
 
     first: IntArray
     """First entry of each column, and their end (columns + 1,)."""
-    to: IntArray
-    """Demand or row of each entry (entries,)."""
+    to: NDArray[Any]
+    """Demand of each entry (entries,); or its first row, and the one after its last (2 * entries,)."""
 
 
 class Transposed:
@@ -31,12 +38,37 @@ class Transposed:
 
     def __init__(self, matrix: csr_array) -> None:
         self._of = matrix
+        self.rows = int(matrix.shape[0])
 
     @cached_property
     def matrix(self) -> csr_array:
         made = self._of.T.tocsr()
         made.sort_indices()
         return made
+
+    @cached_property
+    def runs(self) -> _Entries:
+        """Runs of successive rows that see each column: at long ranges, an eighth of the entries."""
+        count, note = compiled(count_runs, large=False), compiled(note_runs, large=False)
+        if count is None or note is None:
+            return _runs_of(self.matrix)
+        entries = np.ascontiguousarray(self._of.indptr, np.int64), _narrow(self._of.indices)
+        many, columns = np.zeros(self._of.shape[1], dtype=np.int64), self._of.shape[1]
+        count(*entries, np.full(columns, -2, dtype=np.int32), many)
+        first = np.concatenate([[0], np.cumsum(many)]).astype(np.int64)
+        runs = np.empty(2 * int(first[-1]), dtype=np.int32)
+        note(*entries, np.full(columns, -2, dtype=np.int32), first[:-1].copy(), runs)
+        return _Entries(first, runs)
+
+
+def _runs_of(seen_by: csr_array) -> _Entries:
+    """Runs of successive indices of each row of a matrix with sorted ones."""
+    row = np.repeat(np.arange(seen_by.shape[0]), np.diff(seen_by.indptr))
+    begins = np.ones(len(row) + 1, dtype=bool)
+    begins[1:-1] = (np.diff(seen_by.indices) != 1) | (np.diff(row) != 0)
+    at = np.flatnonzero(begins)
+    runs = np.stack([seen_by.indices[at[:-1]], seen_by.indices[at[1:] - 1] + 1], axis=1)
+    return _Entries(np.searchsorted(row[at[:-1]], np.arange(seen_by.shape[0] + 1)), _narrow(runs.ravel()))
 
 
 class Worths:
@@ -45,23 +77,19 @@ class Worths:
     def __init__(self, adds_to: csr_array, seen_by: Transposed) -> None:
         """`adds_to` has the worth of columns (columns, demands), `seen_by` who sees them (columns, rows)."""
         self._demands, self._seen_by = int(adds_to.shape[1]), seen_by
-        self._adds = _entries(adds_to, np.int64)
+        first, to = adds_to.indptr, adds_to.indices
+        self._adds = _Entries(np.ascontiguousarray(first, np.int64), np.ascontiguousarray(to, np.int64))
         self._worth = np.ascontiguousarray(adds_to.data, np.int64)
         self._sums = np.zeros(self._demands, dtype=np.int64)
         self._gains = np.zeros(3, dtype=np.int64)
 
-    @cached_property
-    def _seen(self) -> _Entries:
-        return _entries(self._seen_by.matrix, np.int32)
-
-    @cached_property
-    def _rows(self) -> int:
-        return int(self._seen_by.matrix.shape[1])
-
     @property
-    def rows_of(self) -> tuple[IntArray, IntArray]:
-        """First entry of each column, and their end (columns + 1,); and the rows that see it: for kernels."""
-        return self._seen
+    def runs_of_rows(self) -> tuple[IntArray, NDArray[np.int32]]:
+        """First run of each column, and their end (columns + 1,); and runs of rows that see it: for kernels.
+
+        Run k is of the rows from entry 2 k to before entry 2 k + 1.
+        """
+        return self._seen_by.runs
 
     @property
     def added(self) -> tuple[IntArray, IntArray, IntArray]:
@@ -101,18 +129,19 @@ class Worths:
         kernel = compiled(add_worth_by_row, large=False)
         if kernel is None:
             return self._by_row(columns, place, len(demands))
-        sums = np.zeros(len(demands) * self._rows, dtype=np.int64)
-        kernel(columns, *self._seen, *self._adds, self._worth, place, self._rows, sums)
-        return sums.reshape(len(demands), self._rows)
+        rows = self._seen_by.rows
+        sums = np.zeros(len(demands) * rows, dtype=np.int64)
+        kernel(columns, *self.runs_of_rows, *self._adds, self._worth, place, rows, sums)
+        return sums.reshape(len(demands), rows)
 
     def _by_row(self, columns: IntArray, place: IntArray, asked: int) -> IntArray:
-        counts = self._seen.first[columns + 1] - self._seen.first[columns]
-        row = self.seers(columns)
-        counts, demand, worth = self._entries(np.repeat(columns, counts))
+        counts, row = self._seers(columns)
+        rows, each = self._seen_by.rows, np.repeat(columns, counts)
+        counts, demand, worth = self._entries(each)
         is_asked = place[demand] >= 0
-        cell = place[demand[is_asked]] * self._rows + np.repeat(row, counts)[is_asked]
-        sums = np.bincount(cell, worth[is_asked], asked * self._rows)
-        return sums.astype(np.int64).reshape(asked, self._rows)
+        cell = place[demand[is_asked]] * rows + np.repeat(row, counts)[is_asked]
+        sums = np.bincount(cell, worth[is_asked], asked * rows)
+        return sums.astype(np.int64).reshape(asked, rows)
 
     def _entries(self, columns: IntArray) -> tuple[IntArray, IntArray, IntArray]:
         """Number of demands that each column adds to, their indices, and the worth to each."""
@@ -126,10 +155,16 @@ class Worths:
 
     def seers(self, columns: IntArray) -> IntArray:
         """Rows that see the columns, once for each column (n,)."""
-        counts = self._seen.first[columns + 1] - self._seen.first[columns]
-        return self._seen.to[ranges(self._seen.first[columns], counts)].astype(np.int64)
+        return self._seers(columns)[1]
+
+    def _seers(self, columns: IntArray) -> tuple[IntArray, IntArray]:
+        """Number of rows that see each column (columns,), and these rows, column by column (n,)."""
+        first, ends = self.runs_of_rows
+        runs = first[columns + 1] - first[columns]
+        begin, end = ends.reshape(-1, 2)[ranges(first[columns], runs)].astype(np.int64).T
+        counts = np.bincount(np.repeat(np.arange(len(columns)), runs), end - begin, len(columns))
+        return counts.astype(np.int64), ranges(begin, end - begin)
 
 
-def _entries(by_column: csr_array, of: type[np.signedinteger]) -> _Entries:
-    first, to = by_column.indptr, by_column.indices
-    return _Entries(np.ascontiguousarray(first, np.int64), np.ascontiguousarray(to, of))
+def _narrow(indices: NDArray[Any]) -> NDArray[np.int32]:
+    return np.ascontiguousarray(indices, np.int32)

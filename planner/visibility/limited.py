@@ -19,8 +19,8 @@ from stopgo.mission.stages import Visibility
 from stopgo.planner.geometry.shapes import local_origin, to_grid
 from stopgo.planner.visibility.sight.well_seen import SeenSegments, clipped
 
-BLOCK = 100_000
-"""Runs of units that are tested at a time, for the memory that this takes."""
+BLOCK = 20_000
+"""Runs of units that are tested at a time: what is computed of them then fits a processor's cache."""
 
 
 def within_limits(in_sight: Visibility) -> Visibility:
@@ -57,7 +57,8 @@ def _clipped(in_sight: Visibility, limits: ViewLimits) -> Visibility:
         stretches = SeenSegments(a[segment] - at[row], b[segment] - at[row], targets.units[segment])
         low, high = (unit[own] - start for unit in (in_sight.first, in_sight.last))
         run, first, last = clipped(stretches, low, high, limits)
-        np.add.at(counts, row[run], 1)
+        begin, end = int(row.min(initial=0)), int(row.max(initial=-1)) + 1
+        counts[begin:end] += np.bincount(row[run] - begin, minlength=end - begin)
         kind = in_sight.first.dtype
         return segment[run], (start[run] + first).astype(kind), (start[run] + last).astype(kind)
 
@@ -65,6 +66,15 @@ def _clipped(in_sight: Visibility, limits: ViewLimits) -> Visibility:
     segment, first, last = (read_only(np.concatenate(part)) for part in zip(*found, strict=True))
     pointer = frozen(np.concatenate([[0], np.cumsum(counts)]), np.int64)
     return replace(in_sight, pointer=pointer, segment=segment, first=first, last=last, in_sight=in_sight)
+
+
+def keep_only_visible(in_sight: Visibility) -> None:
+    """Forget who sees each unit, but not which units are visible: long ranges have many millions of runs."""
+    _ = in_sight.visible  # which is kept
+    none = np.empty(0, dtype=in_sight.first.dtype)
+    vars(in_sight).update(
+        pointer=frozen(np.zeros(len(in_sight.pointer)), np.int64), segment=none, first=none, last=none
+    )
 
 
 def _row_of(pointer: IntArray, run: IntArray) -> IntArray:

@@ -131,6 +131,24 @@ def test_a_plan_is_the_same_with_a_second_process(
     assert not forked.space.targets.a.flags.writeable
 
 
+@pytest.mark.parametrize("fov", [360.0, 270.0])
+def test_a_plan_is_the_same_where_second_processes_end_without_a_result(
+    monkeypatch: pytest.MonkeyPatch, fov: float
+) -> None:
+    """The lines of sight without limits, which only such a process needs, are found again then."""
+    settings = Settings(d_dis=0.1, fov=fov, refine=False)
+    alone = pipeline.plan(two_rooms(0.9), settings)
+    assert alone.figures.quality is not None
+    monkeypatch.setattr(pipeline, "MANY", 0)
+    monkeypatch.setattr(SideWork, "_serve", lambda *_: os._exit(0))
+    again = pipeline.plan(two_rooms(0.9), settings)
+    assert again.figures == alone.figures
+    assert again.mission == alone.mission
+    in_sight = again.parts[0].route.selection.visibility.in_sight
+    assert in_sight is not None
+    assert not len(in_sight.first)
+
+
 def test_a_process_whose_end_was_taken_note_of_elsewhere_is_no_error() -> None:
     """A parent that ignores SIGCHLD passes that on, and children then go without being waited for."""
     before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)

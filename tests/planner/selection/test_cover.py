@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, eye_array
 
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Selection
 from stopgo.planner.selection import cover
-from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.cover import Cover, cover_of
+from stopgo.planner.selection.demands import demands_of
 from tests.planner.kernels import machine_code
+from tests.planner.selection.test_swaps import cover_of_rooms
+from tests.planner.worlds import column, planned, two_rooms
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -51,3 +56,28 @@ def test_sums_over_some_rows_at_a_time_are_those_of_all(block: int, monkeypatch:
         monkeypatch.setattr(cover, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
         assert np.array_equal(one.covered_by(np.array([2, 5])), wide[[2, 5]].sum(axis=0))
         assert np.array_equal(one.paid_to(price), sees @ price)
+        again = Cover(sees, one.worth, one.needed)
+        assert np.array_equal(again.adds.toarray(), one.adds.toarray())
+        assert again.most_demands == 3
+
+
+def test_the_columns_of_more_demands_come_last() -> None:
+    one = cover_of_rooms(3, rows=40, columns=100)
+    random = np.random.default_rng(0)
+    sets = [np.sort(random.choice(40, size, replace=False)) for size in (3, 7, 1, 20)]
+    more = np.stack([np.isin(np.arange(40), rows) for rows in sets], axis=1)
+    both = one.with_one_of_each(sets)
+    assert both.sees.has_canonical_format
+    assert np.array_equal(both.sees.toarray(), np.hstack([one.sees.toarray(), more]))
+    assert np.array_equal(both.adds.toarray(), both.sees.astype(np.int64) @ both.worth.toarray().T)
+
+
+def test_a_problem_is_the_same_in_numpy_as_written_and_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    floor = two_rooms(1.0, more=(column("c", 2.0, 1.0), column("k", 6.0, 3.0)))
+    seen = planned(floor, Settings(range=4))[1][Selection].visibility
+    made = []
+    for kernels in (lambda kernel: None, lambda kernel: kernel, machine_code):
+        monkeypatch.setattr(cover, "compiled", lambda kernel, *, large, by=kernels: by(kernel))
+        one = cover_of(seen, demands_of(seen))
+        made.append([one.sees.indptr.tolist(), one.sees.indices.tolist(), one.worth.toarray().tolist()])
+    assert made[0] == made[1] == made[2]
