@@ -14,7 +14,7 @@ from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.mission.stages import DROP_REASONS
 from stopgo.recordings import plan as plan_recording
 from stopgo.recordings.drawing import entities, palette
-from stopgo.recordings.plan import COMMON, CommonDrawings, PlanRecording
+from stopgo.recordings.plan import COMMON, CommonDrawings, PlanRecording, visibility
 from stopgo.recordings.rrd.read import check
 from tests.faults.sizes import some
 from tests.recordings import world
@@ -134,6 +134,21 @@ def test_each_candidate_has_a_row_with_what_it_sees(plan: Path) -> None:
     assert np.allclose(seen[2][0], [(4.0, 2.0), (4.3, 2.0)], atol=1e-6)
     rays = on(plan, "/plan/visibility/rays", "LineStrips2D:strips", entities.CANDIDATE)
     assert np.allclose(rays[2][0], [(4.0, 2.0), (5.0, 1.0), (4.3, 2.0)], atol=1e-6)
+
+
+def test_of_many_millions_of_lines_one_candidate_in_so_many_is_shown(
+    plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of them with all that it sees; none has the lines of the one before."""
+    monkeypatch.setattr(visibility, "MOST_LINES", 3)
+    thin = write_plan(tmp_path / "thin.rrd")
+    lines, points = "LineStrips2D:strips", "Points2D:positions"
+    for entity, component in ((entities.SEEN, lines), (entities.RAYS, lines), (entities.EYE, points)):
+        all_, some_ = (on(path, entity, component, entities.CANDIDATE) for path in (plan, thin))
+        assert sorted(some_) == [0, 2]
+        assert all(np.array_equal(some_[row], all_[row]) for row in some_)
+    said = [text for _, (text,) in cells(thin, "/log/plan", "TextLog:text")]
+    assert any(text.endswith("units visible from any; the timeline has 2 of 3 candidates") for text in said)
 
 
 def test_each_choice_adds_what_it_newly_sees(plan: Path) -> None:
