@@ -42,7 +42,7 @@ class _Shown(NamedTuple):
 
 
 def _of_rows(visibility: Visibility, rows: IntArray) -> Visibility:
-    """Return what some rows see, numbered anew; the candidates stay all."""
+    """Return what some rows see, as rows from 0 on; the candidates stay all."""
     pointer = visibility.pointer
     own = np.concatenate([np.arange(pointer[row], pointer[row + 1]) for row in rows])
     return replace(
