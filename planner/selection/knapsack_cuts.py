@@ -120,7 +120,8 @@ def _dense(matrix: csc_array, first: int, many: int) -> IntArray:
 
 def _levels(cover: Cover, chosen: FloatArray) -> IntArray:
     """Level of the views of each column (columns,): up to `LEVELS` for all it needs, one more for above."""
-    views = cover.sees.T @ chosen / cover.asks
+    some = np.flatnonzero(chosen)  # products have a copy of all entries that they go over
+    views = cover.sees[some].T @ chosen[some] / cover.asks
     level = np.minimum(LEVELS, (views * LEVELS).astype(np.int64))
     return np.where(views > SEEN, LEVELS + 1, level)
 
