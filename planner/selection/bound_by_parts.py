@@ -43,7 +43,8 @@ def has_parts(cover: Cover) -> bool:
     On open floors of long range each part is nearly all that a row sees, several times over. Rows and columns
     without an entry do not count, such as rows that are not offered.
     """
-    rows, columns = (int(np.count_nonzero(np.diff(matrix.indptr))) for matrix in (cover.sees, cover.seen_by))
+    firsts = cover.sees.indptr, cover.worths.runs_of_rows[0]
+    rows, columns = (int(np.count_nonzero(np.diff(first))) for first in firsts)
     return cover.sees.nnz**3 <= MOST_AROUND * columns**2 * rows
 
 
