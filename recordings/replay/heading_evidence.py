@@ -7,23 +7,16 @@ another unit, or with a compass that was not converted, has others.
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
 from stopgo.mission.comparing.acquired import Certainty
 from stopgo.mission.comparing.comparison import DONE, StopComparison
-from stopgo.mission.run.run_log import Track
 from stopgo.mission.run.scans import HEADING_RAD, needs_heading
 from stopgo.recordings.replay.replayed import Replay
 
 NEIGHBOURS = 4
 """Number of visited stops around one whose heading errors may be a drift that it has too."""
-MOST_POSES = 20_000
-STEP_M = 0.3
-"""Length of path over which a direction of driving is measured."""
-ALONG_RAD, MOSTLY = math.radians(20.0), 0.8
-"""Greatest angle between heading and driving, and the fraction of the path where it must hold."""
 
 
 def heading_answer(replay: Replay, number: int, *, drifts: bool) -> tuple[Certainty, str]:
@@ -40,7 +33,7 @@ def heading_answer(replay: Replay, number: int, *, drifts: bool) -> tuple[Certai
         return "unknown", NO_HEADING_THERE.format(scanner.fov_deg)
     if not item.turned_rad or not replay.inferred:
         return ("no" if item.turned_rad else "yes"), ""
-    if not _are_of_driving(replay.run.poses):
+    if not replay.drives_ahead:
         return "unknown", OTHER_HEADINGS
     return ("unknown", DRIFTS) if drifts and _is_alike(replay, item, number) else ("no", "")
 
@@ -67,20 +60,6 @@ def _is_measured(replay: Replay, number: int) -> bool:
     known = source.ns[np.isfinite(source.heading)] + offset_ns
     found = [match.standstill for match in replay.at(number)]
     return any(((known >= item.begin_ns) & (known <= item.end_ns)).any() for item in found)
-
-
-def _are_of_driving(track: Track) -> bool:
-    """True if the robot mostly drove where its headings point."""
-    rows = [0]
-    for k in range(0, len(track), max(1, len(track) // MOST_POSES)):
-        if math.dist(track.xy[k], track.xy[rows[-1]]) >= STEP_M:
-            rows.append(k)
-    along = []
-    for a, b in pairwise(rows):
-        x, y = track.xy[b] - track.xy[a]
-        away = math.remainder(float(track.heading[(a + b) // 2]) - math.atan2(y, x), math.tau)
-        along.append(abs(away) <= ALONG_RAD)
-    return bool(along) and float(np.mean(along)) >= MOSTLY
 
 
 def _is_alike(replay: Replay, item: StopComparison, number: int) -> bool:

@@ -16,6 +16,7 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.run.events import Scanned, Settled, Unconfirmed
 from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs.field_log import FieldLog
+from stopgo.recordings.replay.driving_direction import drives_ahead
 from stopgo.recordings.replay.log_placing import PlacedLog
 from stopgo.recordings.replay.matching import Match
 
@@ -70,6 +71,11 @@ class Replay:
         kind = Settled if self.inferred else Scanned
         logged = {event.stop for event in self.run.events if isinstance(event, kind)}
         return frozenset(stop.id for stop in self.mission.stops if logged and stop.id not in logged)
+
+    @cached_property
+    def drives_ahead(self) -> bool:
+        """True if the robot mostly drove where its headings point: else they are of another unit or axis."""
+        return drives_ahead(self.run.poses)
 
     @cached_property
     def extra(self) -> tuple[Match, ...]:
