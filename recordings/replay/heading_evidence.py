@@ -40,8 +40,9 @@ def heading_answer(replay: Replay, number: int, *, drifts: bool) -> tuple[Certai
 
 def unknown_headings(replay: Replay) -> str:
     """Return why the log does not show where the scanner looked at a visited stop; empty if it does."""
-    visited = [number for number, item in enumerate(replay.comparison.asked) if item.outcome in DONE]
-    answers = (heading_answer(replay, number, drifts=False) for number in visited)
+    asked = enumerate(replay.comparison.asked)
+    placed = [number for number, item in asked if item.outcome in DONE and item.deviation_m is not None]
+    answers = (heading_answer(replay, number, drifts=False) for number in placed)
     return next((why for answer, why in answers if answer == "unknown"), "")
 
 

@@ -12,10 +12,11 @@ from msgspec.structs import replace as changed
 from stopgo.bridge.robot.journal_file import open_journal
 from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError
-from stopgo.mission.run.events import Arrived, Finished, Scanned, Skipped, Started
+from stopgo.mission.run.events import Arrived, Event, Finished, Scanned, Skipped, Started, Unconfirmed
 from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.drive_verdict import drive_verdict
+from stopgo.recordings.replay.heading_evidence import unknown_headings
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replay_page import to_do
 from stopgo.recordings.replay.replayed import Replay
@@ -128,3 +129,20 @@ def test_a_scan_turned_from_its_heading_is_named_as_such_and_to_be_repeated(tmp_
     assert judgement.answer == "no" and "position error" not in judgement.text
     assert f"{name}: turned 14.3° from its heading; the scanner sees 180°." in judgement.text
     assert f"{name}: scan it again, turned by +14.3°" in list(to_do(found))
+
+
+def test_a_stop_without_a_pose_leaves_what_was_visible_from_the_others_known(tmp_path: Path) -> None:
+    mission = with_digest(changed(MISSION, scanner=changed(MISSION.scanner, fov_deg=180.0)))
+    run = run_of(mission)
+    stop, *_ = (event for event in run.events if isinstance(event, Scanned))
+    common = {name: getattr(stop, name) for name in Event.__struct_fields__}
+    passed = Unconfirmed(**common, stop=stop.stop, pose=None, reason="no pose of the vehicle at the stop")
+    with open_journal(tmp_path / "state", "r1") as journal:
+        for event in run.events:
+            if getattr(event, "stop", None) != stop.stop:
+                journal.append(event)
+            elif event is stop:
+                journal.append(passed)
+    found = replay(read_log(tmp_path / "state"), mission, Placing())
+    assert next(item for item in found.comparison.asked if item.stop == stop.stop).deviation_m is None
+    assert unknown_headings(found) == ""
