@@ -88,7 +88,8 @@ class AutoRunner:
     def snapshot(self) -> tuple[Run, Mission | None]:
         """The run as seen if this process only looks; else as stored by any process."""
         listed, run = self._book.listed, self._follower.run if self._looks_only else self._book.run
-        return run_on_vehicle(run, self._observer.position.items), None if listed is None else listed.mission
+        run = run_on_vehicle(run, self._observer.position.items, listed)
+        return run, None if listed is None else listed.mission
 
     def position(self) -> Position | None:
         fix = self._observer.poses.fix

@@ -32,7 +32,7 @@ from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.resuming import ON_LINE_M, resume_place, route_lines
-from stopgo.mission.mavlink.following.steps import Observation
+from stopgo.mission.mavlink.following.steps import Observation, run_on_vehicle
 from stopgo.mission.mavlink.local_frame import VehicleOrigin, apart
 from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.run import states as runs
@@ -54,6 +54,9 @@ UNREMEMBERED = (
     " or name the folder of that push with --state"
 )
 CLEARED = "the vehicle reports no mission: somebody has cleared it; push it again"
+REPLACED = (
+    "the vehicle reports {} items, and {} were pushed: somebody has replaced them; push the mission again"
+)
 HOMEWARD = (
     "an autopilot in AUTO drives its list forward only, and no path back from here is planned; it drives the"
     " mission's return at its end. With stopgo robot --controller mavlink:URL it can drive home"
@@ -197,6 +200,8 @@ class VehicleCommands:
             return Refused("no_mission", UNREMEMBERED)
         if order.verb in DRIVING and self._observer.position.items == 0:
             return Refused("no_mission", CLEARED)
+        if order.verb in DRIVING and run_on_vehicle(run, self._observer.position.items, listed) != run:
+            return Refused("mission_differs", REPLACED.format(self._observer.position.items, listed.end))
         wrong_origin = self._wrong_origin(listed) if order.verb in DRIVING else None
         if wrong_origin is not None:
             return wrong_origin

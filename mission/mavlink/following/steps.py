@@ -293,9 +293,15 @@ def _author(observed: Observation, by: str) -> str:
     return observed.failsafe if observed.failsafe and by == SOMEBODY else by
 
 
-def run_on_vehicle(run: Run, items: int | None) -> Run:
-    """Return the run as reported; a ready mission is dropped if the vehicle reports no items."""
-    return Run() if run.state == "READY" and items == 0 else run
+COUNTED_TOO = 1
+"""Items by which two counts of one list may differ: a firmware may count home."""
+
+
+def run_on_vehicle(run: Run, items: int | None, listed: ListedMission | None) -> Run:
+    """Return the run as reported; a ready mission is dropped if the vehicle reports no items, or others."""
+    if run.state != "READY" or items is None or listed is None:
+        return run
+    return Run() if items == 0 or abs(items - listed.end) > COUNTED_TOO else run
 
 
 def arrival_error_text(pose: Pose, run: Run, listed: ListedMission) -> str:

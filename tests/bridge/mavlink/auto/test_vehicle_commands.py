@@ -14,7 +14,7 @@ from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.bridge.mavlink.vehicle_link.peer import reached as found_peer
 from stopgo.bridge.robot.answers import answer_to, remember_answer
-from stopgo.mission.document import Scan
+from stopgo.mission.document import Scan, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.translate import translate
@@ -107,6 +107,16 @@ def test_another_mission_is_never_started(tmp_path: Path) -> None:
     with site.up():
         why = refused(site, "start")
     assert "mission_differs" in why and "settle of S1" in why and "push" in why
+
+
+def test_a_list_of_another_station_is_not_reported_as_a_ready_mission(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    first, *_ = site.mission.stops
+    site.load(translate(with_digest(msgspec.structs.replace(site.mission, stops=(first,))), "ardupilot"))
+    with site.up(), site.reached() as station:
+        assert (station.status().state, station.status().mission_id) == ("IDLE", None)
+    with site.up():
+        assert "mission_differs" in refused(site, "start")
 
 
 def test_a_mission_that_another_station_has_cleared_is_not_reported_or_started(tmp_path: Path) -> None:

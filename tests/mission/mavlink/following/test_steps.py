@@ -187,12 +187,13 @@ def test_a_scanner_that_does_not_see_all_around_must_face_the_right_way() -> Non
     assert words == ["Failed S2", "Held"] and "11.5°" in run.reason
 
 
-def test_a_mission_that_somebody_has_cleared_does_not_lie_ready() -> None:
-    ready = Run(state="READY", mission_id="m", revision=1)
-    assert run_on_vehicle(ready, 0) == Run()
-    for items in (None, 14):
-        assert run_on_vehicle(ready, items) == ready
-    assert run_on_vehicle(going(), 0) == going()
+def test_a_mission_that_somebody_has_cleared_or_replaced_does_not_lie_ready() -> None:
+    ready, mine = Run(state="READY", mission_id="m", revision=1), listed()
+    for items in (0, 5, mine.end + 7):
+        assert run_on_vehicle(ready, items, mine) == Run()
+        assert run_on_vehicle(going(), items, mine) == going()
+    for items in (None, mine.end, mine.end + 1):  # some count home too
+        assert run_on_vehicle(ready, items, mine) == ready
 
 
 @pytest.mark.parametrize("stop_state", ["SCANNING", "VERIFYING"])
