@@ -70,7 +70,7 @@ class StopComparison:
         return self.arrived_s - self.planned_s
 
     @property
-    def is_beside(self) -> bool:
+    def position_outside(self) -> bool:
         """True if the position error is greater than the mission tolerates."""
         away, limit = self.deviation_m, self.tolerance_m
         return away is not None and limit is not None and is_outside(away, limit)
@@ -78,7 +78,7 @@ class StopComparison:
     @property
     def outside_tolerance(self) -> bool:
         """True if the position error is greater than the mission tolerates, or the heading error."""
-        return self.is_beside or self.turned_rad > 0
+        return self.position_outside or self.turned_rad > 0
 
     @property
     def is_doubtful(self) -> bool:
@@ -91,7 +91,7 @@ class StopComparison:
         if self.disputed_m is None:
             return False
         least_m = self.disputed_m - (self.deviation_m or 0.0)  # of the poses, from the stop
-        return not (self.is_beside and is_outside(least_m, self.tolerance_m or 0.0))
+        return not (self.position_outside and is_outside(least_m, self.tolerance_m or 0.0))
 
     @property
     def disputed_text(self) -> str:

@@ -67,7 +67,7 @@ def missing(replay: Replay) -> list[StopComparison]:
 
 def outside(replay: Replay) -> list[StopComparison]:
     """Return stops at which it was too far away, by its own poses or by a simulator's truth."""
-    return [item for item in replay.comparison.asked if item.is_beside and item.outside_text]
+    return [item for item in replay.comparison.asked if item.position_outside and item.outside_text]
 
 
 def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence[str]) -> Iterator[str]:
@@ -101,7 +101,7 @@ def _against(replay: Replay, against: Sequence[StopEvidence]) -> Iterator[str]:
             yield f"{words if replay.inferred else WORDS_OF_EVENTS.get(outcome, words)} {named(stops)}."
     for one in against:
         item = one.item
-        if one.is_placed and item.is_beside and item.outside_text:
+        if one.is_placed and item.position_outside and item.outside_text:
             far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
             yield f"{item.stop}: position error {far:.0f} mm (tolerance {limit:.0f} mm)."
         if one.turned:

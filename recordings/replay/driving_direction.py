@@ -1,4 +1,4 @@
-"""Headings of a log beside the directions in which the robot drove: are they of the driving robot?"""
+"""Headings of a log, compared with the directions in which the robot drove: are they of the driving robot?"""
 
 from __future__ import annotations
 
