@@ -98,9 +98,10 @@ class MavlinkBase:
         watch, known = TakeoverWatch(self._autopilot, by_hold=True), [""]
 
         def taken() -> str:
+            control = self._autopilot.control
             if not known[0] and (why := watch.taken() or watch.steered()):
-                known[0] = self._blocked_by = why
-                self._autopilot.control.accept_mode()
+                known[0] = self._blocked_by = control.mode_change() or why
+                control.accept_mode()
             return known[0]
 
         return taken

@@ -46,7 +46,7 @@ def _workers(place: Path) -> list[int]:
 def test_work_is_done_once_in_the_process_asked_for(tmp_path: Path, *, forked: bool) -> None:
     place = tmp_path / "workers"
     with SideWork(partial(_noted, place), forked=forked) as work:
-        assert work.position_outside == forked
+        assert work.is_beside == forked
         assert [work.result(), work.result()] == ["done", "done"]
     (worker,) = _workers(place)
     assert (worker != os.getpid()) == forked

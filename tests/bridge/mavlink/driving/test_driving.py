@@ -25,6 +25,7 @@ from tests.bridge.mavlink.driving.world import (
     gateway,
     is_driving,
     is_state,
+    retried,
     rover,
     scanned,
     site_mission,
@@ -182,7 +183,7 @@ def test_who_drives_by_hand_keeps_the_vehicle_until_it_is_handed_over(tmp_path: 
             station.command("retry")
         assert operator.mode() == "MANUAL"
         operator.hold()
-        until(reports, lambda report: _retried(station))
+        until(reports, lambda report: retried(station))
         until(reports, is_state("FINISHED"))
         assert scanned(station) == ALL
 
@@ -192,14 +193,6 @@ def _refusal(station: Any) -> str:
     with pytest.raises(NegativeResult) as refused:
         station.command("start")
     return str(refused.value)
-
-
-def _retried(station: Any) -> bool:
-    """True once the robot knows that the vehicle is handed over."""
-    try:
-        return bool(station.command("retry").outcome == "ok")
-    except NegativeResult:
-        return False
 
 
 def test_a_hold_during_a_scan_is_told_at_once_and_the_next_leg_waits(tmp_path: Path) -> None:
@@ -297,7 +290,7 @@ def test_a_line_that_is_cut_holds_the_leg_and_stops_the_vehicle_once_it_is_back(
         assert operator.mode() == "GUIDED"
         line.roughness = Roughness()
         until(reports, lambda report: isinstance(report, PoseReport) and operator.mode() == "HOLD")
-        until(reports, lambda report: _retried(station))
+        until(reports, lambda report: retried(station))
         until(reports, is_state("FINISHED"))
         assert scanned(station) == ALL
 
@@ -313,7 +306,7 @@ def test_a_vehicle_that_dies_on_a_leg_comes_back_and_is_driven_on(tmp_path: Path
         assert "no data from the autopilot for" in held.reason
         vehicle.on()
         operator.hold()
-        until(reports, lambda report: _retried(station))
+        until(reports, lambda report: retried(station))
         until(reports, is_state("FINISHED"))
         assert scanned(station) == ALL
 

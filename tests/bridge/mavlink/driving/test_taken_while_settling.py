@@ -11,6 +11,7 @@ from tests.bridge.mavlink.driving.world import (
     events_of,
     gateway,
     is_state,
+    retried,
     rover,
     scanned,
     site_mission,
@@ -39,8 +40,8 @@ def test_a_run_is_held_and_goes_on_once_the_vehicle_is_handed_over(
         until(reports, is_state("HELD", "FINISHED"))
         events, mode = events_of(station), operator.mode()
         operator.hold()
-        station.command("retry")
-        until(reports, is_state("HELD", "FINISHED"))
+        until(reports, lambda report: retried(station))
+        until(reports, is_state("FINISHED"))
         assert scanned(station) == ["s1", "s2"]
     assert isinstance(events[-1], Held) and not [event for event in events if isinstance(event, Scanned)]
     assert events[-1].reason.startswith("while it settled at s1: ") and mode in events[-1].reason

@@ -27,6 +27,7 @@ from stopgo.bridge.robot.simulated_faults import NO_FAULTS
 from stopgo.bridge.station.follow import Report
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, Scan, with_digest
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor, pose_of
@@ -181,3 +182,11 @@ def scanned(station: Station) -> list[str]:
 def bearing_of_corridor() -> tuple[float, float]:
     """North and east of a metre along the corridor."""
     return math.cos(math.radians(120)), math.sin(math.radians(120))
+
+
+def retried(station: Station) -> bool:
+    """True once the robot knows that the vehicle is handed over."""
+    try:
+        return station.command("retry").outcome == "ok"
+    except NegativeResult:
+        return False
