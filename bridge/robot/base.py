@@ -98,7 +98,7 @@ class SharedBase(Protocol):
 
 
 def watch_takeover(base: object) -> Callable[[], str]:
-    """Return what reports who takes a base from now on; others than the robot command few bases."""
+    """Return what reports who takes a base from now on; of a base that is not shared, it reports nobody."""
     return base.watch_takeover() if isinstance(base, SharedBase) else lambda: ""
 
 

@@ -32,7 +32,7 @@ from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.resuming import ON_LINE_M, resume_place, route_lines
-from stopgo.mission.mavlink.following.steps import Observation, run_on_vehicle
+from stopgo.mission.mavlink.following.steps import Observation, is_replaced
 from stopgo.mission.mavlink.local_frame import VehicleOrigin, apart
 from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.run import states as runs
@@ -198,10 +198,11 @@ class VehicleCommands:
         listed, run = self._book.listed, self._book.run
         if listed is None:
             return Refused("no_mission", UNREMEMBERED)
-        if order.verb in DRIVING and self._observer.position.items == 0:
+        items = self._observer.position.items
+        if order.verb in DRIVING and items == 0:
             return Refused("no_mission", CLEARED)
-        if order.verb in DRIVING and run_on_vehicle(run, self._observer.position.items, listed) != run:
-            return Refused("mission_differs", REPLACED.format(self._observer.position.items, listed.end))
+        if order.verb in DRIVING and run.state == "READY" and is_replaced(items, listed):
+            return Refused("mission_differs", REPLACED.format(items, listed.end))
         wrong_origin = self._wrong_origin(listed) if order.verb in DRIVING else None
         if wrong_origin is not None:
             return wrong_origin

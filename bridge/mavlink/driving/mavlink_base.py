@@ -95,14 +95,15 @@ class MavlinkBase:
 
     def watch_takeover(self) -> Callable[[], str]:
         """Return what reports who takes the vehicle from now on, also by putting it on hold."""
-        watch, known = TakeoverWatch(self._autopilot, by_hold=True), [""]
+        watch, known = TakeoverWatch(self._autopilot, by_hold=True), ""
 
         def taken() -> str:
+            nonlocal known
             control = self._autopilot.control
-            if not known[0] and (why := watch.taken() or watch.steered()):
-                known[0] = self._blocked_by = control.mode_change() or why
+            if not known and (why := watch.taken() or watch.steered()):
+                known = self._blocked_by = control.mode_change() or why
                 control.accept_mode()
-            return known[0]
+            return known
 
         return taken
 

@@ -297,11 +297,15 @@ COUNTED_TOO = 1
 """Items by which two counts of one list may differ: a firmware may count home."""
 
 
+def is_replaced(items: int | None, listed: ListedMission) -> bool:
+    """True if the vehicle reports no items, or so many that they are not those of the list."""
+    return items is not None and (items == 0 or abs(items - listed.end) > COUNTED_TOO)
+
+
 def run_on_vehicle(run: Run, items: int | None, listed: ListedMission | None) -> Run:
-    """Return the run as reported; a ready mission is dropped if the vehicle reports no items, or others."""
-    if run.state != "READY" or items is None or listed is None:
-        return run
-    return Run() if items == 0 or abs(items - listed.end) > COUNTED_TOO else run
+    """Return the run as reported; a ready mission is dropped if its items are not on the vehicle."""
+    lies_ready = run.state == "READY" and listed is not None
+    return Run() if lies_ready and is_replaced(items, listed) else run
 
 
 def arrival_error_text(pose: Pose, run: Run, listed: ListedMission) -> str:

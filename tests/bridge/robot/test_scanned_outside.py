@@ -130,14 +130,16 @@ def test_a_scanner_that_sees_90_degrees_must_have_faced_as_planned(
     assert (f"s2 was scanned {words}." in capsys.readouterr().out) == bool(outside)
 
 
-def test_a_robot_that_does_not_turn_scans_nothing_with_a_scanner_that_sees_90_degrees() -> None:
+def test_a_robot_that_does_not_turn_scans_nothing_with_a_scanner_that_sees_90_degrees(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     field = Field()
     turned = field.base.goto
 
     def goto(path: Any, *, heading: float | None, **others: Any) -> Any:
         return turned(path, heading=None if heading is None else heading + 0.25, **others)
 
-    field.base.goto = goto  # type: ignore[method-assign]
+    monkeypatch.setattr(field.base, "goto", goto)
     field.station().push(narrow())
     field.order("start")
     field.work()

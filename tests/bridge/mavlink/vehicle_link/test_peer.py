@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import pytest
 
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.messages import station_beat
 from stopgo.bridge.mavlink.vehicle_link.peer import Newest, found, reached
 from stopgo.bridge.mavlink.vehicle_link.url import read_url
-from stopgo.bridge.mavlink.vehicle_link.wire import DOUBLED, Who, wire
+from stopgo.bridge.mavlink.vehicle_link.wire import DOUBLED, Who, Wire, wire
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots.generic import GENERIC
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
@@ -75,7 +78,9 @@ def test_of_several_vehicles_one_must_be_named() -> None:
             pass
 
 
-def test_two_vehicles_with_one_system_id_are_not_taken_for_one() -> None:
+@contextmanager
+def two_with_one_id() -> Iterator[tuple[Wire, Wire, Wire]]:
+    """A listening station, and two vehicles with the system id 1, of which the first one's heart beats."""
     port = free_port()
     out = read_url(f"udpout:127.0.0.1:{port}")
     with (
@@ -84,6 +89,11 @@ def test_two_vehicles_with_one_system_id_are_not_taken_for_one() -> None:
         wire(out, me=Who(1, 1)) as other,
     ):
         one.beat(vehicle_beat)
+        yield station, one, other
+
+
+def test_two_vehicles_with_one_system_id_are_not_taken_for_one() -> None:
+    with two_with_one_id() as (station, one, other):
         while not station.doubled(1):
             other.send(vehicle_beat())
             one.send(vehicle_beat())
@@ -95,21 +105,13 @@ def test_two_vehicles_with_one_system_id_are_not_taken_for_one() -> None:
 def test_a_second_vehicle_with_the_same_id_is_ignored_and_reported_once(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    port = free_port()
-    out = read_url(f"udpout:127.0.0.1:{port}")
-    with (
-        wire(read_url(f"udpin:127.0.0.1:{port}")) as station,
-        wire(out, me=Who(1, 1)) as one,
-        wire(out, me=Who(1, 1)) as other,
-    ):
-        one.beat(vehicle_beat)
-        with found(station) as peer:
-            armed = vehicle_beat()
-            armed.base_mode = dialect.MAV_MODE_FLAG_SAFETY_ARMED
-            while station.dropped[DOUBLED] < 5:
-                other.send(armed)
-                one.send(vehicle_beat())
-            assert not peer.armed
+    with two_with_one_id() as (station, one, other), found(station) as peer:
+        armed = vehicle_beat()
+        armed.base_mode = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        while station.dropped[DOUBLED] < 5:
+            other.send(armed)
+            one.send(vehicle_beat())
+        assert not peer.armed
     assert capsys.readouterr().err.count("note: two vehicles have the system id 1, at 127.0.0.1:") == 1
 
 
