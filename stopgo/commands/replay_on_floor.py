@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from stopgo.mission.console.table import printable
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def on_floor(replays: list[Replay], planned: PlannedFloor, clouds: Path | None) 
     found = []
     for item in replays:
         if why := unknown_headings(item):
-            typer.echo(f"{item.log.path}: what was visible is undecided: {why}", err=True)
+            _tell(f"{item.log.path}: what was visible is undecided: {why}")
         found.append(item if why else item.with_sight(as_driven(planned, item.scanned_from)))
     return [item.with_measured(_measured(planned, item, clouds)) for item in found]
 
@@ -72,11 +73,16 @@ def write_follow_up(replays: list[Replay], planned: PlannedFloor, others: list[M
 
     by_clouds = any(item.measured is not None and item.measured.decides for item in replays)
     if not by_clouds and any(item.sight is None for item in replays):
-        typer.echo(f"{path}: not written: it is not known what was visible", err=True)
+        _tell(f"{path}: not written: it is not known what was visible")
         return
     mission = _follow_up_of(replays, planned, others)
     if mission is None:
-        typer.echo(f"{path}: not written: all required targets were visible, or measured", err=True)
+        _tell(f"{path}: not written: all required targets were visible, or measured")
         return
     write(mission, path)
-    typer.echo(f"{path}: {len(mission.stops)} follow-up stops", err=True)
+    _tell(f"{path}: {len(mission.stops)} follow-up stops")
+
+
+def _tell(line: str) -> None:
+    """Print a line on stderr; a path in it may have any letters."""
+    typer.echo(printable(line), err=True)
