@@ -32,9 +32,8 @@ class Board:
         return np.maximum(0, self._cover.needed - self._reached)
 
     def state(self) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-        """Views that each column needs, shortage and penalty of each demand, gains by row: for a kernel."""
-        gains = np.ascontiguousarray(self._adds.T).ravel()
-        return self._left, self._cover.needed - self._reached, self.weight, gains
+        """Views that columns need, shortage and penalty of demands, gains by demand: for a kernel."""
+        return self._left, self._cover.needed - self._reached, self.weight, self._adds.ravel()
 
     def raise_penalties(self) -> None:
         """Raise the penalty of each unmet demand, so that the search leaves local minima."""

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.planner.geometry.index_ranges import distinct
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.knapsack_cuts import KnapsackCuts, tightened
 from stopgo.planner.selection.linear_programme import LinearProgramme, Solution
@@ -117,10 +118,10 @@ class _Ascent:
     def programme(self, part: IntArray) -> _Programme:
         """The programme of these columns, and of the demands to which only few columns add."""
         cover, worth = self._cover, self._problem.worth
-        demands = _marked(cover.adds_to[part].indices, len(cover.needed))
+        demands = distinct(cover.adds_to[part].indices, len(cover.needed))
         demands = demands[~self._is_wide[demands]]
-        others = np.setdiff1d(_marked(worth[demands].indices, cover.columns), part)
-        rows = _marked(cover.seen_by[part].indices, cover.rows)
+        others = np.setdiff1d(distinct(worth[demands].indices, cover.columns), part)
+        rows = distinct(cover.seen_by[part].indices, cover.rows)
         cost = np.concatenate([self._spare(rows, part), *self._gains(part, others, demands)])
         seen = cover.sees[rows][:, part].T.astype(float)
         scale = 1.0 / np.maximum(worth[demands].max(axis=1).toarray().ravel(), 1e-300)
@@ -205,7 +206,7 @@ def _parts(cover: Cover) -> Iterator[IntArray]:
 
 def _pairs(cover: Cover, parts: list[IntArray]) -> Iterator[list[IntArray]]:
     """The parts, the largest first, each with the next that few of its rows see, if there is one."""
-    rows = [_marked(cover.seen_by[part].indices, cover.rows) for part in parts]
+    rows = [distinct(cover.seen_by[part].indices, cover.rows) for part in parts]
     left = sorted(range(len(parts)), key=lambda k: -len(parts[k]))
     while left:
         one = left.pop(0)
@@ -222,11 +223,4 @@ def _pairs(cover: Cover, parts: list[IntArray]) -> Iterator[list[IntArray]]:
 
 def _seen_with(cover: Cover, columns: IntArray) -> IntArray:
     """All columns that the rows see which see any of these (n,)."""
-    return _marked(cover.sees[_marked(cover.seen_by[columns].indices, cover.rows)].indices, cover.columns)
-
-
-def _marked(numbers: IntArray, most: int) -> IntArray:
-    """Each of these numbers below `most` once, ascending."""
-    is_marked = np.zeros(most, dtype=bool)
-    is_marked[numbers] = True
-    return np.flatnonzero(is_marked)
+    return distinct(cover.sees[distinct(cover.seen_by[columns].indices, cover.rows)].indices, cover.columns)

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import BoolArray, IntArray
+from stopgo.planner.geometry.index_ranges import distinct
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.running_coverage import RunningCoverage
 
@@ -65,7 +66,7 @@ def _to_cover(cover: Cover, rows: IntArray) -> IntArray:
     A separator of a network is seen by rows of many rooms, which have nothing else in common.
     """
     columns = cover.columns_of_each(rows)
-    return np.unique(columns[cover.weight[columns] > 0])
+    return distinct(columns[cover.weight[columns] > 0], cover.columns)
 
 
 def _searched(
@@ -80,11 +81,11 @@ def _searched(
 def _problem_of(others: RunningCoverage, is_other: BoolArray, district: IntArray) -> tuple[Cover, IntArray]:
     """The problem that the other rows leave in a district, and the rows offered there (ascending)."""
     cover, missing = others.cover, others.missing
-    seen = np.unique(cover.columns_of_each(district))
+    seen = distinct(cover.columns_of_each(district), cover.columns)
     seers = cover.worths.seers(seen[others.left(seen) > 0])
     offered = np.union1d(seers[~is_other[seers]], district)
     sees = cover.sees[offered]
-    columns = np.unique(sees.indices)
+    columns = distinct(sees.indices, cover.columns)
     left = others.left(columns)
     columns, left = columns[left > 0], left[left > 0]
     demands = np.union1d([0], np.flatnonzero(missing))
@@ -94,9 +95,10 @@ def _problem_of(others: RunningCoverage, is_other: BoolArray, district: IntArray
 
 def _with_columns(matrix: csr_array, columns: IntArray) -> csr_array:
     """These columns (ascending) of a matrix, at no cost for all the others."""
-    place = np.searchsorted(columns, matrix.indices)
-    place[place == len(columns)] = 0
-    kept = columns[place] == matrix.indices if len(columns) else np.zeros(len(place), dtype=bool)
+    place_of = np.full(matrix.shape[1], -1, dtype=np.int32)
+    place_of[columns] = np.arange(len(columns))
+    place = place_of[matrix.indices]
+    kept = place >= 0
     counts = np.concatenate([[0], np.cumsum(kept)])
     return csr_array(
         (matrix.data[kept], place[kept], counts[matrix.indptr]), shape=(matrix.shape[0], len(columns))

@@ -39,20 +39,19 @@ def repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
 def by_kernel(kernel: Callable[..., int], cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
     """`repaired` by the kernel, compiled or as written."""
     board, most = Board(cover, rows), max(1, cover.most_demands)
+    many, demands = len(rows), len(cover.needed)
     chosen, free = np.array(rows, dtype=np.int64), np.ones(cover.rows, dtype=np.int64)
     free[chosen] = 0
 
-    def scratch(size: int) -> IntArray:
-        return np.zeros(size, dtype=np.int64)
+    def scratch(size: int, value: int = 0) -> IntArray:
+        return np.full(size, value, dtype=np.int64)
 
-    many = len(rows)
-    state = [*board.state(), chosen, free, scratch(TENURE), np.ones(cover.rows, dtype=np.int64)]
+    state = [*board.state(), chosen, free, scratch(TENURE), scratch(cover.rows, -1)]
     tables = [scratch(size) for size in (3 * many, many * most, many * most)]
-    tables += [scratch(many * cover.rows * most), scratch(cover.rows), scratch(4)]
-    demands = len(cover.needed)
-    others = [np.full(demands, -1, dtype=np.int64), scratch(3 * demands)]
+    tables += [scratch(many * demands, -1), np.zeros(many * cover.rows * most, dtype=np.int64)]
+    others = [scratch(demands, -1), scratch(cover.rows), scratch(5), scratch(3 * demands)]
     problem = (*cover.seen_columns, *cover.worths.runs_of_rows, *cover.worths.added)
-    met = kernel(swaps, most, *problem, *state, *tables, *others)
+    met = kernel(swaps, most, *problem, cover.asks, *state, *tables, *others)
     return np.sort(chosen) if met else None
 
 

@@ -154,16 +154,25 @@ class Worths:
         return self._entries(columns)[1]
 
     def seers(self, columns: IntArray) -> IntArray:
-        """Rows that see the columns, once for each column (n,)."""
-        return self._seers(columns)[1]
+        """Rows that see any of the columns, ascending (n,)."""
+        begin, end = self._runs(columns).T
+        rows = self._seen_by.rows + 1
+        within = np.cumsum(np.bincount(begin, minlength=rows) - np.bincount(end, minlength=rows))
+        return np.flatnonzero(within)
 
     def _seers(self, columns: IntArray) -> tuple[IntArray, IntArray]:
         """Number of rows that see each column (columns,), and these rows, column by column (n,)."""
-        first, ends = self.runs_of_rows
+        first = self.runs_of_rows[0]
         runs = first[columns + 1] - first[columns]
-        begin, end = ends.reshape(-1, 2)[ranges(first[columns], runs)].astype(np.int64).T
+        begin, end = self._runs(columns).T
         counts = np.bincount(np.repeat(np.arange(len(columns)), runs), end - begin, len(columns))
         return counts.astype(np.int64), ranges(begin, end - begin)
+
+    def _runs(self, columns: IntArray) -> IntArray:
+        """Runs of rows that see the columns, column by column (n, 2)."""
+        first, ends = self.runs_of_rows
+        runs = ranges(first[columns], first[columns + 1] - first[columns])
+        return ends.reshape(-1, 2)[runs].astype(np.int64)
 
 
 def _narrow(indices: NDArray[Any]) -> NDArray[np.int32]:

@@ -80,3 +80,14 @@ def test_a_covering_problem_that_is_done_with_is_freed_at_once() -> None:
         assert gone() is None
     finally:
         gc.enable()
+
+
+@pytest.mark.parametrize("count", [0, 1, 9])
+def test_seers_of_columns_are_the_rows_that_see_any_of_them(count: int) -> None:
+    for seed in range(5):
+        random = np.random.default_rng(seed)
+        sees = random.random((25, 30)) < 0.2
+        columns = np.sort(random.choice(30, count, replace=False))
+        matrix = csr_array(sees.astype(np.int8))
+        found = Worths(csr_array(np.ones((30, 1), np.int64)), Transposed(matrix)).seers(columns)
+        assert found.tolist() == np.flatnonzero(sees[:, columns].any(axis=1)).tolist()
