@@ -14,6 +14,7 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings.layer_kinds import layer_option
 from stopgo.mission.stages import NavigableSpace, Route
 from stopgo.mission.stages.figures import LEG_OVER_IGNORED
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.ring_index import RingIndex, areas_within
 from stopgo.planner.geometry.shapes import (
     HAIRLINE,
@@ -87,12 +88,13 @@ def legs_of(route: Route) -> tuple[BaseGeometry, ...]:
     return tuple(shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0]) for line in lines)
 
 
-def floor_of_rooms(space: NavigableSpace) -> list[float]:
+@instance_cached
+def floor_of_rooms(space: NavigableSpace) -> tuple[float, ...]:
     """Area in m² of each room's floor: an outline also over a void or beyond the slab counts less."""
     whole = room_shapes(space)
     inside = areas_within(np.array(whole, dtype=object), ground_of(space)).tolist()
     pairs = zip(whole, inside, strict=True)
-    return [on if shape.area - on > LEAST_OFF else shape.area for shape, on in pairs]
+    return tuple(on if shape.area - on > LEAST_OFF else shape.area for shape, on in pairs)
 
 
 def _little_reached(space: NavigableSpace, reached_m2: float) -> Iterator[Finding]:

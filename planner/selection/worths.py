@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.geometry.compiling import compiled
-from stopgo.planner.geometry.index_ranges import ranges
+from stopgo.planner.geometry.index_ranges import distinct, ranges
 from stopgo.planner.selection.worth_kernel import (
     add_worth,
     add_worth_by_row,
@@ -155,10 +155,11 @@ class Worths:
 
     def seers(self, columns: IntArray) -> IntArray:
         """Rows that see any of the columns, ascending (n,)."""
-        begin, end = self._runs(columns).T
-        rows = self._seen_by.rows + 1
-        within = np.cumsum(np.bincount(begin, minlength=rows) - np.bincount(end, minlength=rows))
-        return np.flatnonzero(within)
+        (begin, end), rows = self._runs(columns).T, self._seen_by.rows
+        if int((end - begin).sum()) < rows:
+            return distinct(ranges(begin, end - begin), rows)
+        begun, ended = (np.bincount(at, minlength=rows + 1) for at in (begin, end))
+        return np.flatnonzero(np.cumsum(begun - ended))
 
     def _seers(self, columns: IntArray) -> tuple[IntArray, IntArray]:
         """Number of rows that see each column (columns,), and these rows, column by column (n,)."""
