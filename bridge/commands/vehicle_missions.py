@@ -65,7 +65,7 @@ def push_mission(
         with if_stopped(say, lambda: NOTHING_SENT):
             url, peer = opened.enter_context(_peer(connection, autopilot))
         sent = made or qgc_plan.items_of(mission, replace(items, autopilot=peer.autopilot.name))
-        origin = check_pushable(url, peer, sent, consent, state=state, report=say)
+        origin = check_pushable(url, peer, mission, sent, consent, state=state, report=say)
         deviation = _path_deviation_note(peer, mission)
         if deviation:
             say(deviation)
@@ -106,7 +106,7 @@ def clear_mission(
     """Clear the mission on an autopilot, verify that it holds none, and store that in the logbook."""
     with _peer(connection, autopilot) as (url, peer), logbook(url, peer.who.system, state) as book:
         if not while_running:
-            check_run_over(peer, url, book, "to clear it")
+            check_run_over(peer, book, "to clear it")
         had = clear(peer, while_running=while_running, report=say)
         forget(book)
     if as_json:

@@ -88,7 +88,7 @@ class ExternalChanges:
         if run.over or run.state == "HELD":
             return None
         why = self._guard.difference(listed, run)
-        return runs.held(run, f"{why}; push it again (stopgo push)") if why else None
+        return runs.held(run, f"{why}; push it again (stopgo push), then retry") if why else None
 
     def _begun_elsewhere(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
         """Start the run, if the vehicle drives the list that it was sent without a start from here."""

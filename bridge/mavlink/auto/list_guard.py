@@ -132,7 +132,10 @@ class ListGuard:
         if not found:
             return ""
         more = f" (and {len(found) - SHOWN} more)" if len(found) > SHOWN else ""
-        return f"{self._by} has changed the vehicle's mission: {'; '.join(found[:SHOWN])}{more}"
+        change = f"{self._by} has changed the vehicle's mission"
+        if items == 0 and self._uploader is None:
+            change = "the vehicle has lost its mission in a restart, or somebody has cleared it"
+        return f"{change}: {'; '.join(found[:SHOWN])}{more}"
 
     @property
     def _by(self) -> str:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal
 
 import msgspec
+from msgspec.structs import replace
 
 from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
@@ -42,6 +43,8 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True):
     revision: int
     sha256: str
     """Digest of the items."""
+    digest: str = ""
+    """Digest of the mission; empty in a record of an earlier version."""
 
 
 class PackedItems(msgspec.Struct, frozen=True):
@@ -97,7 +100,7 @@ class Logbook:
         self.robot = robot
         self.clock = clock
         self.boots = VehicleBoots(journal)
-        self._address = address
+        self.address = address
         self.own_order: Ordered | None = None
         """The command that this process carries out; it counts before the journal has it."""
         self._listed: tuple[Sent, ListedMission] | None = None
@@ -124,7 +127,16 @@ class Logbook:
         items = self.journal.fact("items", PackedItems)
         assert stored is not None and items is not None
         mission = msgspec.json.decode(stored[1], type=Mission)
-        return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList), self._address)
+        return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList), self.address)
+
+    def was_sent(self, mission: Mission, sent: ItemList) -> bool:
+        """True if this very mission was the last that was sent, as this list."""
+        last, manifest = self.journal.fact("sent", Sent), None
+        if last is not None:
+            manifest = self.journal.missions.manifest(last.mission_id, last.revision)
+        if last is None or manifest is None:
+            return False
+        return replace(last, digest=last.digest or manifest.digest) == _record(mission, sent)
 
     def scanned_files(self, run: Run) -> frozenset[ScanFile]:
         """Name and sha256 of each scan that has counted in the run."""
@@ -215,16 +227,20 @@ def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
         mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
         sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
     )  # fmt: skip
-    packed = msgspec.msgpack.encode(sent)
-    record = Sent(mission_id=mission.id, revision=mission.revision, sha256=hashlib.sha256(packed).hexdigest())
     listed_mission(mission, sent)
     with book.journal.transaction():
         book.journal.missions.store(manifest, document)
         book.move(lambda run: () if run.over else (_replaced(run, "a mission was pushed to the vehicle"),))
         book.journal.store_fact("run", runs.installed(book.run, mission))
-        book.journal.store_fact("sent", record)
-        book.journal.store_fact("items", PackedItems(packed))
+        book.journal.store_fact("sent", _record(mission, sent))
+        book.journal.store_fact("items", PackedItems(msgspec.msgpack.encode(sent)))
         book.journal.forget_fact("pending")
+
+
+def _record(mission: Mission, sent: ItemList) -> Sent:
+    """Return the record of a mission; by its bytes a list equals itself, although it contains NaN."""
+    packed = hashlib.sha256(msgspec.msgpack.encode(sent)).hexdigest()
+    return Sent(mission_id=mission.id, revision=mission.revision, sha256=packed, digest=mission.digest)
 
 
 def forget(book: Logbook) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from stopgo.bridge.console import Progress
 from stopgo.bridge.mavlink.auto.logbook import logbook, remember
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
+from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import (
     NOTHING_SENT,
     LineReport,
@@ -22,6 +23,7 @@ from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.document import Mission
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
+from stopgo.mission.mavlink.read_back import differences
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,18 @@ class PushConsent:
 
 
 def check_pushable(
-    url: Url, peer: Peer, sent: ItemList, consent: PushConsent, *, state: Path | None, report: LineReport
+    url: Url,
+    peer: Peer,
+    mission: Mission,
+    sent: ItemList,
+    consent: PushConsent,
+    *,
+    state: Path | None,
+    report: LineReport,
 ) -> VehicleOrigin | None:
     """Check that a mission may be sent, and return the vehicle's origin; `None` if it was not compared.
+
+    The mission of a run that is not over may be sent to a vehicle that has lost it: the run goes on by it.
 
     Raises
     ------
@@ -45,7 +56,8 @@ def check_pushable(
     """
     if not consent.while_running:
         with logbook(url, peer.who.system, state) as book:
-            check_run_over(peer, url, book, "a push")
+            if not (book.was_sent(mission, sent) and differences(sent, download(peer))):
+                check_run_over(peer, book, "a push")
     check_mission_idle(peer, consent.while_running)
     with if_stopped(report, lambda: NOTHING_SENT):
         return None if consent.any_origin else check_origin(peer, sent.origin, set_it=consent.set_origin)
@@ -62,7 +74,9 @@ def send_and_remember(
     progress: Progress | None = None,
     report: LineReport = lambda line: None,
 ) -> Uploaded:
-    """Upload the items, see them there, and store them; a repeated push leaves the run as it is.
+    """Upload the items, see them there, and store them.
+
+    The run is left as it is if the vehicle held this very mission, or its run is not over and it had lost it.
 
     Raises
     ------
@@ -71,6 +85,7 @@ def send_and_remember(
     """
     done = upload(peer, sent, while_running=while_running, progress=progress, report=report)
     with logbook(url, peer.who.system, state) as book:
-        if not (done.already and book.listed is not None and book.listed.sent == sent):
+        is_kept = done.already or not book.run.over
+        if not (is_kept and book.was_sent(mission, sent)):
             remember(book, mission, sent)
     return done

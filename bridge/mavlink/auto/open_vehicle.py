@@ -210,7 +210,7 @@ class OpenVehicle(Station):
         consent = PushConsent(set_origin=self._set_origin, any_origin=options.consent.any_origin)
         with self._one:
             sent = items_of(mission, replace(Supplements(), autopilot=peer.autopilot.name))
-            check_pushable(self.url, peer, sent, consent, state=options.state, report=_say_nothing)
+            check_pushable(self.url, peer, mission, sent, consent, state=options.state, report=_say_nothing)
             done = send_and_remember(self.url, peer, mission, sent, state=options.state, progress=progress)
         return Accepted(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, already=done.already

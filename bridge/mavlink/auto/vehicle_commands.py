@@ -53,7 +53,9 @@ UNREMEMBERED = (
     "no record of a mission pushed to this vehicle; push one by the same URL,"
     " or name the folder of that push with --state"
 )
-CLEARED = "the vehicle reports no mission: somebody has cleared it; push it again"
+CLEARED = (
+    "the vehicle reports no mission: it has lost it in a restart, or somebody has cleared it; push it again"
+)
 REPLACED = (
     "the vehicle reports {} items, and {} were pushed: somebody has replaced them; push the mission again"
 )
