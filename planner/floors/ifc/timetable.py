@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from typing import Literal, get_args
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import bytes_of, rows_of
@@ -25,7 +26,19 @@ KNOWN = {
     ),
 }
 """Known column names for the GlobalId, a task's name and its days; the first match counts."""
-PARTS = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})(?:[ T].*)?")
+DAYS = ("start", "finish")
+Order = Literal["day/month/year", "month/day/year", "year/month/day"]
+ORDERS: tuple[Order, ...] = get_args(Order)
+"""Orders of the parts of a day without a year of four digits in front, the likeliest first."""
+USUAL: Mapping[str, tuple[Order, ...]] = {
+    "/": ORDERS,
+    "-": ("day/month/year", "year/month/day"),
+    ".": ("day/month/year",),
+}
+"""Orders that a separator leaves open, where no day of the file shows which it is."""
+YEAR_FIRST = re.compile(r"(\d{4})([-./])(\d{1,2})\2(\d{1,2})(?:[ T].*)?")
+YEAR_LAST = re.compile(r"(\d{1,2})([-./])(\d{1,2})\2(\d{4}|\d{1,2})(?:[ T].*)?")
+"""Days whose year has four digits, or two digits at either end."""
 
 
 @dataclass(frozen=True)
@@ -91,41 +104,53 @@ def _tasks(
         raise InputError(
             f"{path}: no row has a GlobalId; say which column it is: --schedule-column guid=NAME"
         )
-    day_first = _day_first((cell(row, key) for _, row in used for key in ("start", "finish")), path)
+    order = _order_of(((f"{path}: line {line}: {key}", cell(row, key)) for line, row in used for key in DAYS))
     found: dict[str, list[Task]] = defaultdict(list)
     for line, row in used:
-        start, finish = (
-            _day(cell(row, key), day_first, f"{path}: line {line}: {key}") for key in ("start", "finish")
-        )
+        start, finish = (_day(cell(row, key), order, f"{path}: line {line}: {key}") for key in DAYS)
         if start or finish:
             found[cell(row, "guid")].append(Task(cell(row, "task"), start, finish, source=path.name))
     return {guid: tuple(tasks) for guid, tasks in found.items()}
 
 
-def _day_first(cells: Iterable[str], path: Path) -> bool:
-    """True if days are written before months: shown by days over 12, else by the separator."""
-    written = [match for cell in cells if (match := PARTS.fullmatch(cell)) and len(match[1]) < 3]
-    if any(int(match[1]) > 12 for match in written):
-        return True
-    if any(int(match[3]) > 12 for match in written):
-        return False
-    if any(match[2] == "/" and match[1] != match[3] for match in written):
-        raise InputError(f"{path}: '{written[0][0]}' may be day/month or month/day; write days as YYYY-MM-DD")
-    return True
+def _order_of(cells: Iterable[tuple[str, str]]) -> Order:
+    """The order in which days are written: shown by the days themselves, else by the separator.
+
+    `cells` are the places of the texts, and the texts. A year of four digits in front needs no order.
+
+    Raises
+    ------
+    InputError
+        Naming the first day that can be read in two orders.
+    """
+    written = [(where, match) for where, cell in cells if (match := YEAR_LAST.fullmatch(cell))]
+    fitting = [order for order in ORDERS if all(_read(match, order) for _, match in written)]
+    for where, match in written:
+        likely = [order for order in fitting if order in USUAL[match[2]]]
+        if len({_read(match, order) for order in likely}) > 1:
+            orders = " or ".join(order if len(match[4]) == 2 else order[: -len("/year")] for order in likely)
+            raise InputError(f"{where} = '{legible(match[0])}' may be {orders}; write days as YYYY-MM-DD")
+    return fitting[0] if fitting else ORDERS[0]
 
 
-def _day(text: str, day_first: bool, what: str) -> str | None:
+def _read(match: re.Match[str], order: Order) -> date | None:
+    """A day whose parts are in this order; None if that is no day. Years of two digits begin with 20."""
+    parts = dict(zip(order.split("/"), (match[1], match[3], match[4]), strict=True))
+    year = parts["year"]
+    if len(year) not in (2, 4):
+        return None
+    try:
+        return date(int(year) + (2000 if len(year) == 2 else 0), int(parts["month"]), int(parts["day"]))
+    except ValueError:
+        return None
+
+
+def _day(text: str, order: Order, what: str) -> str | None:
     """A day as YYYY-MM-DD; None for an empty cell."""
     if not text:
         return None
-    match = PARTS.fullmatch(text)
-    try:
-        if match is None:
-            raise ValueError
-        first, second, third = int(match[1]), int(match[3]), int(match[4])
-        if len(match[1]) == 4:
-            return date(first, second, third).isoformat()
-        year = third if third > 99 else 2000 + third
-        return (date(year, second, first) if day_first else date(year, first, second)).isoformat()
-    except ValueError:
-        raise InputError(f"{what} = '{legible(text)}' is no day; write days as YYYY-MM-DD") from None
+    last, first = YEAR_LAST.fullmatch(text), YEAR_FIRST.fullmatch(text)
+    day = _read(last, order) if last else _read(first, "year/month/day") if first else None
+    if day is None:
+        raise InputError(f"{what} = '{legible(text)}' is no day; write days as YYYY-MM-DD")
+    return day.isoformat()

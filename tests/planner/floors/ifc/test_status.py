@@ -15,6 +15,7 @@ from stopgo.mission.floor import FloorPlan, Rank
 from stopgo.planner.floors.ifc.construction_dates import phases_by_product, tasks_by_product
 from stopgo.planner.floors.ifc.model import Task
 from stopgo.planner.floors.ifc.status import status_on
+from stopgo.planner.floors.ifc.timetable import read_timetable
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 
@@ -267,6 +268,11 @@ def test_a_schedule_whose_global_ids_lost_their_capitals_is_reported_as_unrelate
         ("guid,finish\nx,soon\n", "line 2: finish = 'soon' is no day; write days as YYYY-MM-DD"),
         ("guid,finish\nx,31-13-2024\n", "line 2: finish = '31-13-2024' is no day"),
         ("guid,finish\nx,3/4/2024\n", "'3/4/2024' may be day/month or month/day"),
+        ("guid,finish\nx,24-02-01\n", "line 2: finish = '24-02-01' may be day/month/year or year/month/day"),
+        ("guid,finish\nx,\ny,5/4/24\n", "line 3: finish = '5/4/24' may be day/month/year or month/day/year"),
+        ("guid,finish\nx,24-02-01\nx,45-02-01\nx,01-02-45\n", "'45-02-01' is no day"),
+        ("guid,finish\nx,1.2.202\n", "line 2: finish = '1.2.202' is no day; write days as YYYY-MM-DD"),
+        ("guid,finish\nx,1.2.4\n", "line 2: finish = '1.2.4' is no day"),
         ("guid,finish\n,2024-01-01\n", "no row has a GlobalId"),
         ("", "is empty; give a CSV"),
     ],
@@ -278,6 +284,28 @@ def test_a_schedule_that_cannot_be_used_is_refused_by_line(
     path.write_text(text)
     with pytest.raises(InputError, match=said):
         read(two_rooms(), date="2024-03-01", schedule=path)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        (["01.02.24"], ["2024-02-01"]),
+        (["31-5-2024"], ["2024-05-31"]),
+        (["2/13/2024", "3/4/2024"], ["2024-02-13", "2024-03-04"]),
+        (["24-02-01", "45-02-01"], ["2024-02-01", "2045-02-01"]),
+        (["24-02-01", "01-02-45"], ["2001-02-24", "2045-02-01"]),
+        (["24-02-01", "13-02-2024"], ["2001-02-24", "2024-02-13"]),
+        (["24-02-24", "2024-2-1 07:00"], ["2024-02-24", "2024-02-01"]),
+    ],
+)
+def test_the_days_of_a_schedule_show_the_order_in_which_they_are_written(
+    written: list[str], meant: list[str], tmp_path: Path
+) -> None:
+    """`24-02-01` alone was read as 2001-02-24."""
+    path = tmp_path / "work.csv"
+    path.write_text("\n".join(["guid,finish", *(f"{number},{day}" for number, day in enumerate(written))]))
+    tasks = read_timetable(path, {}).tasks
+    assert [tasks[str(number)][0].finish for number in range(len(written))] == meant
 
 
 def test_tasks_are_read_as_of_the_end_of_the_day() -> None:
