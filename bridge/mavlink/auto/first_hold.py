@@ -145,9 +145,24 @@ def _hold_of(book: Logbook) -> Mode | None:
     return None if listed is None else autopilot_named(listed.sent.autopilot).modes.hold
 
 
-def note_order(url: Url, systems: tuple[int, ...], state: Path | None, verb: Verb, by: str) -> None:
-    """Note in the logbooks who has commanded HOLD, so that a watch does not take it for somebody else's."""
-    for system in systems:
-        with suppress(InputError), logbook(url, system, state, make=False) as book:
-            until_ns = book.clock.now_ns() + ORDERING_NS
-            book.journal.store_fact("ordered", ordered_by(verb, by, until_ns=until_ns))
+@contextmanager
+def noted_order(
+    url: Url, systems: tuple[int, ...], state: Path | None, verb: Verb, by: str
+) -> Iterator[None]:
+    """Note in the logbooks who has commanded HOLD, so that a watch does not take it for somebody else's.
+
+    If the block fails, nobody carries the command out any more: what the vehicle then reports counts again.
+    """
+
+    def note(for_ns: int) -> None:
+        for system in systems:
+            with suppress(InputError), logbook(url, system, state, make=False) as book:
+                until_ns = book.clock.now_ns() + for_ns
+                book.journal.store_fact("ordered", ordered_by(verb, by, until_ns=until_ns))
+
+    note(ORDERING_NS)
+    try:
+        yield
+    except BaseException:
+        note(0)
+        raise

@@ -21,7 +21,7 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import Accepted, KeyExpressions
 from stopgo.bridge.mavlink.auto.commanded_standstill import stand
 from stopgo.bridge.mavlink.auto.confirmed_commands import Denied
-from stopgo.bridge.mavlink.auto.first_hold import held_first, note_order
+from stopgo.bridge.mavlink.auto.first_hold import held_first, noted_order
 from stopgo.bridge.mavlink.auto.mission_push import PushConsent, check_pushable, send_and_remember
 from stopgo.bridge.mavlink.auto.vehicle_commands import HOMEWARD
 from stopgo.bridge.mavlink.auto.vehicle_station import COMPONENTS, Options, served_on
@@ -145,8 +145,10 @@ class OpenVehicle(Station):
             raise RobotUnreachable(f"{self.url}: HOLD was not sent: {self.trouble}")
         if peer is not None:
             return _stand(peer, self.timeout_s)
-        with held_first(opened, self.url, vehicle=options.vehicle, state=options.state) as hold:
-            note_order(self.url, hold.systems, options.state, verb, self.commander)
+        with (
+            held_first(opened, self.url, vehicle=options.vehicle, state=options.state) as hold,
+            noted_order(self.url, hold.systems, options.state, verb, self.commander),
+        ):
             if not self._await_data():
                 raise RobotUnreachable(f"{self.url}: no data within {self.timeout_s:g} s; nothing was sent")
 

@@ -19,7 +19,7 @@ from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.mavlink.auto.auto_runner import AutoRunner
 from stopgo.bridge.mavlink.auto.commanded_standstill import stand
 from stopgo.bridge.mavlink.auto.confirmed_commands import Denied
-from stopgo.bridge.mavlink.auto.first_hold import held_first, note_order
+from stopgo.bridge.mavlink.auto.first_hold import held_first, noted_order
 from stopgo.bridge.mavlink.auto.logbook import logbook, name_of
 from stopgo.bridge.mavlink.auto.vehicle_commands import Consent
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, found
@@ -90,16 +90,18 @@ def _stopped(opened: Wire, url: Url, options: Options, verb: Verb) -> Iterator[P
         If HOLD was sent and a standstill is not confirmed.
     """
     by = options.commander or whoami()
-    with held_first(opened, url, vehicle=options.vehicle, state=options.state) as hold:
-        note_order(url, hold.systems, options.state, verb, by)
-        with found(opened, hold.vehicle, timeout_s=options.timeout_s) as peer:
-            try:
-                stand(peer, patience_s=options.timeout_s, report=say)
-            except Denied as denied:
-                raise NegativeResult(f"{peer}: denied: {denied}", reason="denied") from None
-            say(f"{peer}: stationary, in mode HOLD, as it reports")
-            hold.close()
-            yield peer
+    with (
+        held_first(opened, url, vehicle=options.vehicle, state=options.state) as hold,
+        noted_order(url, hold.systems, options.state, verb, by),
+        found(opened, hold.vehicle, timeout_s=options.timeout_s) as peer,
+    ):
+        try:
+            stand(peer, patience_s=options.timeout_s, report=say)
+        except Denied as denied:
+            raise NegativeResult(f"{peer}: denied: {denied}", reason="denied") from None
+        say(f"{peer}: stationary, in mode HOLD, as it reports")
+        hold.close()
+        yield peer
 
 
 @contextmanager

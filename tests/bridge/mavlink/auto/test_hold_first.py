@@ -28,6 +28,7 @@ from tests.bridge.mavlink.scripted import Scripted
 from tests.called import stopgo
 from tests.faults.sizes import some
 from tests.mission.mavlink.following.worlds import told
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -254,3 +255,15 @@ def test_the_note_of_a_stop_ends_with_it(tmp_path: Path) -> None:
         assert ordered(site, "abort").returncode == 0
     with site.book() as book:
         assert isinstance(book, Logbook) and book.journal.fact("ordered", Ordered) is None
+
+
+def test_the_note_of_a_stop_of_unknown_outcome_ends_with_it(tmp_path: Path) -> None:
+    """For 20 s more `status` printed the state before the stop, and every other command was refused."""
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+    assert ordered(site, "abort", "--timeout", "1").returncode == 3
+    with site.up(), site.reached(looks_only=True) as station:
+        wait_until(lambda: station.status().state == "PAUSED")
+    with site.up():
+        assert site.order("resume", take_over=True).state == "RUNNING"
