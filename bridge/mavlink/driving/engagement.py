@@ -86,7 +86,9 @@ class Engagement:
         end_if(self._not_ready() or self._control.mode_change())
         self._boots = self._peer.boots
         if not self._peer.armed:
+            end_if(self._control.disarming() if self._control.is_disarmed_at_work else "")
             self._arm(interrupt)
+        self._control.begin_work()
         with self._autopilot.setpoints.standing_at(self._telemetry.position()):
             self._guide(interrupt)
 
@@ -101,12 +103,14 @@ class Engagement:
             self._control.known_mode = None
             self.begin(interrupt)
             return True
+        self._control.note_armed()
         end_if(self._control.mode_change() or self._control.disarming() or self._control.other_hands())
         self._last_position = self._telemetry.position()
         return was_late
 
     def release(self) -> None:
         """Hold after a drive that ended early, unless somebody else has the vehicle; await standstill."""
+        self._control.accept_disarming()
         if self._control.is_changed and not self._telemetry.why_unknown():
             self._control.accept_mode()
         else:

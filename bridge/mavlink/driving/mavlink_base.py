@@ -90,7 +90,7 @@ class MavlinkBase:
     def take_hold(self, why: str) -> bool:
         """Take the hold as known, for the run is paused for it; a failsafe then must end before a drive."""
         self._blocked_by = why
-        self._autopilot.control.accept_mode()
+        self._accept_change()
         return True
 
     def watch_takeover(self) -> Callable[[], str]:
@@ -100,12 +100,16 @@ class MavlinkBase:
         def taken() -> str:
             nonlocal known
             control = self._autopilot.control
-            if not known and (why := watch.taken() or watch.steered()):
+            if not known and (why := watch.taken() or watch.steered() or watch.disarmed()):
                 known = self._blocked_by = control.mode_change() or why
-                control.accept_mode()
+                self._accept_change()
             return known
 
         return taken
+
+    def _accept_change(self) -> None:
+        self._autopilot.control.accept_mode()
+        self._autopilot.control.accept_disarming()
 
     def blocked_by(self) -> str:
         return self._blocked_by
@@ -129,4 +133,5 @@ class MavlinkBase:
         return "arrived"
 
     def stop(self) -> None:
+        self._autopilot.control.accept_disarming()
         self._autopilot.control.stop()

@@ -71,6 +71,10 @@ class StandstillWatch:
         self._look()
         return self._motion.why
 
+    def disarmed(self) -> str:
+        """Return who has disarmed the vehicle; empty if nobody has."""
+        return self._takeover.disarmed()
+
     def _look(self) -> None:
         """Take the present pose, in the vehicle's own frame; a late one says nothing."""
         telemetry = self._autopilot.telemetry
@@ -90,7 +94,7 @@ class MavlinkScanner:
         self._clock = clock
         self._trigger = trigger
         self.pause: Callable[[str], bool] = lambda why: False
-        """Pauses the run for a hold that somebody else commands during a scan; true if it is paused then."""
+        """Pauses the run for a hold or disarming by somebody else during a scan; true if paused then."""
         self._numbers: dict[str, int] = {}
         self._tolerances_m: dict[str, float] = {}
         self._camera: Who | None = None
@@ -226,7 +230,7 @@ class MavlinkScanner:
         asked_s, until_s = times_s[0] - AGAIN_S, times_s[1]
         reported = False
         while not (interrupt.is_set() or watch.why()) and (left := until_s - self._now_s()) > 0:
-            reported = reported or self._report_hold()
+            reported = reported or self._report_change(watch)
             message = waiting.get(min(LOOK_S, left))
             if message is not None and self._is_new(message, next_index):
                 return message
@@ -235,10 +239,13 @@ class MavlinkScanner:
                 self._request_picture(next_index)
         return None
 
-    def _report_hold(self) -> bool:
-        """Report a hold that somebody else has commanded; the scan goes on, for the vehicle stands."""
+    def _report_change(self, watch: StandstillWatch) -> bool:
+        """Report whoever has put the vehicle on hold, or disarmed it; the scan goes on, for it stands."""
         control = self._autopilot.control
-        return control.is_put_on_hold and (self.pause(control.mode_change()) or True)
+        change = control.mode_change() if control.is_put_on_hold else watch.disarmed()
+        if change:
+            self.pause(change)
+        return bool(change)
 
     def _is_new(self, message: Message, next_index: int | None) -> bool:
         """True at the first report of a picture of this vehicle; the picture counts as reported then."""

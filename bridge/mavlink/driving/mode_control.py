@@ -26,6 +26,8 @@ STOP_S = 2.5
 """Longest wait of `stop` for the vehicle to show hold; the command is repeated after that, too."""
 GUARD_S = 10.0
 """A hold that shows within this time after the guard's stop is the guard's."""
+WORKED_S = 10.0
+"""A vehicle that was seen armed so short a time ago was disarmed during the robot's work."""
 IN_FLIGHT_S = 0.3
 """A heartbeat that comes this soon after a command may have been sent before it."""
 
@@ -47,6 +49,10 @@ class ModeControl:
         self._guard_stop_s = -math.inf
         self._stop_pending = threading.Event()
         self._stop_sent_s = 0.0
+        self._armed_s = -math.inf
+        """Time at which the vehicle was last seen armed while the robot worked."""
+        self._armed_boots = 0
+        """Number of its restarts when the robot last began to drive: a restart disarms it, too."""
 
     # Reported mode
 
@@ -114,6 +120,25 @@ class ModeControl:
     def disarming(self) -> str:
         """Report a disarmed autopilot, and who disarmed it; empty if it is armed."""
         return "" if self._peer.armed else f"the autopilot was disarmed by {self._author('arming')}"
+
+    def note_armed(self) -> None:
+        """Note that the robot works with an armed vehicle; a heartbeat may be from before a restart."""
+        if self._peer.armed and self._peer.boots == self._armed_boots:
+            self._armed_s = time.monotonic()
+
+    def begin_work(self) -> None:
+        """Note that the robot begins to drive the vehicle, which is armed."""
+        self._armed_s, self._armed_boots = time.monotonic(), self._peer.boots
+
+    def accept_disarming(self) -> None:
+        """Take a disarmed vehicle as known: who commands to go on may have it armed again."""
+        self._armed_s = -math.inf
+
+    @property
+    def is_disarmed_at_work(self) -> bool:
+        """True if the vehicle was disarmed while the robot worked with it, and not by a restart."""
+        is_recent = time.monotonic() - self._armed_s < WORKED_S
+        return not self._peer.armed and is_recent and self._peer.boots == self._armed_boots
 
     def other_hands(self, within_s: float = JUST_NOW_S) -> str:
         """Report whoever else has steered the vehicle in the guided mode; empty if none was heard."""

@@ -1,4 +1,4 @@
-"""Watch for somebody who takes the vehicle while it stands at a stop: by its mode, or by set points."""
+"""Watch for somebody who takes the vehicle while it stands at a stop: by mode, set points or disarming."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ class TakeoverWatch:
         self._taken_s: float | None = None
         """Time since when a mode is reported in which somebody else drives, or that a restart brought."""
 
+        self._disarmed_s: float | None = None
+        """Time since when it is reported as disarmed, by somebody or by a restart."""
+
     @property
     def is_restarted(self) -> bool:
         return self._autopilot.peer.boots != self._boots
@@ -38,6 +41,15 @@ class TakeoverWatch:
     def steered(self) -> str:
         """Return who steers the vehicle in the guided mode; empty if nobody was heard."""
         return self._autopilot.control.other_hands(time.monotonic() - self._began_s)
+
+    def disarmed(self) -> str:
+        """Return who has disarmed the vehicle; empty if nobody has."""
+        control = self._autopilot.control
+        control.note_armed()
+        is_off = control.is_disarmed_at_work
+        self._disarmed_s = (self._disarmed_s or time.monotonic()) if is_off else None
+        lasts = self._disarmed_s is not None and time.monotonic() - self._disarmed_s >= BOOT_SHOWS_S
+        return control.disarming() if lasts else ""
 
     def _mode_taken(self) -> str:
         control = self._autopilot.control

@@ -99,7 +99,10 @@ class Camera:
     def is_changed(self) -> bool:
         return bool(self.switched)
 
-    is_put_on_hold = False
+    is_put_on_hold = is_disarmed_at_work = False
+
+    def note_armed(self) -> None:
+        """Nobody disarms it."""
 
     def other_hands(self, within_s: float) -> str:
         return ""
