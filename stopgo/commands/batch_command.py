@@ -254,7 +254,7 @@ class BatchProgress:
 
     def show(self) -> None:
         """Name what runs, and the time that is left."""
-        done = f"{len(self._spans)} of {self._total} planned"
+        done = f"{len(self._spans) - self._failed} of {self._total} planned"
         failed = f", {self._failed} failed" if self._failed else ""
         now = time.monotonic()
         names = ", ".join(f"{name} {duration(now - begun)}" for name, begun in self._begun.items())

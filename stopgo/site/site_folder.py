@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from stopgo.mission.files.mission_json import read
 
 FLOORS = (".dxf", ".ifc", ".ifczip", ".ifcxml")
 MOST_FILES, MOST_FOLDERS = 500, 5000
+"""Most floors, and most missions, that a page lists; most folders that are looked into."""
 LONGEST_NAME = 1024
 
 
@@ -46,7 +49,8 @@ class SiteFiles:
 
     def plain(self, text: str) -> str:
         """Return a text with the folder's files by their names in it: where it lies is nobody's business."""
-        return text.replace(f"{self.root}{os.sep}", "")
+        inside = text.replace(f"{self.root}{os.sep}", "")
+        return re.sub(rf"{re.escape(str(self.root))}(?![\w.-])", "the site's folder", inside)
 
     def path(self, name: str) -> Path:
         """Return the path of a name in the folder, whether it exists or not; links must stay inside, too."""
@@ -67,26 +71,39 @@ class SiteFiles:
         return path.relative_to(self.root).as_posix()
 
     def floors(self) -> list[str]:
-        """Return the floors' files, by name."""
-        return [name for name in self._files() if name.lower().endswith(FLOORS) or _is_robots_map(name)]
+        """Return the floors' files, by name.
+
+        Raises
+        ------
+        InputError
+            If the folder is not there any more.
+        """
+        return sorted(name for name in self._walk() if _is_floor(name))[:MOST_FILES]
 
     def missions(self) -> list[dict[str, Any]]:
-        """Return the missions in the folder, the newest first."""
-        found = []
-        for name in self._files():
-            if Path(name).name.startswith("mission") and name.endswith(".json"):
-                path = self.root / name
-                try:
-                    found.append((path.stat().st_mtime, name, read(path)))
-                except (InputError, OSError):
-                    continue
-        found.sort(key=lambda item: (-item[0], item[1]))
-        return [_mission_json(name, mission) for _, name, mission in found]
+        """Return the missions in the folder, the newest first.
 
-    def _files(self) -> list[str]:
-        return sorted(self._walk())[:MOST_FILES]
+        Raises
+        ------
+        InputError
+            If the folder is not there any more.
+        """
+        files = []
+        for name in self._walk():
+            if Path(name).name.startswith("mission") and name.endswith(".json"):
+                with suppress(OSError):
+                    files.append((-(self.root / name).stat().st_mtime, name))
+        found = []
+        for _, name in sorted(files)[:MOST_FILES]:
+            with suppress(InputError, OSError):
+                found.append(_mission_json(name, read(self.root / name)))
+        return found
 
     def _walk(self) -> Iterator[str]:
+        if not self.root.is_dir():
+            raise InputError(
+                "the site's folder is not there; bring it back, or start stopgo site with another"
+            )
         for count, (folder, below, names) in enumerate(os.walk(self.root)):
             below[:] = sorted(name for name in below if not name.startswith("."))
             if count >= MOST_FOLDERS:
@@ -94,6 +111,10 @@ class SiteFiles:
             for name in names:
                 if not name.startswith(".") and Path(folder, name).is_file():
                     yield self.name_of(Path(folder, name))
+
+
+def _is_floor(name: str) -> bool:
+    return name.lower().endswith(FLOORS) or _is_robots_map(name)
 
 
 def _is_robots_map(name: str) -> bool:

@@ -1,0 +1,53 @@
+"""Lists of a site's folder: what they hold among many files, and what is said of a folder that is gone."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from stopgo.mission.document import with_digest
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.mission_json import write
+from stopgo.site.site_folder import MOST_FILES, SiteFiles
+from tests.bridge.world import corridor
+
+
+def test_recordings_do_not_push_floors_and_missions_out_of_the_lists(tmp_path: Path) -> None:
+    """The first 500 files of any kind were listed, by name."""
+    for number in range(MOST_FILES + 1):
+        (tmp_path / f"run-{number:04d}.rrd").touch()
+    (tmp_path / "storey.dxf").touch()
+    (tmp_path / "tower").mkdir()
+    write(corridor(), tmp_path / "tower" / "mission.json")
+    files = SiteFiles.at(tmp_path)
+    assert files.floors() == ["storey.dxf"]
+    assert [mission["file"] for mission in files.missions()] == ["tower/mission.json"]
+
+
+def test_of_too_many_missions_the_newest_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stopgo.site.site_folder.MOST_FILES", 2)
+    for age, name in enumerate(("mission-c", "mission-b", "mission-a")):
+        made = with_digest(msgspec.structs.replace(corridor(), name=name))
+        write(made, tmp_path / f"{name}.json")
+        os.utime(tmp_path / f"{name}.json", (1e9 - age, 1e9 - age))
+    assert [mission["name"] for mission in SiteFiles.at(tmp_path).missions()] == ["mission-c", "mission-b"]
+
+
+def test_a_folder_that_is_gone_is_not_an_empty_one(tmp_path: Path) -> None:
+    folder = tmp_path / "site"
+    folder.mkdir()
+    files = SiteFiles.at(folder)
+    folder.rmdir()
+    for listed in (files.floors, files.missions):
+        with pytest.raises(InputError, match="the site's folder is not there"):
+            listed()
+
+
+def test_a_message_does_not_say_where_the_folder_is(tmp_path: Path) -> None:
+    files = SiteFiles.at(tmp_path)
+    assert files.plain(f"{tmp_path}: not a folder") == "the site's folder: not a folder"
+    assert files.plain(f"{tmp_path}{os.sep}a.rrd: damaged") == "a.rrd: damaged"
+    assert files.plain(f"{tmp_path}-old: kept") == f"{tmp_path}-old: kept"
