@@ -126,6 +126,22 @@ def second_person(world: BrowserWorld, tab: Tab) -> None:
         theirs.close()
 
 
+def test_a_folder_that_is_gone_is_said_to_be_gone(world: BrowserWorld) -> None:
+    """It was shown as a folder without missions."""
+    away = world.folder.with_name("away")
+    tab = world.chromium.tab(world.own)
+    state_is(tab, "r2", "idle", "ready", "finished", "paused", "aborted")
+    world.folder.rename(away)
+    try:
+        tab.press("Push mission", card("r2", "button"))
+        tab.shows("the site's folder is not there", card("r2", ".question"))
+        tab.run("location.hash = '#plan'")
+        tab.shows("the site's folder is not there", "main")
+    finally:
+        away.rename(world.folder)
+        tab.close()
+
+
 def test_a_server_that_was_away_misses_nothing(world: BrowserWorld) -> None:
     """The run goes on, and the page catches up every event once the server is there again."""
     with world.tab() as tab:

@@ -90,7 +90,8 @@ function fault(question, error) {
 
 async function offerMissions(name, question) {
   if (question.firstChild) return fill(question);
-  const { missions } = await read("/api/folder").catch(() => ({ missions: [] }));
+  const { missions, error } = await read("/api/folder").catch((error) => ({ error }));
+  if (error) return fill(question, h("p", { class: "bad", role: "alert" }, error.message));
   if (!missions.length) return fill(question, h("p", {}, t("no_missions")));
   const list = h("select", { "aria-label": t("mission_to_push") }, missions.map((one) =>
     h("option", { value: one.file }, t("mission_choice", { ...one, time: duration(one.total_s) }))));

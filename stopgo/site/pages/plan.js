@@ -37,7 +37,9 @@ export function makePlan(main, me) {
 }
 
 async function makeForm(view) {
-  const [{ floors }, { options }] = await Promise.all([read("/api/folder"), read("/api/plan-options")]);
+  const [{ floors, error }, { options }] = await Promise.all([
+    read("/api/folder").catch((error) => ({ error })), read("/api/plan-options")]);
+  if (error) return say(view.note, error.message);
   if (!floors.length) return say(view.note, t("no_floors"));
   const floor = h("select", { id: "floor", onchange: () => otherFloor(view) },
     floors.map((name) => h("option", { value: name, selected: name === chosen.floor }, name)));
