@@ -47,7 +47,7 @@ def check_pushable(
 ) -> VehicleOrigin | None:
     """Check that a mission may be sent, and return the vehicle's origin; `None` if it was not compared.
 
-    The mission of a run that is not over may be sent to a vehicle that has lost it: the run goes on by it.
+    The mission of a run that is held or paused may be sent to a vehicle that has lost it: the run goes on.
 
     Raises
     ------
@@ -56,7 +56,8 @@ def check_pushable(
     """
     if not consent.while_running:
         with logbook(url, peer.who.system, state) as book:
-            if not (book.was_sent(mission, sent) and differences(sent, download(peer))):
+            is_held = book.run.state in ("HELD", "PAUSED")
+            if not (is_held and book.was_sent(mission, sent) and differences(sent, download(peer))):
                 check_run_over(peer, book, "a push")
     check_mission_idle(peer, consent.while_running)
     with if_stopped(report, lambda: NOTHING_SENT):
