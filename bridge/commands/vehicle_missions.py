@@ -106,7 +106,7 @@ def clear_mission(
     """Clear the mission on an autopilot, verify that it holds none, and store that in the logbook."""
     with _peer(connection, autopilot) as (url, peer), logbook(url, peer.who.system, state) as book:
         if not while_running:
-            check_run_over(peer, book, "to clear it")
+            check_run_over(str(peer), book, "to clear it")
         had = clear(peer, while_running=while_running, report=say)
         forget(book)
     if as_json:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from stopgo.bridge.mavlink.auto.logbook import Logbook
-from stopgo.bridge.mavlink.vehicle_link.peer import Peer
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.tolerance import stops_outside_text
 
 
-def check_run_over(peer: Peer, book: Logbook, what: str) -> None:
+def check_run_over(vehicle: str, book: Logbook, what: str) -> None:
     """Refuse to replace the mission of a run that somebody may want to go on with.
 
     Raises
@@ -24,8 +23,8 @@ def check_run_over(peer: Peer, book: Logbook, what: str) -> None:
     stops = f"{len(run.done)} of {len(mission.stops)} stops done{outside}"
     seen = ", unless stopgo watch shows that it has ended" if run.state == "RUNNING" else ""
     raise NegativeResult(
-        f"{peer}: run {run.run_id} of {mission.name} ({mission.id[:12]}) is {run.state}, {stops}, and {what}"
-        f" would end it; end it first (stopgo abort{book.address}){seen}, or add --while-running;"
+        f"{vehicle}: run {run.run_id} of {mission.name} ({mission.id[:12]}) is {run.state}, {stops},"
+        f" and {what} would end it; end it first (stopgo abort{book.address}){seen}, or add --while-running;"
         " nothing was sent",
         reason="running",
     )

@@ -93,13 +93,13 @@ def test_a_mission_that_was_cleared_is_forgotten_and_its_run_over(tmp_path: Path
 def test_a_mission_is_not_taken_from_under_a_run(state: str, tmp_path: Path) -> None:
     mission = tour()
     with logbook(URL, 1, tmp_path) as book:
-        check_run_over("it", book, "a push")  # type: ignore[arg-type]
+        check_run_over("it", book, "a push")
         remember(book, mission, translate(mission, "px4"))
-        check_run_over("it", book, "a push")  # type: ignore[arg-type]
+        check_run_over("it", book, "a push")
         book.move(lambda run: (started(run, run_id="r7", now_ns=0, by="me"),))
         book.move(lambda run: (Change(changed(run, state=state, done=("S1",))),))  # type: ignore[arg-type]
         with pytest.raises(NegativeResult) as no:
-            check_run_over("it", book, "a push")  # type: ignore[arg-type]
+            check_run_over("it", book, "a push")
     said = str(no.value)
     assert f"run r7 of room (0123456789ab) is {state}, 1 of 3 stops done, and a push would end it" in said
     assert (

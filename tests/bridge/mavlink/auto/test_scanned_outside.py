@@ -153,7 +153,7 @@ def test_a_push_names_the_stops_of_the_run_in_its_way_that_were_scanned_from_els
         found_peer(site.url, vehicle=1) as peer,
         pytest.raises(NegativeResult, match=r"1 of 3 stops done \(1 scanned outside tolerance: S1\)"),
     ):
-        check_run_over(peer, book, "a push")
+        check_run_over(str(peer), book, "a push")
 
 
 def heard(peer: Peer, name: str) -> None:
