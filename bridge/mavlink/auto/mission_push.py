@@ -54,13 +54,13 @@ def check_pushable(
     NegativeResult
         If a run is not over, the vehicle follows a mission, or its origin is another.
     """
-    if not consent.while_running:
-        with logbook(url, peer.who.system, state) as book:
-            is_held = book.run.state in ("HELD", "PAUSED")
-            if not (is_held and book.was_sent(mission, sent) and differences(sent, download(peer))):
-                check_run_over(str(peer), book, "a push")
-    check_mission_idle(peer, consent.while_running)
     with if_stopped(report, lambda: NOTHING_SENT):
+        if not consent.while_running:
+            with logbook(url, peer.who.system, state) as book:
+                is_held = book.run.state in ("HELD", "PAUSED")
+                if not (is_held and book.was_sent(mission, sent) and differences(sent, download(peer))):
+                    check_run_over(str(peer), book, "a push")
+        check_mission_idle(peer, consent.while_running)
         return None if consent.any_origin else check_origin(peer, sent.origin, set_it=consent.set_origin)
 
 

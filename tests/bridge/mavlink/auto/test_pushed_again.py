@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from msgspec.structs import replace
 
+from stopgo.bridge.mavlink.auto import mission_push
 from stopgo.bridge.mavlink.auto.logbook import logbook, remember
 from stopgo.bridge.mavlink.auto.mission_push import PushConsent, check_pushable, send_and_remember
-from stopgo.bridge.mavlink.transfer.upload import Uploaded, clear
-from stopgo.bridge.mavlink.vehicle_link.peer import reached
+from stopgo.bridge.mavlink.transfer.upload import NOTHING_SENT, Uploaded, clear
+from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.mission.document import Mission, with_digest
-from stopgo.mission.errors import NegativeResult
+from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.translate import translate
 from tests.bridge.mavlink.auto.site import KINDS, Site, real_tour, until
 from tests.faults.sizes import some
@@ -72,6 +74,32 @@ def test_a_run_keeps_the_list_that_its_vehicle_holds(tmp_path: Path) -> None:
         with pytest.raises(NegativeResult, match="a push would end it"):
             pushed(site, site.mission)
         assert pushed(site, site.mission, while_running=True).already
+    assert (site.run.state, site.run.done) == ("PAUSED", ("S1",))
+
+
+@pytest.mark.parametrize("end", [KeyboardInterrupt, RobotUnreachable])
+def test_a_push_that_ends_while_it_reads_the_vehicle_has_changed_nothing(
+    end: type[BaseException], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C ended it without a line on what was sent."""
+
+    def ended(peer: Peer) -> NoReturn:
+        raise end("no data")
+
+    site, said = Site(tmp_path, "ardupilot"), list[str]()
+    sent = translate(site.mission, KINDS[site.profile])
+    monkeypatch.setattr(mission_push, "download", ended)
+    with paused_after_a_scan(site), reached(site.url, vehicle=1) as peer, pytest.raises(end):
+        check_pushable(
+            site.url,
+            peer,
+            site.mission,
+            sent,
+            PushConsent(),
+            state=site.folder / "station",
+            report=said.append,
+        )
+    assert said == ([NOTHING_SENT] if end is KeyboardInterrupt else [])
     assert (site.run.state, site.run.done) == ("PAUSED", ("S1",))
 
 
