@@ -1,4 +1,4 @@
-"""Ranges of indices, one after the other."""
+"""Ranges of indices, one after the other; and indices without repetition."""
 
 from __future__ import annotations
 

@@ -220,7 +220,7 @@ def shortfall(
     row: int, opened: int, common: Any, least: int, asked: Any, weight: Any, gain: Any, regained: Any,
     open_: Any,
 ) -> int:  # fmt: skip
-    """Add to the shortfall `total` what demands are shorter by a leaving; some sum above `least` if it is."""
+    """Return the shortfall with a row added after a leaving; some sum above `least` if it is above."""
     rows, total = len(common), common[row]
     for k in range(opened):
         before = asked[open_[3 * k]] - gain[open_[3 * k] * rows + row]
