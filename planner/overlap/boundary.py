@@ -28,6 +28,7 @@ from stopgo.planner.geometry.shapes import (
     whole_steps,
     whole_steps_of,
 )
+from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.overlap.surfaces import smooth_surfaces
 from stopgo.planner.space.targets import units_on, without_needless_vertices
 from stopgo.planner.visibility.exact_sight import open_space_around, viewpoints_of
@@ -54,7 +55,9 @@ WIDER_M = LEAST_STRETCH_M - 1e-9
 JOINED_M = 1e-6
 """Widest gap between stretches of one surface that are one."""
 BLOCK = 4096
-"""Candidates whose boundary is found at a time, which takes several times the memory of the result."""
+"""Most candidates whose boundary is found at a time, which takes several times the memory of the result."""
+MANY = 5000
+"""Candidates from which on another process finds the boundary that half of them see."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +174,12 @@ def shown(candidates: Candidates, rows: IntArray, *, only_wide: bool = False) ->
     faces = np.flatnonzero(wide) if only_wide else np.arange(len(wide))
     ends, on_boundary = (boundary.a[faces], boundary.b[faces]), np.ones(len(faces), dtype=bool)
     scene = scene_of(mesh_around(candidates), *ends, boundary.pieces[faces], on_boundary)
-    blocks = np.split(rows, range(BLOCK, len(rows), BLOCK))
-    return _together([_shown_from(candidates, block, boundary, scene, faces) for block in blocks])
+    blocks = np.array_split(rows, 2 * -(-len(rows) // (2 * BLOCK)) or 1)
+
+    def shown_from(some: Sequence[IntArray]) -> list[ShownBoundary]:
+        return [_shown_from(candidates, block, boundary, scene, faces) for block in some]
+
+    return _together(in_halves(shown_from, blocks, forked=len(rows) >= MANY))
 
 
 def _together(parts: Sequence[ShownBoundary]) -> ShownBoundary:

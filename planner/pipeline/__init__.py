@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stopgo.mission.floor import FloorPlan
-    from stopgo.mission.geometry import IntArray
     from stopgo.mission.plan import PartPlan, Plan
     from stopgo.mission.settings import Settings
     from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
     from stopgo.mission.stages.division import DividedRoute
     from stopgo.planner.appraisal.figures_of_route import FiguresBefore
+    from stopgo.planner.geometry.side_work import SideWork
+    from stopgo.planner.overlap import PairsFound
     from stopgo.planner.selection.later_bound import LaterBound
-    from stopgo.planner.visibility.sight.mesh import Mesh
 
 Observe = Callable[[Any], None]
 
@@ -49,21 +49,48 @@ def plan(
     observe(space)
     if all_parts and settings.divided:
         raise InputError("--all-parts: not possible with robots or shifts; plan each part by its --start")
-    found = parts_to_plan(space) if all_parts else [candidates(space)]
-    planned = frozenset(part.chosen_part for part in found)
-    if settings.divided:
-        return _plan_divided(found[0], planned, observe)
-    return Plan(tuple(_plan_part(part, k, planned, observe) for k, part in enumerate(found)))
+    with _graph_beside(space) as keep_graph:
+        found = parts_to_plan(space) if all_parts else [candidates(space)]
+        planned = frozenset(part.chosen_part for part in found)
+        if settings.divided:
+            return _plan_divided(found[0], planned, observe, keep_graph)
+        parts = (_plan_part(part, k, planned, observe, keep_graph) for k, part in enumerate(found))
+        return Plan(tuple(parts))
 
 
-def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
+@contextmanager
+def _graph_beside(space: NavigableSpace) -> Iterator[Callable[[], None]]:
+    """Yield what keeps the mesh and the pieces between corners for the route of a large floor.
+
+    Another process finds them until then.
+    """
+    from stopgo.planner.geometry.instance_cache import store
+    from stopgo.planner.geometry.side_work import SideWork
+    from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
+    from stopgo.planner.space.navigable import is_large
+
+    forked = is_large(space.floor) and space.settings.graph == "exact"
+    with SideWork(lambda: (drive_mesh(space), corner_pieces(space)), forked=forked) as graph:
+
+        def keep() -> None:
+            if graph.is_apart:
+                mesh, pieces = graph.result()
+                store(drive_mesh, space, mesh)
+                store(corner_pieces, space, pieces)
+
+        yield keep
+
+
+def _plan_part(
+    found: Candidates, number: int, planned: frozenset[int], observe: Observe, keep_graph: Callable[[], None]
+) -> PartPlan:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
     from stopgo.planner.routing import route
 
     settings = found.space.settings
     with _seen(found, planned, observe) as (seen, prepared), _later_bound(seen) as later:
         selection = _selected(seen, later)
-        prepared.keep_graph()
+        keep_graph()
         driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
         observe(selection if driven is None else driven.selection)
         driven = driven or route(selection)
@@ -97,7 +124,7 @@ def _seen(
             observe(seen)
             if many:
                 cover_problem(seen)  # kept for the selection, and made while the pairs are found
-            prepared = after.enter_context(_Prepared(seen, planned))
+            prepared = after.enter_context(_Prepared(seen, planned, pairs))
             if many:
                 keep_pairs(seen.candidates, pairs.result())
         del pairs  # and what it holds
@@ -105,15 +132,21 @@ def _seen(
 
 
 class _Prepared:
-    """Results that need no stops, found while these are selected."""
+    """The figures that need no stops, found while these are selected.
 
-    def __init__(self, seen: Visibility, planned: frozenset[int]) -> None:
+    The selection waits for the `pairs` that register, so that these take both cores before.
+    """
+
+    def __init__(self, seen: Visibility, planned: frozenset[int], pairs: SideWork[PairsFound]) -> None:
         from stopgo.planner.geometry.side_work import SideWork
         from stopgo.planner.visibility.limited import keep_only_visible
 
         self._seen, self._planned = seen, planned
         self._work = SideWork(
-            lambda: self._found(seen), forked=seen.rows >= MANY, again=lambda: self._found(self._seen_again())
+            lambda: self._found(seen),
+            forked=seen.rows >= MANY,
+            again=lambda: self._found(self._seen_again()),
+            after=pairs,
         )
         if self._work.is_apart and seen.in_sight is not None:
             keep_only_visible(seen.in_sight)
@@ -130,31 +163,18 @@ class _Prepared:
 
         return self._seen if self._seen.in_sight is None else visibility(self._seen.in_sight.candidates)
 
-    def _found(self, seen: Visibility) -> tuple[FiguresBefore, tuple[Mesh, IntArray] | None]:
+    def _found(self, seen: Visibility) -> FiguresBefore:
         from stopgo.planner.appraisal.figures_of_route import FiguresBefore
-        from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
 
-        space = seen.space
-        needed = seen.rows >= MANY and space.settings.graph == "exact"
-        figures = FiguresBefore.of(seen, self._planned)
-        return figures, (drive_mesh(space), corner_pieces(space)) if needed else None
-
-    def keep_graph(self) -> None:
-        """Keep the mesh and the pieces between corners for the route, if another process has found them."""
-        from stopgo.planner.geometry.instance_cache import store
-        from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
-
-        if self._work.is_apart and (graph := self._work.result()[1]):
-            store(drive_mesh, self._seen.space, graph[0])
-            store(corner_pieces, self._seen.space, graph[1])
+        return FiguresBefore.of(seen, self._planned)
 
     def figures(self, route: Route) -> FiguresBefore:
         """The figures that need no route, of the visibility that it has."""
         from stopgo.planner.appraisal.figures_of_route import FiguresBefore
 
         if route.visibility is self._seen:
-            return self._work.result()[0]
-        known = self._work.result()[0].estimates if self._work.is_beside else None
+            return self._work.result()
+        known = self._work.result().estimates if self._work.is_beside else None
         return FiguresBefore.of(route.visibility, self._planned, before=self._seen, known=known)
 
 
@@ -211,7 +231,9 @@ UNDIVIDED = -1
 """Part number of the plan that is divided: its mission is not driven, and has its own id."""
 
 
-def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) -> Plan:
+def _plan_divided(
+    found: Candidates, planned: frozenset[int], observe: Observe, keep_graph: Callable[[], None]
+) -> Plan:
     """Plan one part, and divide its stops among robots or tours."""
     from stopgo.mission.document import MissionAllocation
     from stopgo.mission.plan import DividedPlan, PartPlan, Plan
@@ -220,7 +242,7 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
 
     with _seen(found, planned, observe) as (seen, prepared):
         selection = _selected(seen)
-        prepared.keep_graph()
+        keep_graph()
         driven, division = _divided(selection)
         observe(driven.selection)
         observe(driven)

@@ -42,7 +42,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
-    large = _is_large(floor)
+    large = is_large(floor)
     with _SideWorks(forked=large) as works:
         scanned = partial(_occluders_and_targets, floor, settings)
         scanning = works.begun(partial(scanned, NOTHING)) if settings.doors == "open" else None
@@ -79,7 +79,8 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     return space
 
 
-def _is_large(floor: FloorPlan) -> bool:
+def is_large(floor: FloorPlan) -> bool:
+    """True for a floor of so many elements, or corners of them, that other processes save time."""
     corners = sum(len(solid.exterior) for item in floor.elements for solid in item.solids)
     return len(floor.elements) >= MANY or corners >= MANY_CORNERS
 
