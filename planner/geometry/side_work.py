@@ -27,6 +27,8 @@ from stopgo.mission.geometry import frozen
 
 T = TypeVar("T")
 Argument = TypeVar("Argument")
+GIVING_WAY = 5
+"""Niceness of work that gives way: it has a third of the weight of others."""
 PR_SET_PDEATHSIG = 1
 """Option of Linux's prctl: the signal that a process gets when its parent ends."""
 
@@ -41,13 +43,15 @@ class SideWork(Generic[T]):
         forked: bool,
         again: Callable[[], T] | None = None,
         after: SideWork[Any] | None = None,
+        gives_way: bool = False,
     ) -> None:
         """Begin the work in a process of its own if `forked`, and if this process can be forked.
 
         `again` is done if that process ends without a result: what the work holds is then not kept. The
         process waits until that of the work `after` answers, so that both do not take more than one core.
+        One that gives way is for a result that is needed much later: others get more of the cores.
         """
-        self._work, self._process, self._answer = work, 0, -1
+        self._work, self._process, self._answer, self._gives_way = work, 0, -1, gives_way
         self._before = -1 if after is None else after._answer
         self._found: list[T] = []
         if forked and can_fork():
@@ -96,6 +100,8 @@ class SideWork(Generic[T]):
             signal.signal(signal.SIGINT, signal.SIG_DFL)
             _end_with(parent)
             os.close(self._answer)
+            if self._gives_way:
+                os.nice(GIVING_WAY)
             if self._before >= 0:
                 select.select([self._before], [], [])  # there is something to read, or its process has ended
             with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):

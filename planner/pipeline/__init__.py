@@ -70,7 +70,7 @@ def _graph_beside(space: NavigableSpace) -> Iterator[Callable[[], None]]:
     from stopgo.planner.space.navigable import is_large
 
     forked = is_large(space.floor) and space.settings.graph == "exact"
-    with SideWork(lambda: (drive_mesh(space), corner_pieces(space)), forked=forked) as graph:
+    with SideWork(lambda: (drive_mesh(space), corner_pieces(space)), forked=forked, gives_way=True) as graph:
 
         def keep() -> None:
             if graph.is_apart:
@@ -147,6 +147,7 @@ class _Prepared:
             forked=seen.rows >= MANY,
             again=lambda: self._found(self._seen_again()),
             after=pairs,
+            gives_way=True,
         )
         if self._work.is_apart and seen.in_sight is not None:
             keep_only_visible(seen.in_sight)

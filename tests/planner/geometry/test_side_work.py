@@ -14,7 +14,8 @@ import pytest
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings import Settings
 from stopgo.planner import pipeline
-from stopgo.planner.geometry.side_work import SideWork, in_halves
+from stopgo.planner.geometry.side_work import GIVING_WAY, SideWork, in_halves
+from stopgo.planner.overlap import boundary
 from stopgo.planner.space import navigable
 from tests.planner.worlds import two_rooms
 from tests.waiting import wait_until
@@ -124,6 +125,7 @@ def test_a_plan_is_the_same_with_a_second_process(
     for many in (0, 10**9):
         monkeypatch.setattr(pipeline, "MANY", many)
         monkeypatch.setattr(navigable, "MANY", many)
+        monkeypatch.setattr(boundary, "MANY", many)
         plans.append(pipeline.plan(two_rooms(0.9), Settings(d_dis=0.1, refine=refine, fov=fov)))
     forked, alone = plans
     assert forked.figures == alone.figures
@@ -194,3 +196,9 @@ def test_halves_keep_the_order_of_items(forked: bool) -> None:
     found = in_halves(lambda some: [(item, os.getpid()) for item in some], range(5), forked=forked)
     assert [item for item, _ in found] == [0, 1, 2, 3, 4]
     assert len({process for _, process in found}) == 1 + (forked and sys.platform == "linux")
+
+
+def test_work_that_gives_way_has_less_of_the_cores() -> None:
+    with SideWork(lambda: os.nice(0), forked=True, gives_way=True) as work:
+        assert work.is_apart
+        assert work.result() == os.nice(0) + GIVING_WAY
