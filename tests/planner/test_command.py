@@ -18,6 +18,7 @@ from stopgo.mission.files.mission_json import read
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import Settings
 from stopgo.plan_files import plan_files
+from stopgo.recording_process import RecordingProcess
 from tests.disk import small_disk
 from tests.faults.sizes import some
 from tests.planner.worlds import FLOORS, SHARED
@@ -602,14 +603,18 @@ def test_a_plan_is_made_where_recordings_are_not_installed(
     assert {path.name for path in tmp_path.iterdir()} == {"mission.json", "plan.svg", "coverage.json"}
 
 
-def test_sheets_drawn_in_another_process_are_the_same(
-    two_rooms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("recording", [False, True])
+def test_sheets_and_picture_drawn_in_another_process_are_the_same(
+    two_rooms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, recording: bool
 ) -> None:
+    monkeypatch.setattr(RecordingProcess, "is_running", property(lambda _: recording))
+    monkeypatch.setattr("stopgo.planner.geometry.side_work.can_fork", lambda: True)
     for many in (0, 10**9):
         monkeypatch.setattr(stopgo.plan_files, "MANY", many)
         assert main(["plan", str(two_rooms), "-o", str(tmp_path / f"{many}"), "--sheets"]) == 0
-    printed = [(tmp_path / f"{many}" / "plan.pdf").read_bytes() for many in (0, 10**9)]
-    assert printed[0] == printed[1]
+    for name in ("plan.pdf", "plan.svg"):
+        printed = [(tmp_path / f"{many}" / name).read_bytes() for many in (0, 10**9)]
+        assert printed[0] == printed[1]
 
 
 @pytest.mark.parametrize("many", [0, 10**9])
