@@ -60,23 +60,23 @@ def plan(
 
 @contextmanager
 def _graph_beside(space: NavigableSpace) -> Iterator[Callable[[], None]]:
-    """Yield what keeps the mesh and the pieces between corners for the route of a large floor.
+    """Yield what keeps the parts of the route's graph that need no stops.
 
-    Another process finds them until then.
+    Another process finds those of a large floor until then.
     """
     from stopgo.planner.geometry.instance_cache import store
     from stopgo.planner.geometry.side_work import SideWork
-    from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh
+    from stopgo.planner.routing.roadmap import corner_pieces, drive_mesh, outward_corners
     from stopgo.planner.space.navigable import is_large
 
+    parts = (drive_mesh, outward_corners, corner_pieces)
     forked = is_large(space.floor) and space.settings.graph == "exact"
-    with SideWork(lambda: (drive_mesh(space), corner_pieces(space)), forked=forked, gives_way=True) as graph:
+    with SideWork(lambda: [part(space) for part in parts], forked=forked, gives_way=True) as graph:
 
         def keep() -> None:
             if graph.is_apart:
-                mesh, pieces = graph.result()
-                store(drive_mesh, space, mesh)
-                store(corner_pieces, space, pieces)
+                for part, found in zip(parts, graph.result(), strict=True):
+                    store(part, space, found)
 
         yield keep
 

@@ -47,12 +47,13 @@ def improved(
 ) -> IntArray:
     """The smallest selection that drop-and-repair finds, never below the lower bound `at_least`.
 
-    A large one is searched by districts, each with `DISTRICT_SWAPS`; `settled` keeps the rows searched in
-    vain between two searches.
+    A large one is searched by districts, each with `DISTRICT_SWAPS` at most; `settled` keeps the rows
+    searched in vain between two searches.
     """
     if len(chosen) > LARGE:
+        most = min(swaps, DISTRICT_SWAPS)
         return improved_by_districts(
-            cover, chosen, lambda part, rows, least: _improved(part, rows, least, DISTRICT_SWAPS),
+            cover, chosen, lambda part, rows, least: _improved(part, rows, least, most),
             at_least=at_least, settled=set() if settled is None else settled,
         )  # fmt: skip
     return _improved(cover, chosen, at_least, min(swaps, most_swaps(cover, len(chosen))))

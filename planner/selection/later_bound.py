@@ -23,7 +23,7 @@ class LaterBound:
     def __call__(self, problem: Cover, *, found: int) -> int:
         """Begin with the bound of a problem, and return the one known now: none."""
         work = partial(lower_bound, problem, found=found)
-        self._work = SideWork(work, forked=True, again=lambda: self._again().bound, gives_way=True)
+        self._work = SideWork(work, forked=True, again=lambda: self._again().bound)
         return 0
 
     def __enter__(self) -> LaterBound:
