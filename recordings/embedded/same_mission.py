@@ -9,7 +9,7 @@ from stopgo.recordings.embedded.reading import Recording
 
 
 def contradiction(one: Recording, other: Recording) -> str:
-    """Return how two recordings have different missions with the same id and revision; empty if they agree."""
+    """Return which mission of one id and revision differs in two recordings; empty if none does."""
     if one.mission_id != other.mission_id:
         return ""
     own = {mission.revision: mission for mission in one.missions}
@@ -17,7 +17,7 @@ def contradiction(one: Recording, other: Recording) -> str:
         mine = own.get(mission.revision, mission)
         if mine.digest != mission.digest:
             return (
-                f"{other.path.name} has another mission with id {mission.id} and revision {mission.revision}"
+                f"{other.path} has another mission with id {mission.id} and revision {mission.revision}"
                 f" (digest {mission.digest[:12]}…, here {mine.digest[:12]}…)"
             )
     return ""
@@ -30,17 +30,18 @@ def of_its_mission(recording: Recording, read: Sequence[Recording]) -> list[Reco
 
 
 def agreeing(read: Sequence[Recording]) -> list[Recording]:
-    """Return the recordings without the plans that are of another mission than a run.
+    """Return the recordings without the plans that contradict a run, or a later one of these plans.
 
     Raises
     ------
     InputError
-        Naming two runs, or two plans without a run, that have different missions with one id and revision.
+        Naming two runs that have different missions with one id and revision.
     """
-    runs = [item for item in read if item.logs]
-    kept = [item for item in read if item.logs or not any(contradiction(run, item) for run in runs)]
-    for index, item in enumerate(kept):
-        for other in kept[:index]:
-            if problem := contradiction(other, item):
-                raise InputError(f"{other.path.name}: {problem}; give the recordings of one of them")
-    return kept
+    kept: list[Recording] = []
+    for item in sorted(reversed(read), key=lambda item: not item.logs):
+        problem = next(filter(None, (contradiction(item, other) for other in kept)), "")
+        if problem and item.logs:
+            raise InputError(f"{item.path}: {problem}; give the recordings of one of them")
+        if not problem:
+            kept.append(item)
+    return [item for item in read if item in kept]

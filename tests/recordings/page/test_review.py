@@ -188,9 +188,9 @@ def test_a_plan_of_another_mission_with_this_id_and_revision_is_named_and_not_co
     files = [str(sighted), str(field)]
     assert main(["review", *files, "--html", str(page), "-o", str(merged), "--check"]) == 1
     text = capsys.readouterr().out
-    assert f"problem: plan.rrd has another mission with id {mission.id} and revision 1 (digest" in text
+    assert f"problem: {sighted} has another mission with id {mission.id} and revision 1 (digest" in text
     assert "withdrawn" not in text and "S2" not in text
-    assert "plan.rrd has another mission" in page.read_text()
+    assert f"{sighted} has another mission" in page.read_text()
     assert [item.stops[1].id for item in read_recording(merged).missions] == ["S9"]
     assert main(["review", *files, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["recordings"][1]["runs"][0]
@@ -205,5 +205,5 @@ def test_runs_of_two_missions_with_one_id_and_revision_are_not_judged_together(
     assert json.loads(capsys.readouterr().out)["together"] == []
     assert main(["review", str(field), str(other), "--html", str(tmp_path / "page.html")]) == 2
     error = capsys.readouterr().err
-    assert f"other.rrd has another mission with id {mission.id} and revision 1" in error
+    assert f"{field}: {other} has another mission with id {mission.id} and revision 1" in error
     assert error.rstrip().endswith("give the recordings of one of them")
