@@ -197,7 +197,7 @@ def _read(folder: Path, stale: dict[str, Stamp], others: dict[str, IndexedFile])
     from stopgo.recordings.page.reviewed import reviewed
 
     read, faults = _opened(folder, sorted(stale))
-    missions = {recording.mission_id for recording in read.values()}
+    missions = {recording.mission_id for recording in read.values() if recording.logs}
     plans = [name for name, file in others.items() if name not in stale and _planned([file]) & missions]
     found = reviewed([*read.values(), *_opened(folder, plans)[0].values()])
     by_name = dict(zip(read, found.recordings, strict=False))
