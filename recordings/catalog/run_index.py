@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator, Set
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +31,8 @@ VERSION = 3
 SUFFIX = ".rrd"
 PART = 25
 """Files that are read before the index is written again."""
+_one_reader = threading.Lock()
+"""Held while a part is read, so that threads that want the same index share the work."""
 
 
 class IndexedPlan(msgspec.Struct, frozen=True, kw_only=True):
@@ -107,11 +110,15 @@ def index_of(folder: Path, *, say: Callable[[str], None] = lambda line: None) ->
 
 
 def index_by_parts(
-    folder: Path, *, say: Callable[[str], None] = lambda line: None
+    folder: Path,
+    *,
+    kept: dict[str, IndexedFile] | None = None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> Iterator[tuple[RunIndex, int]]:
     """Yield the index after each part of the files that must be read, and the number of those left.
 
-    A run is compared with its plan, so it is read again after a plan of its mission has come or gone.
+    A run is compared with its plan, so it is read again after a plan of its mission has come or gone. `kept`
+    holds what is known of a folder in which no index can be written.
 
     Raises
     ------
@@ -120,28 +127,39 @@ def index_by_parts(
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: not a folder; give a folder of recordings")
-    known, stamps = _known(folder / INDEX), dict(sorted(_stamps(folder)))
+    announced: set[str] = set()
+    kept = {} if kept is None else kept
+    left = -1
+    while left:
+        with _one_reader:
+            index, left = _next_part(folder, announced, kept, say)
+        yield index, left
+
+
+def _next_part(
+    folder: Path, announced: set[str], kept: dict[str, IndexedFile], say: Callable[[str], None]
+) -> tuple[RunIndex, int]:
+    """Read the next files, and return the index and the number of those left.
+
+    `announced` are the files whose plans are known to the runs of their missions; those read are added.
+    """
+    known, stamps = kept or _known(folder / INDEX), dict(sorted(_stamps(folder)))
     files = {name: known[name] for name, stamp in stamps.items() if _is_unchanged(known.get(name), stamp)}
     gone = _planned(file for name, file in known.items() if name not in files)
     files = {name: file for name, file in files.items() if not _has_run_of(file, gone)}
     stale = sorted(stamps.keys() - files.keys(), key=lambda name: (stamps[name][1], name))  # plans are older
-    if not stale:
-        if len(files) != len(known):
-            _write(folder, files, say)
-        yield RunIndex(VERSION, files), 0
-        return
-    say(f"{folder}: reading {len(stale)} of {len(stamps)} recordings")
-    announced: set[str] = set()
-    while stale:
-        part, stale = stale[:PART], stale[PART:]
-        files |= _read(folder, {name: stamps[name] for name in part}, files)
-        come = _planned(files[name] for name in part if name not in announced)
-        announced.update(part)
-        outdated = [name for name in files if name not in part and _has_run_of(files[name], come)]
-        stale += outdated
-        files = {name: files[name] for name in sorted(files.keys() - set(outdated))}
-        _write(folder, files, say)
-        yield RunIndex(VERSION, files), len(stale)
+    if stale and not announced:
+        say(f"{folder}: reading {len(stale)} of {len(stamps)} recordings")
+    part = stale[:PART]
+    files |= _read(folder, {name: stamps[name] for name in part}, files) if part else {}
+    come = _planned(files[name] for name in part if name not in announced)
+    announced.update(part)
+    outdated = {name for name in files if name not in part and _has_run_of(files[name], come)}
+    files = {name: files[name] for name in sorted(files.keys() - outdated)}
+    if part or len(files) != len(known):
+        kept.clear()
+        kept.update({} if _is_written(folder, files, say) else files)
+    return RunIndex(VERSION, files), len(stale) - len(part) + len(outdated)
 
 
 def _planned(files: Iterable[IndexedFile]) -> set[str]:
@@ -153,11 +171,14 @@ def _has_run_of(file: IndexedFile, missions: Set[str]) -> bool:
     return any(run.mission_id in missions for run in file.runs)
 
 
-def _write(folder: Path, files: dict[str, IndexedFile], say: Callable[[str], None]) -> None:
+def _is_written(folder: Path, files: dict[str, IndexedFile], say: Callable[[str], None]) -> bool:
+    """Write the index; False if the folder takes none, and the files are read again next time."""
     try:
         write_atomic(folder / INDEX, msgspec.json.encode(RunIndex(VERSION, files)))
-    except InputError as error:  # the files are read again next time
+    except InputError as error:
         say(str(error))
+        return False
+    return True
 
 
 def _known(path: Path) -> dict[str, IndexedFile]:

@@ -17,7 +17,14 @@ from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.files.mission_json import read
-from stopgo.recordings.catalog.run_index import RunIndex, index_by_parts, index_of, run_cells, stamp_of
+from stopgo.recordings.catalog.run_index import (
+    IndexedFile,
+    RunIndex,
+    index_by_parts,
+    index_of,
+    run_cells,
+    stamp_of,
+)
 from stopgo.recordings.page import report_html
 from stopgo.site.planning import WorkLane
 from stopgo.site.planning_work import CommandTask
@@ -58,6 +65,8 @@ class RunRoom:
         self._merged_folder = merged
         self._lane = lane
         self._one_at_a_time = threading.Lock()
+        self._known: dict[str, IndexedFile] = {}
+        """State of the files of a folder that takes no index."""
         self._merged: dict[str, MergedFiles] = {}
         self._secrets: dict[str, tuple[str, float]] = {}
 
@@ -67,9 +76,9 @@ class RunRoom:
         Each call reads a part of those that are new or changed, so that a large folder shows its progress.
         """
         with self._one_at_a_time:
-            index, left = next(index_by_parts(self._folder.root))
+            index, left = next(index_by_parts(self._folder.root, kept=self._known))
             if _has_gone(self._folder.root, index):
-                index, left = next(index_by_parts(self._folder.root))
+                index, left = next(index_by_parts(self._folder.root, kept=self._known))
         return {"missions": self._missions(index), "faults": index.faults(), "left": left}
 
     def _missions(self, whole: RunIndex) -> list[dict[str, Any]]:

@@ -6,12 +6,13 @@ import json
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from stopgo.command_line import main
 from stopgo.recordings.catalog import run_index
-from stopgo.recordings.catalog.run_index import INDEX, index_by_parts, index_of, index_text
+from stopgo.recordings.catalog.run_index import INDEX, IndexedFile, index_by_parts, index_of, index_text
 from tests.recordings import run, world
 
 
@@ -126,3 +127,36 @@ def test_a_large_folder_is_read_by_parts_and_goes_on_where_it_was_ended(
     assert [left for _, left in rest] == [3, 2, 1, 0]
     assert rest[0][0] == ["plan.rrd"] and len(rest[-1][0]) == 4
     assert [found.coverage for _, found in index_of(tmp_path).runs()] == pytest.approx([8 / 14] * 3)
+
+
+def test_a_folder_that_takes_no_index_is_read_to_its_end(
+    skipping: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(3):
+        shutil.copy(skipping, tmp_path / f"run-{number}.rrd")
+    monkeypatch.setattr(run_index, "PART", 1)
+    (tmp_path / INDEX).mkdir()
+    said: list[str] = []
+    assert len(index_of(tmp_path, say=said.append).files) == 3
+    assert any(INDEX in line for line in said)
+    kept: dict[str, IndexedFile] = {}
+    assert [next(index_by_parts(tmp_path, kept=kept))[1] for _ in range(4)] == [2, 1, 0, 0]
+
+
+def test_threads_that_want_one_index_share_the_work(
+    skipping: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the map and the list of a site that begins."""
+    for number in range(4):
+        shutil.copy(skipping, tmp_path / f"run-{number}.rrd")
+    read, counted = run_index._read, []
+
+    def counting(folder: Path, stale: dict[str, run_index.Stamp], others: dict[str, IndexedFile]) -> Any:
+        counted.extend(stale)
+        return read(folder, stale, others)
+
+    monkeypatch.setattr(run_index, "_read", counting)
+    monkeypatch.setattr(run_index, "PART", 1)
+    first, second = index_by_parts(tmp_path), index_by_parts(tmp_path)
+    assert [next(one)[1] for one in (first, second, first, second)] == [3, 2, 1, 0]
+    assert len(counted) == len(set(counted)) == 4
