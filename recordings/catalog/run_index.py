@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -162,13 +162,18 @@ def _next_part(
     return RunIndex(VERSION, files), len(stale) - len(part) + len(outdated)
 
 
-def _planned(files: Iterable[IndexedFile]) -> set[str]:
-    """Return the ids of missions that these files have plans of."""
-    return {plan.mission_id for file in files for plan in file.plans}
+def _planned(files: Iterable[IndexedFile]) -> dict[str, int]:
+    """Return the ids of missions that these files have plans of, each with the least revision."""
+    plans = sorted((plan for file in files for plan in file.plans), key=lambda plan: -plan.revision)
+    return {plan.mission_id: plan.revision for plan in plans}
 
 
-def _has_run_of(file: IndexedFile, missions: Set[str]) -> bool:
-    return any(run.mission_id in missions for run in file.runs)
+def _has_run_of(file: IndexedFile, plans: Mapping[str, int]) -> bool:
+    """Return True if a run followed one of these revisions or a later one: what its stops see is compared."""
+    return any(
+        run.mission_id in plans and plans[run.mission_id] <= max(run.revisions, default=0)
+        for run in file.runs
+    )
 
 
 def _is_written(folder: Path, files: dict[str, IndexedFile], say: Callable[[str], None]) -> bool:
@@ -219,7 +224,9 @@ def _read(folder: Path, stale: dict[str, Stamp], others: dict[str, IndexedFile])
 
     read, faults = _opened(folder, sorted(stale))
     missions = {recording.mission_id for recording in read.values() if recording.logs}
-    plans = [name for name, file in others.items() if name not in stale and _planned([file]) & missions]
+    plans = [
+        name for name, file in others.items() if name not in stale and missions & _planned([file]).keys()
+    ]
     found = reviewed([*read.values(), *_opened(folder, plans)[0].values()])
     by_name = dict(zip(read, found.recordings, strict=False))
     return {

@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from stopgo.command_line import main
@@ -160,3 +161,17 @@ def test_threads_that_want_one_index_share_the_work(
     first, second = index_by_parts(tmp_path), index_by_parts(tmp_path)
     assert [next(one)[1] for one in (first, second, first, second)] == [3, 2, 1, 0]
     assert len(counted) == len(set(counted)) == 4
+
+
+def test_a_later_revision_of_a_plan_reads_no_earlier_run_again(
+    sighted: Path, skipping: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As each variant that is saved on the page."""
+    shutil.copy(skipping, tmp_path / "run.rrd")
+    shutil.copy(sighted, tmp_path / "plan.rrd")
+    before = index_of(tmp_path)
+    shutil.copy(sighted, tmp_path / "next.rrd")
+    later = msgspec.structs.replace(before.files["plan.rrd"].plans[0], revision=2)
+    found = msgspec.structs.replace(before.files["plan.rrd"], plans=(later,))
+    monkeypatch.setattr(run_index, "_read", lambda folder, stale, others: dict.fromkeys(stale, found))
+    assert [left for _, left in index_by_parts(tmp_path)] == [0]
