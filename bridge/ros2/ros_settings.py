@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.settings.toml_file import read_toml
+from stopgo.mission.settings.toml_file import read_toml, with_quotes
 
 Metres = Annotated[float, msgspec.Meta(gt=0, le=100)]
 Seconds = Annotated[float, msgspec.Meta(gt=0, le=3600)]
@@ -159,7 +159,7 @@ def read_ros_settings(path: Path | None) -> RosSettings:
         what, _, where = str(error).partition(" - at ")
         keys = where.strip("`").removeprefix("$").lstrip(".")
         found = value_at(document, keys)
-        raise InputError(f"{path}: {keys or 'the file'}{found}: {what}") from None
+        raise InputError(f"{path}: {keys or 'the file'}{found}: {with_quotes(what)}") from None
 
 
 def changed_settings(settings: RosSettings, changes: dict[str, Any]) -> RosSettings:

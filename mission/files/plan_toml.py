@@ -13,7 +13,7 @@ from stopgo.mission.settings.coverage_parameters import ANY_INCIDENCE
 from stopgo.mission.settings.parameter import Parameter
 from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.settings.scanners import SCANNERS
-from stopgo.mission.settings.toml_file import read_toml
+from stopgo.mission.settings.toml_file import read_toml, with_quotes
 
 
 def read_settings(
@@ -97,9 +97,10 @@ def _refused(error: str, values: dict[str, Any], path: Path | None) -> str:
     """A refused value as one line: file and key, or option; the value; and what would be right."""
     problem, _, where = error.partition(" - at `$.")
     key = where.rstrip("`").partition("[")[0]
-    parameter, value = PARAMETERS[key], _shown(values[key])
-    given = f"{parameter.flag} {value}" if path is None else f"{path}: {parameter.key} = {value}"
-    return f"{given}: {parameter.right or problem}"
+    parameter, value = PARAMETERS[key], values[key]
+    if path is None:
+        return f"{parameter.flag} {_shown(value)}: {parameter.right or problem}"
+    return f"{path}: {parameter.key} = {_toml(value)}: {parameter.right or with_quotes(problem)}"
 
 
 def _shown(value: object) -> str:
@@ -146,7 +147,7 @@ def _home_of(key: str, table: str) -> str:
 
 
 def _toml(value: object) -> str:
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
     if isinstance(value, bool):
         return str(value).lower()

@@ -27,7 +27,7 @@ GRAVE = (
     *("walls_missing", "little_reached", "stray_element", "leg_over_ignored", "units_doubtful"),
     "scans_apart",
     "accuracy_not_met",
-    *("no_geometry", "kernel_crashed", "damaged_model", "schedule_unrelated"),
+    *("no_geometry", "no_body", "kernel_crashed", "damaged_model", "schedule_unrelated"),
     "limits_not_met",
     *("open_outline", "missing_block", "no_outline", "bad_coordinates"),
 )

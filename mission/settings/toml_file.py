@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from datetime import date, time
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +14,16 @@ from stopgo.mission.errors import InputError
 def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
     """Read a TOML file; `remedy` says how to get one where there is none.
 
+    Dates and times without quotes are read as their text: no key takes anything else.
+
     Raises
     ------
     InputError
         Naming the file and the problem.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        return {key: _as_text(value) for key, value in tomllib.loads(text).items()}
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from None
     except RecursionError:
@@ -26,3 +31,29 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
     except (OSError, ValueError) as error:  # a name that no file can have is a ValueError
         why = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({why}){f'; {remedy}' if remedy else ''}") from None
+
+
+def with_quotes(problem: str) -> str:
+    """Return msgspec's problem with a value, and whether quotes are missing or too many."""
+    found = re.search(r"Expected `([^`]+)`.*, got `(\w+)`", problem)
+    if found is None:
+        return problem
+    wanted, given = set(found[1].split(" | ")), found[2]
+    if "str" in wanted and given in PLAIN:
+        return f"{problem}; write it in quotes"
+    if given == "str" and wanted & PLAIN:
+        return f"{problem}; write it without quotes"
+    return problem
+
+
+PLAIN = frozenset({"int", "float", "bool"})
+"""msgspec's names of values that stand without quotes."""
+
+
+def _as_text(value: Any) -> Any:
+    """Return a value with the text of every date and time in it."""
+    if isinstance(value, date | time):  # a datetime is a date
+        return value.isoformat()
+    if isinstance(value, dict):
+        return {key: _as_text(item) for key, item in value.items()}
+    return [_as_text(item) for item in value] if isinstance(value, list) else value

@@ -142,6 +142,8 @@ def _reader_of(file: FloorFile) -> Variant[Reader]:
     for other in others:
         if suffix in other.what.suffixes:
             return other
+    if suffix == ".zip" and file.data.startswith(ZIP):
+        raise InputError(f"{file.path}: is compressed; unpack it first, and name the floor's file in it")
     readers = (*READERS, *(other.what for other in others))
     known = ", ".join(suffix for reader in readers for suffix in reader.suffixes)
     raise InputError(f"{file.path}: unknown kind of file '{suffix}'; floors are read from {known}")
@@ -161,6 +163,8 @@ def _listed(names: Iterable[str]) -> str:
 def _bytes_of(path: Path) -> bytes:
     if path.is_char_device() or path.is_block_device():
         raise InputError(f"{path}: is a device, which may never end; name a file")
+    if path.is_fifo() or path.is_socket():
+        raise InputError(f"{path}: is a pipe, and a floor is read more than once; save it as a file")
     try:
         data = path.read_bytes()
     except FileNotFoundError:
@@ -171,7 +175,13 @@ def _bytes_of(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read ({error}); check the path and its permissions") from None
     if not data.strip():
         raise InputError(f"{path}: is empty ({len(data)} bytes); export the floor again")
+    if data.startswith(GZIP):
+        raise InputError(f"{path}: is compressed with gzip; unpack it first (gunzip)")
     return data
+
+
+GZIP, ZIP = b"\x1f\x8b", b"PK\x03\x04"
+"""First bytes of compressed files."""
 
 
 __all__ = [

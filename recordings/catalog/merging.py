@@ -13,6 +13,7 @@ from stopgo.recordings.drawing.canvas import Canvas, Sheet, layout_alone, missio
 from stopgo.recordings.embedded.checking import embed_end
 from stopgo.recordings.embedded.plan import origin_in, planned_extent
 from stopgo.recordings.embedded.reading import Recording
+from stopgo.recordings.embedded.same_mission import agreeing
 from stopgo.recordings.page.reviewed import missions_of
 from stopgo.recordings.plan.mission import mission_extent
 from stopgo.recordings.rrd.read import chunks
@@ -26,7 +27,7 @@ def merge(recordings: Sequence[Recording], out: Path) -> None:
     InputError
         When they are of several missions or origins, or `out` is one of them or cannot be written.
     """
-    ordered = _plans_first(recordings)
+    ordered = _plans_first(agreeing(recordings))
     _check_same_mission(ordered, out)
     with replacing(out) as (temporary,), open_canvas(_sheet(ordered)) as canvas:
         _fill(canvas, ordered)
@@ -39,7 +40,7 @@ def layout_of(recordings: Sequence[Recording]) -> bytes:
     A browser draws the data it has so far, and would make its own layout for a recording that comes before
     it.
     """
-    return layout_alone(_sheet(_plans_first(recordings)))
+    return layout_alone(_sheet(_plans_first(agreeing(recordings))))
 
 
 def _plans_first(recordings: Sequence[Recording]) -> list[Recording]:

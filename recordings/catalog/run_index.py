@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime
 import os
-from collections.abc import Callable, Iterable, Iterator
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,9 +26,13 @@ if TYPE_CHECKING:
     from stopgo.recordings.page.reviewed import RecordingReview
 
 INDEX = ".stopgo-runs.json"
-VERSION = 2
+VERSION = 3
 """Version of the index; an index of another version is rebuilt."""
 SUFFIX = ".rrd"
+PART = 25
+"""Files that are read before the index is written again."""
+_one_reader = threading.Lock()
+"""Held while a part is read, so that threads that want the same index share the work."""
 
 
 class IndexedPlan(msgspec.Struct, frozen=True, kw_only=True):
@@ -96,22 +101,89 @@ def index_of(folder: Path, *, say: Callable[[str], None] = lambda line: None) ->
     InputError
         When there is no such folder.
     """
+    index = RunIndex(VERSION, {})
+    for known, left in index_by_parts(folder, say=say):
+        index = known
+        if left:
+            say(f"{folder}: {left} left")
+    return index
+
+
+def index_by_parts(
+    folder: Path,
+    *,
+    kept: dict[str, IndexedFile] | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> Iterator[tuple[RunIndex, int]]:
+    """Yield the index after each part of the files that must be read, and the number of those left.
+
+    A run is compared with its plan, so it is read again after a plan of its mission has come or gone. `kept`
+    holds what is known of a folder in which no index can be written.
+
+    Raises
+    ------
+    InputError
+        When there is no such folder.
+    """
     if not folder.is_dir():
         raise InputError(f"{folder}: not a folder; give a folder of recordings")
-    known = _known(folder / INDEX)
-    found = dict(sorted(_stamps(folder)))
-    unchanged = {name: known[name] for name, stamp in found.items() if _is_unchanged(known.get(name), stamp)}
-    stale = [name for name in found if name not in unchanged]
-    if not stale and len(unchanged) == len(known):
-        return RunIndex(VERSION, unchanged)
-    say(f"{folder}: reading {len(stale)} of {len(found)} recordings")
-    read = _read(folder, {name: found[name] for name in stale}, unchanged) if stale else {}
-    index = RunIndex(VERSION, dict(sorted((unchanged | read).items())))
+    announced: set[str] = set()
+    kept = {} if kept is None else kept
+    left = -1
+    while left:
+        with _one_reader:
+            index, left = _next_part(folder, announced, kept, say)
+        yield index, left
+
+
+def _next_part(
+    folder: Path, announced: set[str], kept: dict[str, IndexedFile], say: Callable[[str], None]
+) -> tuple[RunIndex, int]:
+    """Read the next files, and return the index and the number of those left.
+
+    `announced` are the files whose plans are known to the runs of their missions; those read are added.
+    """
+    known, stamps = kept or _known(folder / INDEX), dict(sorted(_stamps(folder)))
+    files = {name: known[name] for name, stamp in stamps.items() if _is_unchanged(known.get(name), stamp)}
+    gone = _planned(file for name, file in known.items() if name not in files)
+    files = {name: file for name, file in files.items() if not _has_run_of(file, gone)}
+    stale = sorted(stamps.keys() - files.keys(), key=lambda name: (stamps[name][1], name))  # plans are older
+    if stale and not announced:
+        say(f"{folder}: reading {len(stale)} of {len(stamps)} recordings")
+    part = stale[:PART]
+    files |= _read(folder, {name: stamps[name] for name in part}, files) if part else {}
+    come = _planned(files[name] for name in part if name not in announced)
+    announced.update(part)
+    outdated = {name for name in files if name not in part and _has_run_of(files[name], come)}
+    files = {name: files[name] for name in sorted(files.keys() - outdated)}
+    if part or len(files) != len(known):
+        kept.clear()
+        kept.update({} if _is_written(folder, files, say) else files)
+    return RunIndex(VERSION, files), len(stale) - len(part) + len(outdated)
+
+
+def _planned(files: Iterable[IndexedFile]) -> dict[str, int]:
+    """Return the ids of missions that these files have plans of, each with the least revision."""
+    plans = sorted((plan for file in files for plan in file.plans), key=lambda plan: -plan.revision)
+    return {plan.mission_id: plan.revision for plan in plans}
+
+
+def _has_run_of(file: IndexedFile, plans: Mapping[str, int]) -> bool:
+    """Return True if a run followed one of these revisions or a later one: what its stops see is compared."""
+    return any(
+        run.mission_id in plans and plans[run.mission_id] <= max(run.revisions, default=0)
+        for run in file.runs
+    )
+
+
+def _is_written(folder: Path, files: dict[str, IndexedFile], say: Callable[[str], None]) -> bool:
+    """Write the index; False if the folder takes none, and the files are read again next time."""
     try:
-        write_atomic(folder / INDEX, msgspec.json.encode(index))
-    except InputError as error:  # the files are read again next time
+        write_atomic(folder / INDEX, msgspec.json.encode(RunIndex(VERSION, files)))
+    except InputError as error:
         say(str(error))
-    return index
+        return False
+    return True
 
 
 def _known(path: Path) -> dict[str, IndexedFile]:
@@ -146,14 +218,17 @@ def _is_unchanged(file: IndexedFile | None, stamp: Stamp) -> bool:
     return file is not None and (file.size, file.changed_ns) == stamp
 
 
-def _read(folder: Path, stale: dict[str, Stamp], unchanged: dict[str, IndexedFile]) -> dict[str, IndexedFile]:
-    """Read files, together with the plans of the same folder that are already known."""
+def _read(folder: Path, stale: dict[str, Stamp], others: dict[str, IndexedFile]) -> dict[str, IndexedFile]:
+    """Read files, and compare their runs also with the plans in other files."""
     from stopgo.recordings.page.reviewed import reviewed
 
-    known = [name for name, file in unchanged.items() if file.plans]
-    read, faults = _opened(folder, sorted({*stale, *known}))
-    found = reviewed(list(read.values()))
-    by_name = dict(zip(read, found.recordings, strict=True))
+    read, faults = _opened(folder, sorted(stale))
+    missions = {recording.mission_id for recording in read.values() if recording.logs}
+    plans = [
+        name for name, file in others.items() if name not in stale and missions & _planned([file]).keys()
+    ]
+    found = reviewed([*read.values(), *_opened(folder, plans)[0].values()])
+    by_name = dict(zip(read, found.recordings, strict=False))
     return {
         name: _file(by_name[name], stamp) if name in by_name else _faulty(stamp, faults[name])
         for name, stamp in stale.items()

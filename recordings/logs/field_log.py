@@ -74,6 +74,8 @@ class Poses:
     truth: bool = False
     """True for a simulator's true poses; they are never used as the robot's own estimate."""
     oddities: tuple[str, ...] = ()
+    astray: float = 0.0
+    """Share of the poses that was left out, as the robot would have jumped there and back."""
     height: FloatArray | None = None
     """Heights (n,), metres upwards from any level; None where the source has none."""
     restarts_ns: tuple[int, ...] = ()
@@ -194,8 +196,9 @@ def poses_of(
     mended = mended_times(times[finite], positions[finite], forward=not own_clock)
     times = times.copy()
     times[finite] = mended.ns
-    oddities = (*mended.lines, *oddities_of(times, positions, finite))
+    not_finite = int((~finite).sum())
     finite[finite] = mended.kept
+    oddities = (*mended.lines, *oddities_of(times, positions, finite, not_finite))
     order = np.flatnonzero(finite)[np.argsort(times[finite], kind="stable")]
     if not len(order):
         return None
@@ -205,6 +208,7 @@ def poses_of(
             *oddities,
             f"{int(astray.sum())} of {len(order)} poses lie far from both neighbours; left out",
         )
+        more["astray"] = float(astray.mean())
         order = order[~astray]
     headings = frozen(np.asarray(heading, float)[order])
     heights = None if height is None else frozen(np.asarray(height, float)[order])
@@ -237,17 +241,17 @@ def _astray(ns: IntArray, xy: FloatArray) -> BoolArray:
     return astray
 
 
-def oddities_of(ns: IntArray, xy: FloatArray, finite: np.ndarray) -> tuple[str, ...]:
-    """Return gaps, jumps, times that run back and poses that are not finite, one line each."""
+def oddities_of(ns: IntArray, xy: FloatArray, kept: np.ndarray, not_finite: int) -> tuple[str, ...]:
+    """Return gaps, jumps and times that run back in the kept poses, and how many are not finite."""
     lines = []
-    if not finite.all():
-        lines.append(f"{int((~finite).sum())} of {len(finite)} poses are not finite; left out")
-    step = np.diff(ns[finite]) / 1e9
+    if not_finite:
+        lines.append(f"{not_finite} of {len(kept)} poses are not finite; left out")
+    step = np.diff(ns[kept]) / 1e9
     back = int((step < 0).sum())
     if back:
         lines.append(f"time runs back {back} times, by up to {-step.min():.3f} s; ordered by time")
-    order = np.argsort(ns[finite], kind="stable")
-    times, positions = ns[finite][order], xy[finite][order]
+    order = np.argsort(ns[kept], kind="stable")
+    times, positions = ns[kept][order], xy[kept][order]
     step = np.diff(times) / 1e9
     usual = float(np.median(step)) if len(step) else 0.0
     gaps = step[step > max(GAP_S, 10 * usual)]

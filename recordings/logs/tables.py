@@ -118,7 +118,11 @@ def read_csv(path: Path, reading: Reading) -> FieldLog:
             if row is not None:
                 robots.setdefault(columns.robot_of(cells), []).append(row)
     if not robots:
-        raise InputError(f"{path}: no row has numbers for {', '.join(columns.needed)}")
+        raise InputError(
+            f"{path}: {columns.problem or 'no row has numbers for ' + ', '.join(columns.needed)}"
+        )
+    for own in robots.values():
+        columns.check_headings([values for _, values in own])
     tracks = [track for robot, own in robots.items() if (track := columns.track(own, robot)) is not None]
     ns = np.array([row[0] for own in robots.values() for row in own], np.int64)
     return _log(path, "CSV trajectory", tracks, len(ns), lost, ns)
@@ -141,8 +145,16 @@ PLACES = (
 ROBOTS = ("robot", "robot_name", "robot_id", "vehicle", "vehicle_id", "agent")
 """Column names of the robot, where a table has the poses of several."""
 HEIGHTS = ("z", "z_m", "pz", "pos_z")
+RADIANS_OR_DEGREES = ("heading", "yaw", "theta")
+"""Column names of a heading without a unit: radians, unless the path says otherwise."""
+MOST_BEYOND_TURN = 0.05
+"""Share of rows whose heading may be beyond a turn, as an invalid one is."""
+PIECE_M = 0.2
+"""Length of the path that gives a direction."""
+LEAST_AGREEMENT, LEAST_BETTER = 0.9, 0.1
+"""Agreement of headings with the path, 1 for a constant difference; and how much more than as radians."""
 TURNS: dict[str, Callable[[float], float]] = {
-    **dict.fromkeys(("heading", "yaw", "theta", "heading_rad", "yaw_rad"), float),
+    **dict.fromkeys((*RADIANS_OR_DEGREES, "heading_rad", "yaw_rad", "theta_rad"), float),
     **dict.fromkeys(("heading_deg", "yaw_deg", "theta_deg"), lambda degrees: float(np.radians(degrees))),
     **dict.fromkeys(
         ("bearing_deg", "bearing", "course_deg"), lambda degrees: float(np.radians(90 - degrees))
@@ -164,7 +176,9 @@ class _Columns:
         self.quaternion: tuple[str, ...] = next(
             (names for names in QUATERNIONS if set(names) <= at.keys()), ()
         )
-        self.at = at
+        self.at, self.path = at, path
+        self.problem = ""
+        """Reason why a row was left out, where its numbers tell more than that."""
         if not self.time or not self.position:
             known = ", ".join(names)[:80]
             raise InputError(
@@ -181,12 +195,32 @@ class _Columns:
         try:
             ns = self._ns(cells[self.at[self.time]])
             if abs(ns) > LATEST_S * 1e9:
+                cell = cells[self.at[self.time]].strip()
+                self.problem = (
+                    f"{self.time} {cell} is no second since 1970; name it time_ms, time_us or time_ns"
+                )
                 return None
             x, y = (float(cells[self.at[name]]) for name in self.position)
             height = float(cells[self.at[self.height]]) if self.height else math.nan
             return ns, (x, y, self._heading(cells), height)
         except (ValueError, IndexError, OverflowError):
             return None
+
+    def check_headings(self, rows: list[Numbers]) -> None:
+        """Refuse headings without a unit that are degrees by the direction of the path.
+
+        Raises
+        ------
+        InputError
+            Naming the column, and what to call it.
+        """
+        if self.turn not in RADIANS_OR_DEGREES or self.position[0].startswith("lat"):
+            return
+        table = np.array(rows)
+        if np.mean(np.abs(table[:, 2]) > math.tau) > MOST_BEYOND_TURN:
+            name = _name_by_path(table[:, :2], table[:, 2], self.turn)
+            if name:
+                raise InputError(f"{self.path}: the headings in {self.turn} are degrees; name it {name}")
 
     def robot_of(self, cells: list[str]) -> str:
         """Return the name of the robot in a row; empty without one."""
@@ -215,6 +249,24 @@ class _Columns:
             return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]), robot=robot)
         height = table[:, 3] if self.height else None
         return poses_of("CSV", "table", ns, table[:, :2], table[:, 2], height=height, robot=robot)
+
+
+def _name_by_path(xy: np.ndarray, heading: np.ndarray, column: str) -> str:
+    """Return the name for a column of degrees if they follow the path (n, 2), and radians do not."""
+    at = [0]
+    for k in range(1, len(xy)):
+        if math.dist(xy[k], xy[at[-1]]) >= PIECE_M:
+            at.append(k)
+    pieces = np.diff(xy[at], axis=0)
+    course, turned = np.arctan2(pieces[:, 1], pieces[:, 0]), np.radians(heading[at[1:]])
+
+    def agreement(angles: np.ndarray) -> float:
+        return float(np.abs(np.exp(1j * (angles - course)).mean())) if len(angles) else 0.0
+
+    found = {f"{column}_deg": agreement(turned), "bearing_deg": agreement(-turned)}
+    best = max(found, key=lambda name: found[name])
+    as_radians = agreement(heading[at[1:]])
+    return best if found[best] > max(LEAST_AGREEMENT, as_radians + LEAST_BETTER) else ""
 
 
 def _log(path: Path, form: str, tracks: list[Poses], rows: int, lost: int, ns: np.ndarray) -> FieldLog:

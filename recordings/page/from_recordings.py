@@ -16,6 +16,7 @@ from stopgo.recordings.embedded.floor_lines import floor_lines
 from stopgo.recordings.embedded.plan import origin_in
 from stopgo.recordings.embedded.reading import Recording
 from stopgo.recordings.embedded.reasons import reasons_in
+from stopgo.recordings.embedded.same_mission import agreeing
 from stopgo.recordings.page.reviewed import (
     RecordingReview,
     Review,
@@ -33,9 +34,10 @@ def subject_of(review: Review) -> ReportSubject:
     Raises
     ------
     InputError
-        When they are of several plans, or none of them contains its mission.
+        When they are of several plans or contradict each other, or none of them contains its mission.
     """
-    items, read = review.recordings, [item.recording for item in review.recordings]
+    read = agreeing([item.recording for item in review.recordings])
+    items = [item for item in review.recordings if item.recording in read]
     plan_id, missions, sights = _one_plan(read), missions_of(read), sights_of(read)
     if not missions:
         raise InputError(
@@ -61,7 +63,9 @@ def subject_of(review: Review) -> ReportSubject:
         },
         together=() if both is None else (*both.sentences, *review.next_together(plan_id)),
         rooms_together=() if both is None else both.rooms,
-        problems=tuple(f"{item.recording.path.name}: {text}" for item in items for text in item.problems),
+        problems=tuple(
+            f"{item.recording.path.name}: {text}" for item in review.recordings for text in item.problems
+        ),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +21,7 @@ from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.drawing import entities
 from stopgo.recordings.embedded.checking import problems_of
 from stopgo.recordings.embedded.reading import Recording, read_each
+from stopgo.recordings.embedded.same_mission import agreeing, contradiction, of_its_mission
 from stopgo.recordings.page.runs_together import RunsTogether, follow_up_command, together
 
 SUFFIX = ".rrd"
@@ -90,8 +92,9 @@ class Review:
         for plan_id, items in self._by_plan.items():
             runs = [run for item in items for run in item.comparisons]
             if len(runs) > 1 or (runs and runs[0].mission.share is not UNSET):
-                read = [item.recording for item in items]
-                found[plan_id] = together(runs, missions_of(read), sights_of(read))
+                with suppress(InputError):  # runs of different missions are reported alone
+                    read = agreeing([item.recording for item in items])
+                    found[plan_id] = together(runs, missions_of(read), sights_of(read))
         return found
 
     def next_together(self, plan_id: str) -> tuple[str, ...]:
@@ -168,10 +171,11 @@ def files_in(paths: Iterable[Path]) -> Iterator[Path]:
 
 
 def _review(recording: Recording, read: Sequence[Recording]) -> RecordingReview:
-    of_mission = [item for item in read if item.mission_id == recording.mission_id]
+    of_mission = of_its_mission(recording, read)
     missions, sights = missions_of(of_mission), sights_of(of_mission)
     comparisons = [compare(log, missions, sights) for log in recording.logs] if missions else []
-    return RecordingReview(recording, tuple(comparisons), problems_of(recording))
+    problems = (*problems_of(recording), *filter(None, (contradiction(recording, item) for item in read)))
+    return RecordingReview(recording, tuple(comparisons), problems)
 
 
 def plan_id_of(recording: Recording) -> str:

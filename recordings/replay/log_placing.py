@@ -29,6 +29,8 @@ FIRST_NS = 3 * 10**8
 """Time after a log's begin within which a first standstill gives a first pose without noise."""
 
 
+MOST_ASTRAY = 0.4
+"""Share of poses that lie far from both neighbours; with more, the log is not that of one robot."""
 DIRECTION_M = 0.5
 """Length of the path that gives the first direction of driving."""
 LONGEST_TURN_S = 1.0
@@ -84,11 +86,16 @@ def placed(log: FieldLog, mission: Mission, placing: Placing) -> PlacedLog:
     Raises
     ------
     InputError
-        When the log has no pose, several robots, or no transform to the mission frame.
+        When the log has no pose, several robots, poses that jump, or no transform to the mission frame.
     Undecided
         When its standstills fit the stops by no placing, or by several.
     """
     source = chosen(log, placing)
+    if source.astray > MOST_ASTRAY:
+        raise InputError(
+            f"{log.path}: {source.astray:.0%} of its poses jump away and back, as of two robots in one log; "
+            "name each row's robot in a column robot, or give the log of one"
+        )
     track, turns = _track(source)
     transform = _transform(log, source, track, turns, mission, placing)
     offset = round(placing.time_offset_s * 1e9)

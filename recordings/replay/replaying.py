@@ -12,24 +12,26 @@ from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import InputError
+from stopgo.mission.errors import InputError, Undecided
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.run.events import AnyEvent
 from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.mission.stages.sight import Sight
-from stopgo.recordings.logs.field_log import FieldLog, Remark
+from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark
 from stopgo.recordings.replay.driven_mission import must_be_driven
 from stopgo.recordings.replay.followed import followed_events
 from stopgo.recordings.replay.inferred_events import events_of
 from stopgo.recordings.replay.joined_parts import joined
-from stopgo.recordings.replay.log_placing import PlacedLog, Placing, placed
+from stopgo.recordings.replay.log_placing import PlacedLog, Placing, chosen, placed
 from stopgo.recordings.replay.matching import Match, matched, reaches
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.reported_visits import reported_visits
 from stopgo.recordings.replay.standstills import Standstill, find_standstills
 from stopgo.recordings.replay.uploaded import differences_of
 
+FASTER = 50.0
+"""Times the mission's speed at which poses are not in metres."""
 NEAR_ROUTE_M = 2.0
 LEAST_ON_ROUTE, LEAST_WITHOUT_HALTS = 0.5, 0.9
 """Least fraction of the path within NEAR_ROUTE_M of the route; below it, a log is of another mission."""
@@ -45,7 +47,21 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
     Undecided
         When `--align stops` finds no placing, or several.
     """
-    return _compared(log, placed(log, mission, placing), mission, placing, sights)
+    try:
+        return _compared(log, placed(log, mission, placing), mission, placing, sights)
+    except (InputError, Undecided) as error:
+        hint = _unit_hint(chosen(log, placing), mission) if log.poses else ""
+        raise type(error)(f"{error}{hint}") from None
+
+
+def _unit_hint(source: Poses, mission: Mission) -> str:
+    """Return a remark on poses that move much faster than the robot; empty for all others."""
+    step, seconds = np.hypot(*np.diff(source.xy, axis=0).T), np.diff(source.ns) / 1e9
+    moving = (step > 0) & (seconds > 0)
+    speed = float(np.median(step[moving] / seconds[moving])) if moving.any() else 0.0
+    if speed < FASTER * mission.robot.speed:
+        return ""
+    return f"; its poses move at {speed:.0f} m/s: give them in metres, and their times in the column's unit"
 
 
 def replay_parts(

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.settings.toml_file import read_toml
+from stopgo.mission.settings.toml_file import read_toml, with_quotes
 
 AXES = ("file", "storey", "date", "variant")
 DEEPEST = 20
@@ -187,6 +187,7 @@ def _lines_of_tables(path: Path) -> list[int]:
 
 
 def _plain(error: msgspec.ValidationError) -> str:
-    """The library's message with the key first: `storeys[0]: Expected `str`, got `int``."""
+    """The library's message with the key first: `storeys[0]: Expected `str`, got `int`; …`."""
     problem, _, where = str(error).partition(" - at `$.")
-    return f"{where.rstrip('`')}: {problem}" if where else problem
+    named = f"{where.rstrip('`')}: {problem}" if where else problem
+    return with_quotes(named)

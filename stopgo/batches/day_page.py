@@ -44,7 +44,8 @@ def begin_of(text: str) -> float:
     InputError
         When the text is no time of a day.
     """
-    hours, _, minutes = text.partition(":")
+    whole = text.removesuffix(":00") if text.count(":") == 2 else text  # TOML's times have seconds
+    hours, _, minutes = whole.partition(":")
     if not (hours.isdecimal() and minutes.isdecimal() and int(hours) < 24 and int(minutes) < 60):
         raise InputError(f"[day]: begin = {text!r}: give a time such as 07:00")
     return 3600.0 * int(hours) + 60.0 * int(minutes)

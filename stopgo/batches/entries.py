@@ -50,10 +50,11 @@ class EntryFault:
     """A fault of a batch's file that is known before anything is planned."""
 
     place: str
+    """Position in the file; empty if the text names it."""
     text: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.text}"
+        return f"{self.place}: {self.text}" if self.place else self.text
 
 
 @dataclass(frozen=True)

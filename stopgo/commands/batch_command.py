@@ -166,7 +166,8 @@ def _run_command(call: BatchCall) -> int:
 def _collect(store: ResultStore, unused_for: str | None, store_gb: float) -> int:
     oldest = None if unused_for is None else _seconds(unused_for)
     removed, freed = store.collect_garbage(most_bytes=int(store_gb * 1e9), oldest_s=oldest)
-    typer.echo(f"{printable(str(store.folder))}: removed {removed} results, {freed / 1e6:.1f} MB")
+    results = _number(removed, "result", "results")
+    typer.echo(f"{printable(str(store.folder))}: removed {results}, {freed / 1e6:.1f} MB")
     return 0
 
 
@@ -195,7 +196,8 @@ def _print_problems(found: Expansion) -> int:
     for problem in found.problems:
         notice(str(problem))
     if found.problems:
-        notice(f"{len(found.problems)} faults, {len(found.entries)} sound entries; correct the file")
+        sound = f"{_number(len(found.entries), 'sound entry', 'sound entries')}; correct the file"
+        notice(f"{_number(len(found.problems), 'fault', 'faults')}, {sound}")
     return 2 if found.problems else 0
 
 
@@ -207,7 +209,12 @@ def _print_entries(entries: Sequence[Entry], *, as_json: bool) -> None:
         typer.echo(json.dumps({"entries": listed}, ensure_ascii=False))
         return
     typer.echo(table(header, rows))
-    typer.echo(f"{len(entries)} entries")
+    typer.echo(_number(len(entries), "entry", "entries"))
+
+
+def _number(count: int, one: str, many: str) -> str:
+    """Return a count with its noun."""
+    return f"{count} {one if count == 1 else many}"
 
 
 def _run(batch: Batch, workers: int, scheduler: str | None, store_gb: float) -> BatchRecord:
@@ -215,7 +222,7 @@ def _run(batch: Batch, workers: int, scheduler: str | None, store_gb: float) -> 
     from stopgo.batches.engine import Running, engine_for
     from stopgo.batches.store import ResultStore
 
-    with running(f"looking up {len(batch.entries)} plans") as step:
+    with running(f"looking up {_number(len(batch.entries), 'plan', 'plans')}") as step:
         try:
             left = batch.take_kept()
             if left:

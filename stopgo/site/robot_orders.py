@@ -41,10 +41,17 @@ class StopRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class OrderRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An order to one robot; sent again with the same `id`, it is given once."""
+    """An order to one robot; sent again with the same `id`, it is given once.
+
+    The robot refuses it if it has another mission, run or stop than the page showed: another page may have
+    ordered meanwhile.
+    """
 
     id: str
     verb: Verb
+    mission_id: str | None = None
+    revision: int | None = None
+    run_id: str | None = None
     stop: str | None = None
     take_over: bool = False
     again: bool = False
@@ -110,12 +117,7 @@ class RobotOrders:
             return self._once(
                 request.id, name, partial(self._stop, request.id, robot, request.verb), self._stops
             )
-        details: dict[str, Any] = {"take_over": request.take_over, "stop": request.stop}
-        if request.verb == "start":
-            details = {
-                "take_over": request.take_over, "again": request.again, "from_here": request.from_here
-            }  # fmt: skip
-        give = partial(robot.station.command, request.verb, **details)
+        give = partial(robot.station.command, request.verb, **_details(request))
         return self._once(
             request.id, name, partial(self._run, request.id, robot, request.verb, give), self._others
         )
@@ -211,6 +213,17 @@ class RobotOrders:
     def _tell(self, record: OrderRecord) -> None:
         kind = "stop" if record.verb in ("pause", "abort") else "order"
         self._feed.tell((kind, record.robot), asdict(record), at_once=True)
+
+
+def _details(request: OrderRequest) -> dict[str, Any]:
+    """Return the fields of the command that the station does not fill in itself."""
+    if request.verb == "start":
+        return {
+            "take_over": request.take_over, "again": request.again, "from_here": request.from_here,
+            "mission_id": request.mission_id, "revision": request.revision,
+        }  # fmt: skip
+    stop = request.stop if request.verb in ("skip", "retry") else None
+    return {"take_over": request.take_over, "run_id": request.run_id, "stop": stop}
 
 
 def _stands(robot: LiveRobot, since_s: float) -> bool:

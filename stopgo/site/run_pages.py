@@ -17,7 +17,14 @@ from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.files.mission_json import read
-from stopgo.recordings.catalog.run_index import RunIndex, index_of, run_cells, stamp_of
+from stopgo.recordings.catalog.run_index import (
+    IndexedFile,
+    RunIndex,
+    index_by_parts,
+    index_of,
+    run_cells,
+    stamp_of,
+)
 from stopgo.recordings.page import report_html
 from stopgo.site.planning import WorkLane
 from stopgo.site.planning_work import CommandTask
@@ -58,13 +65,24 @@ class RunRoom:
         self._merged_folder = merged
         self._lane = lane
         self._one_at_a_time = threading.Lock()
+        self._known: dict[str, IndexedFile] = {}
+        """State of the files of a folder that takes no index."""
         self._merged: dict[str, MergedFiles] = {}
         self._secrets: dict[str, tuple[str, float]] = {}
 
     def listed(self) -> dict[str, Any]:
-        """Return the missions with plans and runs, the newest run's first."""
+        """Return the missions with plans and runs, the newest run's first, and the recordings left to read.
+
+        Each call reads a part of those that are new or changed, so that a large folder shows its progress.
+        """
         with self._one_at_a_time:
-            index = without_repeats(self._index())
+            index, left = next(index_by_parts(self._folder.root, kept=self._known))
+            if _has_gone(self._folder.root, index):
+                index, left = next(index_by_parts(self._folder.root, kept=self._known))
+        return {"missions": self._missions(index), "faults": index.faults(), "left": left}
+
+    def _missions(self, whole: RunIndex) -> list[dict[str, Any]]:
+        index = without_repeats(whole)
         plans = {plan.mission_id: (name, plan) for name, plan in index.plans()}
         missions = []
         for mission_id in files_of(index):
@@ -79,7 +97,7 @@ class RunRoom:
                 "coverage": None if plan is None else plan.coverage,
                 "runs": [{"file": name, "answer": run.answer, **run_cells(run)} for name, run in runs],
             })  # fmt: skip
-        return {"missions": missions, "faults": index.faults()}
+        return missions
 
     def report(self, key: str) -> bytes:
         """Return the report of a mission's plan and runs together, as one page."""
@@ -152,7 +170,9 @@ class RunRoom:
         NegativeResult
             If nothing is left, or it is not known what is.
         """
-        listed = next((one for one in self.listed()["missions"] if one["key"] == key), None)
+        with self._one_at_a_time:
+            index = self._index()
+        listed = next((one for one in self._missions(index) if one["key"] == key), None)
         if listed is None or listed["file"] is None:
             raise InputError("the folder has no mission.json next to the plan of these runs")
         path = self._folder.file(listed["file"])

@@ -100,9 +100,18 @@ def test_faults_of_the_file_are_reported_before_anything_is_planned(site: Path) 
     code, record, error = batch(site)
     assert (code, record["error"]["exit_code"] if "error" in record else 2) == (2, 2)
     assert "x.dxf: no such file" in error
+    assert "1 fault, 2 sound entries; correct the file" in error
     assert not (site / "out" / "a").exists()
     code, record, _ = batch(site, "--skip-faulty")
     assert (code, statuses(record)) == (2, {"a": "planned", "b": "planned"})
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_fault_of_a_table_names_its_place_once(site: Path) -> None:
+    batch_file(site, TWO + '\n[[floors]]\nfiles = "a.dxf"\nstoreys = [1]')
+    code, _, error = batch(site, "--dry-run")
+    assert code == 2
+    assert f"stopgo: {site / 'plans.toml'}: line" in error
 
 
 def test_a_dry_run_lists_the_entries_and_plans_nothing(site: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from stopgo.batches import engine
+from stopgo.batches.batch_file import read_day
 from stopgo.batches.day_page import begin_of
 from stopgo.batches.day_plan import DayJob, DayPlan, DayRobot, plan_day, read_transfers, span
 from stopgo.batches.entries import Entry
@@ -177,3 +178,10 @@ def test_a_day_has_a_page_for_each_robot(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(list(folder.glob("r_2*.html"))) == 1, "a name that is no path"
     assert called(*batch, "--day", "soon").returncode == 2
     assert called(*batch, "--since", "last").returncode == 2
+
+
+def test_a_time_without_quotes_begins_a_day(tmp_path: Path) -> None:
+    table = read_day(batch_file(tmp_path, '[day]\nbegin = 08:15:00\nrobots = [{ name = "r1" }]'))
+    assert begin_of(table.begin) == 8.25 * 3600
+    with pytest.raises(InputError, match="begin = '08:15:30': give a time such as 07:00"):
+        begin_of("08:15:30")

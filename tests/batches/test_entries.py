@@ -137,3 +137,16 @@ def test_files_that_include_each_other_are_refused(tmp_path: Path) -> None:
     (tmp_path / "other.toml").write_text('include = ["plans.toml"]')
     _, problems = read_batch(batch_file(tmp_path, 'include = ["other.toml"]'))
     assert "is included by itself (plans.toml -> other.toml -> plans.toml)" in problems[0]
+
+
+def test_dates_without_quotes_are_entries(tmp_path: Path) -> None:
+    text = '[[floors]]\nfiles = "a.ifc"\nstoreys = ["EG"]\ndates = [2026-01-01]\n'
+    text += "override = [{ when = { date = 2026-01-01 }, options = { range = 7.0 } }]"
+    found = expanded(tmp_path, text)
+    assert names(found) == ["a/EG/2026-01-01"]
+    assert only(found).settings.range == 7.0
+
+
+def test_a_number_where_a_text_belongs_needs_quotes(tmp_path: Path) -> None:
+    _, problems = read_batch(batch_file(tmp_path, '[[floors]]\nfiles = "a.ifc"\nstoreys = [1]'))
+    assert problems[0].endswith("storeys[0]: Expected `str`, got `int`; write it in quotes")

@@ -50,13 +50,18 @@ def test_a_day_from_the_floor_to_the_report(world: BrowserWorld) -> None:
     """Push, start, skip a held stop, finish, read the report, and plan what is missing."""
     with world.tab() as tab:
         push_on_page(tab, "r1", "The robot holds no mission.")
+        tab.run(NOTE_ORDERS)
         tab.press("Start", card("r1", "button"))
         tab.shows("Started by anna", ".events")
         state_is(tab, "r1", "HELD")
         tab.shows("HELD: ", card("r1", ".reason"))
         tab.press("Skip stop", card("r1", "button"))
+        tab.shows("Leave stop s02 of r1 out?", ".question")
         tab.press("Skip stop", ".question button")
         tab.shows("skipped", ".events")
+        start, skip = tab.run("window.orders")
+        assert (start["revision"], skip["stop"]) == (1, "s02")
+        assert len(start["mission_id"]) == 32 and skip["run_id"]
         state_is(tab, "r1", "finished")
         tab.until("document.querySelectorAll('.map .stop.done').length > 0")
         tab.until("document.querySelectorAll('.map .stop.skipped').length == 1")
@@ -70,6 +75,12 @@ def test_a_day_from_the_floor_to_the_report(world: BrowserWorld) -> None:
         tab.shows("1 stops for what is missing: plans/house/follow-up/mission.json")
         follow_up = "plans/house/follow-up/mission.json"
         push_on_page(tab, "r1", "is replaced by another mission", file=follow_up)
+
+
+NOTE_ORDERS = """{ const real = window.fetch; window.orders = []; window.fetch = (to, given) => {
+  if (String(to).endsWith("/orders")) window.orders.push(JSON.parse(given.body));
+  return real(to, given); } }"""
+"""Keep the orders that the page gives."""
 
 
 NO_ANSWER = """{ const real = window.fetch; window.fetch = (to, ...rest) => String(to).includes("/api/stop")

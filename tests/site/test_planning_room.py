@@ -18,6 +18,7 @@ from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.mission_json import read
 from stopgo.planner.floors.ifc import loading
 from stopgo.planner.floors.ifc.extract import main as extract
+from stopgo.recordings.catalog import run_index
 from stopgo.recordings.page import reviewed
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.kept_variants import kept_variants
@@ -215,6 +216,23 @@ def test_saved_plans_are_listed_and_downloaded(room: PlanningRoom, place: Path, 
     assert back.recording_of_secret(secret).startswith(b"RRF2")
     with pytest.raises(InputError, match="too old"):
         back.recording_of_secret("guessed")
+
+
+def test_a_large_folder_is_listed_by_parts(
+    room: PlanningRoom, place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    back = RunRoom(SiteFiles.at(place), tmp_path, room.files)
+    assert back.listed()["left"] == 0
+    monkeypatch.setattr(run_index, "PART", 1)
+    copies = [place / f"copy-{number}.rrd" for number in range(2)]
+    plan = (place / back.listed()["missions"][0]["file"]).with_name("plan.rrd")
+    try:
+        for copy in copies:
+            copy.write_bytes(plan.read_bytes())
+        assert [back.listed()["left"] for _ in range(2)] == [1, 0]
+    finally:
+        for copy in copies:
+            copy.unlink()
 
 
 def test_a_recording_that_is_renamed_while_it_is_read_is_read_again(

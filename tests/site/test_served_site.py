@@ -6,19 +6,30 @@ import http.client
 import json
 import socket
 import ssl
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import now_utc
 from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.robot.program import RobotOptions, robot_on
+from stopgo.bridge.robot.robot_hardware import SimulatedBody
+from stopgo.bridge.robot.simulated_faults import read_faults
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission, with_digest
+from stopgo.mission.files.mission_json import write
 from stopgo.site.request_checks import KEY_HEADER
 from stopgo.site.server_certificate import own_certificate
 from stopgo.site.web_server import SiteOptions, _certificates, serving_site
 from tests.ports import free_port
+from tests.recordings import world
+from tests.waiting import wait_until
 
 STOP = {"id": "s1"}
 
@@ -101,3 +112,51 @@ def test_who_may_order_follows_the_keys(tmp_path: Path, role: Any, may: bool) ->
         _, me = browser.send("GET", "/api/me")
         assert (me["role"], me["commander"]) == ("operator" if may else "viewer", "vera")
         assert browser.send("POST", "/api/stop", STOP)[0].status == (200 if may else 409)
+
+
+def order(browser: Browser, verb: str, **fields: Any) -> tuple[str, str]:
+    """Give an order, and return its outcome with the state or the reason."""
+    path = "/api/robots/r1/" + ("push" if verb == "push" else "orders")
+    given = {"id": uuid.uuid4().hex, **({} if verb == "push" else {"verb": verb}), **fields}
+    answer, body = browser.send("POST", path, given)
+    assert answer.status == 200, body
+    (record,) = body["orders"]
+    return record["outcome"], record["reason"] or record["state"]
+
+
+@pytest.fixture
+def served_robot(tmp_path: Path) -> Iterator[tuple[Browser, Station]]:
+    """A page of a site with a robot whose first stop is blocked, and another station."""
+    board, port, keys = Switchboard(), free_port(), KeyExpressions("r1")
+    body = SimulatedBody(tmp_path / "r1", faults=read_faults(["blocked@1"]))
+    robot = RobotOptions(name="r1", listen="", state=tmp_path / "r1", body=body, speed_up=60.0)
+    options = SiteOptions(tmp_path / "site", "", robots=("r1",), port=port)
+    with (
+        robot_on(board.link(), keys, robot),
+        serving_site(options, say=quiet, link=board.link()) as address,
+    ):
+        page = Browser(http.client.HTTPConnection("127.0.0.1", port), address)
+        yield page, Station(board.link(), keys, commander="ben")
+
+
+def test_an_order_for_what_another_page_has_changed_is_refused(
+    served_robot: tuple[Browser, Station], tmp_path: Path
+) -> None:
+    """One page started what the other had pushed; two that skipped one stop skipped two."""
+    page, station = served_robot
+    first = world.nouns_at()[-1]
+    assert isinstance(first, Mission)
+    second = with_digest(structs.replace(first, id="f" * 32))
+    write(first, tmp_path / "site" / "first.json")
+    write(second, tmp_path / "site" / "second.json")
+    assert order(page, "push", file="first.json")[0] == "ok"
+    assert order(page, "push", file="second.json")[0] == "ok"
+    shown = {"mission_id": first.id, "revision": first.revision}
+    assert order(page, "start", **shown) == ("refused", "wrong_mission")
+    assert order(page, "start", **{**shown, "mission_id": second.id}) == ("ok", "RUNNING")
+    held = wait_until(lambda: (state := station.status()).state == "HELD" and state)
+    skip = {"run_id": held.run_id, "stop": "S1"}
+    assert order(page, "skip", **{**skip, "run_id": "another"}) == ("refused", "wrong_run")
+    assert order(page, "skip", **skip)[0] == "ok"
+    assert order(page, "skip", **skip)[0] == "refused"
+    assert station.status().skipped == ("S1",)

@@ -28,8 +28,12 @@ class Door:
 
 
 def doors_on(level: Level, model: Model, walls: dict[str, Region]) -> list[Door]:
-    """The doors of a floor; `walls` are the cut walls by GlobalId."""
-    found = (_door(product, mesh, level, model, walls) for product, mesh in model.of_role("doors"))
+    """The doors of a floor; `walls` are the cut walls by GlobalId. One without a body is as its opening."""
+    found = []
+    for product in sorted(model.products.values(), key=lambda item: item.global_id):
+        mesh = model.meshes.get(product.global_id, model.meshes.get(product.opening or ""))
+        if product.role == "doors" and mesh is not None:
+            found.append(_door(product, mesh, level, model, walls))
     return [door for door in found if door is not None]
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -184,11 +184,22 @@ def extracted(model: ifcopenshell.file, shapes: Iterable[Made], *, damage: tuple
         place=place_of(model, unit),
         left_out=_left_out(model, owners),
         failed=tuple(map(_in_words, failed)),
+        bodiless=tuple(_in_words(entity) for entity, role in chosen if _is_bodiless(entity, role, own)),
         boxed=tuple(_in_words(entities[item.number]) for item in made if item.way == BOX),
         uncut=tuple(_in_words(entities[item.number]) for item in made if item.way in UNCUT),
         damage=damage,
     )
     return Model(described, vertices, faces)
+
+
+def _is_bodiless(entity: Any, role: str, made: Mapping[int, Sequence[Made]]) -> bool:
+    """True for a product that has no body, no shape of its parts, and no parts that may have one.
+
+    A door or a window without a body is known by its opening.
+    """
+    if role == "openings" or has_body(entity) or made.get(entity.id()) or getattr(entity, "FillsVoids", ()):
+        return False
+    return not ifcopenshell.util.element.get_parts(entity)
 
 
 def _in_words(entity: Any) -> str:

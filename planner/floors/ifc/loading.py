@@ -22,7 +22,7 @@ from stopgo.planner.floors.ifc.model import Model, unpacked
 from stopgo.planner.floors.ifc.model import packed as pack
 from stopgo.planner.floors.reader import FloorFile
 
-FORM = 8
+FORM = 9
 """Raised whenever what is kept of a model, or how it is read, changes."""
 MOST_KEPT = 2 * 1024**3
 """Bytes of models that are kept; the ones longest unused go first."""

@@ -104,6 +104,8 @@ class Described(msgspec.Struct, frozen=True, kw_only=True):
     """Products by class that no plan is made of, such as furniture."""
     failed: tuple[str, ...] = ()
     """Products whose geometry could not be made, in words."""
+    bodiless: tuple[str, ...] = ()
+    """Products that the model gives no body, in words."""
     boxed: tuple[str, ...] = ()
     """Products that are shown as the box around their points, in words."""
     uncut: tuple[str, ...] = ()

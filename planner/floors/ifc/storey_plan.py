@@ -105,9 +105,13 @@ def _as_of(item: Element, found: Statuses | None, options: FloorOptions) -> Elem
 def odd_products(model: Model) -> list[Finding]:
     """Products that could not be shaped, each by name."""
     described = model.described
+    spaces = [name for name in described.bodiless if name.startswith("IfcSpace ")]
+    solids = [name for name in described.bodiless if name not in spaces]
     return [
         *(Finding("damaged_model", f"the file is damaged: {legible(text)}") for text in described.damage),
         *(Finding("no_geometry", f"{name} has no shape that can be made") for name in described.failed),
+        *_named("no_body", solids, "have no body in the model and are left out"),
+        *_named("space_without_body", spaces, "have no body in the model: their floor has no name"),
         *_named("box_shape", described.boxed, "have no shape that can be made and are shown as boxes"),
         *_named("uncut_shape", described.uncut, "are shown without the openings cut out of them"),
         *(Finding("kernel_crashed", f"{name} crashed the geometry kernel") for name in described.crashed),

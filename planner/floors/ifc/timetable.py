@@ -32,7 +32,7 @@ ORDERS: tuple[Order, ...] = get_args(Order)
 """Orders of the parts of a day without a year of four digits in front, the likeliest first."""
 USUAL: Mapping[str, tuple[Order, ...]] = {
     "/": ORDERS,
-    "-": ("day/month/year", "year/month/day"),
+    "-": ORDERS,
     ".": ("day/month/year",),
 }
 """Orders that a separator leaves open, where no day of the file shows which it is."""

@@ -19,11 +19,12 @@ export function makeBack(main, me) {
 
 async function load(list, note, me) {
   try {
-    const { missions, faults } = await read("/api/runs");
-    say(note, missions.length ? "" : t("no_recordings"));
-    note.hidden = missions.length > 0;
+    const { missions, faults, left } = await read("/api/runs");
+    say(note, left ? t("reading_left", { n: left }) : missions.length ? "" : t("no_recordings"));
+    note.hidden = !left && missions.length > 0;
     fill(list, missions.map((one) => mission(one, me, () => load(list, note, me))),
       faults.map((fault) => h("p", { class: "bad" }, fault)));
+    if (left && list.isConnected) load(list, note, me);
   } catch (error) {
     say(note, error.message);
   }

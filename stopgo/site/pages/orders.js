@@ -45,10 +45,17 @@ export function resultText(record) {
 }
 
 function pressed(name, verb, button, question) {
-  const again = ["FINISHED", "ABORTED"].includes(get("robot", name)?.state);
-  if (ASK_FIRST.includes(verb) || (verb === "start" && again)) {
-    ask(question, t(`confirm_${verb}`, { robot: name }), t(`verb_${verb}`), () => give(name, { verb, again: verb === "start" && again }, question));
-  } else give(name, { verb }, question);
+  const seen = get("robot", name) ?? {};
+  const again = verb === "start" && ["FINISHED", "ABORTED"].includes(seen.state);
+  const order = { verb, again, ...meant(verb, seen) };
+  if (ASK_FIRST.includes(verb) || again) {
+    ask(question, t(`confirm_${verb}`, { robot: name, stop: seen.stop ?? "" }), t(`verb_${verb}`), () => give(name, order, question));
+  } else give(name, order, question);
+}
+
+// What an order is for, as the page shows it: the robot refuses it if another page has changed that meanwhile.
+function meant(verb, { mission_id, revision, run_id, stop }) {
+  return verb === "start" ? { mission_id, revision } : { run_id, stop };
 }
 
 function ask(question, text, yes, work) {

@@ -240,3 +240,25 @@ def test_the_printed_file_explains_itself() -> None:
     lines = settings_toml(Settings()).splitlines()
     assert lines[lines.index("clearance = 0.7") - 1] == "# Minimum distance stop to element, m"
     assert "# robot_radius = (half of min_door_width)" in lines
+
+
+def test_a_date_without_quotes_is_read_as_its_text(tmp_path: Path) -> None:
+    file = tmp_path / "plan.toml"
+    file.write_text("[floor]\ndate = 2026-11-30\n", encoding="utf-8")
+    assert read_settings(file, {}).date == "2026-11-30"
+    file.write_text("[floor]\ndate = 07:32:00\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"^--date 07:32:00: is no day; write it as YYYY-MM-DD"):
+        read_settings(file, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("[floor]\nstorey = 1", "storey = 1: .*; write it in quotes$"),
+        ('[robot]\nspeed = "0.5"', 'speed = "0.5": .*; write it without quotes$'),
+    ],
+)
+def test_missing_and_extra_quotes_are_named(tmp_path: Path, text: str, remedy: str) -> None:
+    (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=remedy):
+        read_settings(tmp_path / "plan.toml", {})

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import io
+import os
 from pathlib import Path
 
 import pytest
@@ -65,6 +67,25 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
 def test_a_device_is_not_read_without_end() -> None:
     assert "is a device" in refusal(Path("/dev/zero"))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    """It was read for ever, or was "empty" when it was read again."""
+    os.mkfifo(tmp_path / "pipe.dxf")
+    assert "is a pipe, and a floor is read more than once" in refusal(tmp_path / "pipe.dxf")
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("hall.ifc", gzip.compress(b"ISO-10303-21;"), "is compressed with gzip; unpack it first"),
+        ("hall.dxf.gz", gzip.compress(b"  0\nSECTION"), "is compressed with gzip; unpack it first"),
+        ("hall.zip", b"PK\x03\x04 a drawing", "is compressed; unpack it first"),
+    ],
+)
+def test_a_compressed_file_says_what_to_do(tmp_path: Path, name: str, data: bytes, says: str) -> None:
+    assert says in refusal(tmp_path / name, data)
 
 
 def test_a_directory_is_named(tmp_path: Path) -> None:

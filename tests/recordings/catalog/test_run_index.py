@@ -6,12 +6,14 @@ import json
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
 
 from stopgo.command_line import main
 from stopgo.recordings.catalog import run_index
-from stopgo.recordings.catalog.run_index import INDEX, index_of, index_text
+from stopgo.recordings.catalog.run_index import INDEX, IndexedFile, index_by_parts, index_of, index_text
 from tests.recordings import run, world
 
 
@@ -91,3 +93,85 @@ def test_a_folder_without_recordings_has_none(tmp_path: Path, capsys: pytest.Cap
 
 def test_texts_of_recordings_do_not_reach_the_terminal_as_they_are(folder: Path) -> None:
     assert "\x1b" not in index_text(index_of(folder))
+
+
+def test_a_run_is_compared_again_when_its_plan_comes_and_goes(
+    sighted: Path, skipping: Path, tmp_path: Path
+) -> None:
+    """Its coverage stayed unknown, or that of the plan that had gone."""
+    shutil.copy(skipping, tmp_path / "run.rrd")
+
+    def coverage() -> float | None:
+        ((_, found),) = index_of(tmp_path).runs()
+        return found.coverage
+
+    assert coverage() is None
+    shutil.copy(sighted, tmp_path / "plan.rrd")
+    assert coverage() == pytest.approx(8 / 14)
+    (tmp_path / "plan.rrd").unlink()
+    assert coverage() is None
+
+
+def test_a_large_folder_is_read_by_parts_and_goes_on_where_it_was_ended(
+    sighted: Path, skipping: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing was kept before all was read. Files that have plan and run are read at most once more."""
+    for number in range(3):
+        shutil.copy(skipping, tmp_path / f"run-{number}.rrd")
+    shutil.copy(sighted, tmp_path / "plan.rrd")
+    for age, name in enumerate(("run-0", "plan", "run-1", "run-2")):
+        os.utime(tmp_path / f"{name}.rrd", (age, age))
+    monkeypatch.setattr(run_index, "PART", 1)
+    index, left = next(index_by_parts(tmp_path))
+    assert (list(index.files), left) == (["run-0.rrd"], 3)
+    rest = [(sorted(index.files), left) for index, left in index_by_parts(tmp_path)]
+    assert [left for _, left in rest] == [3, 2, 1, 0]
+    assert rest[0][0] == ["plan.rrd"] and len(rest[-1][0]) == 4
+    assert [found.coverage for _, found in index_of(tmp_path).runs()] == pytest.approx([8 / 14] * 3)
+
+
+def test_a_folder_that_takes_no_index_is_read_to_its_end(
+    skipping: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(3):
+        shutil.copy(skipping, tmp_path / f"run-{number}.rrd")
+    monkeypatch.setattr(run_index, "PART", 1)
+    (tmp_path / INDEX).mkdir()
+    said: list[str] = []
+    assert len(index_of(tmp_path, say=said.append).files) == 3
+    assert any(INDEX in line for line in said)
+    kept: dict[str, IndexedFile] = {}
+    assert [next(index_by_parts(tmp_path, kept=kept))[1] for _ in range(4)] == [2, 1, 0, 0]
+
+
+def test_threads_that_want_one_index_share_the_work(
+    skipping: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the map and the list of a site that begins."""
+    for number in range(4):
+        shutil.copy(skipping, tmp_path / f"run-{number}.rrd")
+    read, counted = run_index._read, []
+
+    def counting(folder: Path, stale: dict[str, run_index.Stamp], others: dict[str, IndexedFile]) -> Any:
+        counted.extend(stale)
+        return read(folder, stale, others)
+
+    monkeypatch.setattr(run_index, "_read", counting)
+    monkeypatch.setattr(run_index, "PART", 1)
+    first, second = index_by_parts(tmp_path), index_by_parts(tmp_path)
+    assert [next(one)[1] for one in (first, second, first, second)] == [3, 2, 1, 0]
+    assert len(counted) == len(set(counted)) == 4
+
+
+def test_a_later_revision_of_a_plan_reads_no_earlier_run_again(
+    sighted: Path, skipping: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As each variant that is saved on the page."""
+    shutil.copy(skipping, tmp_path / "run.rrd")
+    shutil.copy(sighted, tmp_path / "plan.rrd")
+    before = index_of(tmp_path)
+    shutil.copy(sighted, tmp_path / "next.rrd")
+    later = msgspec.structs.replace(before.files["plan.rrd"].plans[0], revision=2)
+    found = msgspec.structs.replace(before.files["plan.rrd"], plans=(later,))
+    monkeypatch.setattr(run_index, "_read", lambda folder, stale, others: dict.fromkeys(stale, found))
+    assert [left for _, left in index_by_parts(tmp_path)] == [0]

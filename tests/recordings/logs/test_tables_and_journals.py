@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import sqlite3
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -97,6 +98,56 @@ def test_a_stamp_with_digits_run_together_is_a_line_that_cannot_be_read(
     log = read_log(path)
     assert log.lost == "1 of 4 lines cannot be read"
     assert log.seconds == 2.0
+
+
+SQUARE = [
+    *((0.5 * n, 0.0, 0.0) for n in range(9)),
+    *((4.0, 0.5 * n, 90.0) for n in range(9)),
+    *((4.0 - 0.5 * n, 4.0, 180.0) for n in range(9)),
+    *((0.0, 4.0 - 0.5 * n, 270.0) for n in range(9)),
+]
+"""x, y and the heading in degrees."""
+
+
+@pytest.mark.parametrize(
+    ("column", "written", "name"),
+    [
+        ("yaw", lambda heading: heading, "yaw_deg"),
+        ("heading", lambda heading: (heading + 180) % 360, "heading_deg"),
+        ("heading", lambda heading: (90 - heading) % 360, "bearing_deg"),
+        ("heading", lambda heading: math.radians(heading) + 4 * math.pi, ""),
+        ("heading_rad", lambda heading: heading, ""),
+    ],
+)
+def test_headings_in_degrees_are_not_taken_for_radians(
+    tmp_path: Path, column: str, written: Callable[[float], float], name: str
+) -> None:
+    """Every stop of a scanner with a field of view was denied for its heading."""
+    path = tmp_path / "a.csv"
+    rows = [f"{n},{x},{y},{written(heading)}" for n, (x, y, heading) in enumerate(SQUARE)]
+    path.write_text("\n".join([f"time,x,y,{column}", *rows]))
+    if not name:
+        assert len(read_log(path).poses[0].ns) == len(SQUARE)
+        return
+    with pytest.raises(InputError, match=f"the headings in {column} are degrees; name it {name}$"):
+        read_log(path)
+
+
+def test_a_time_in_milliseconds_since_1970_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time,x,y\n1700000000000,1,2\n1700000000100,1,2\n")
+    with pytest.raises(InputError, match="time 1700000000100 is no second since 1970; name it time_ms"):
+        read_log(path)
+
+
+def test_a_pose_with_a_wrong_time_makes_no_gap(tmp_path: Path) -> None:
+    """Its own line said that it is left out, two others that 54 years are missing."""
+    path = tmp_path / "a.csv"
+    rows = [f"{0 if n == 9 else 1_700_000_000 + n / 10},{n / 10},0" for n in range(40)]
+    path.write_text("\n".join(["time,x,y", *rows]))
+    assert read_log(path).poses[0].oddities == (
+        "1 of 40 poses have a time far from that of their neighbours; left out",
+    )
 
 
 @pytest.mark.parametrize("content", ["a,b\n1,2\n", "time,x,y\n", "time,x,y\nu,v,w\n", "\n"])

@@ -168,3 +168,42 @@ def test_junk_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     path.write_bytes(b"junk" * 100)
     assert main(["review", str(path)]) == 2
     assert capsys.readouterr().err == f"stopgo: {path}: is not a Rerun recording\n"
+
+
+def other_revision_1(mission: Mission) -> Mission:
+    """Return a mission with the same id and revision, whose second stop has another id and lies elsewhere."""
+    first, second = mission.stops
+    moved = msgspec.structs.replace(second, id="S9", x=second.x - 0.3)
+    return with_digest(msgspec.structs.replace(mission, stops=(first, moved)))
+
+
+def test_a_plan_of_another_mission_with_this_id_and_revision_is_named_and_not_compared(
+    sighted: Path, mission: Mission, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The plan's S2 was "withdrawn", and its coverage that of the run."""
+    field, page, merged = tmp_path / "field.rrd", tmp_path / "page.html", tmp_path / "merged.rrd"
+    with FieldRecording(field, other_revision_1(mission)) as recording:
+        for report in run.reports(other_revision_1(mission)):
+            tell(recording, report)
+    files = [str(sighted), str(field)]
+    assert main(["review", *files, "--html", str(page), "-o", str(merged), "--check"]) == 1
+    text = capsys.readouterr().out
+    assert f"problem: {sighted} has another mission with id {mission.id} and revision 1 (digest" in text
+    assert "withdrawn" not in text and "S2" not in text
+    assert f"{sighted} has another mission" in page.read_text()
+    assert [item.stops[1].id for item in read_recording(merged).missions] == ["S9"]
+    assert main(["review", *files, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["recordings"][1]["runs"][0]
+    assert ([stop["stop"] for stop in told["stops"]], told["coverage"]) == (["S1", "S9"], None)
+
+
+def test_runs_of_two_missions_with_one_id_and_revision_are_not_judged_together(
+    field: Path, mission: Mission, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = run_without(tmp_path / "other.rrd", other_revision_1(mission), "S9")
+    assert main(["review", str(field), str(other), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["together"] == []
+    assert main(["review", str(field), str(other), "--html", str(tmp_path / "page.html")]) == 2
+    error = capsys.readouterr().err
+    assert f"{field}: {other} has another mission with id {mission.id} and revision 1" in error
+    assert error.rstrip().endswith("give the recordings of one of them")

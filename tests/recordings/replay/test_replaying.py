@@ -16,13 +16,13 @@ from msgspec.structs import replace as changed
 import stopgo
 from stopgo.command_line import main
 from stopgo.mission.document import Frame, Mission, with_digest
-from stopgo.mission.errors import InputError
+from stopgo.mission.errors import InputError, Undecided
 from stopgo.mission.files.mission_json import write
 from stopgo.mission.frames.transform import SiteOrigin, Transform
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
 from stopgo.recordings.replay.drive_verdict import drive_verdict
-from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.log_placing import Align, Placing
 from stopgo.recordings.replay.path_and_time import driven_path, lost_times
 from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
 from stopgo.recordings.replay.replaying import replay
@@ -134,6 +134,26 @@ def test_several_robots_are_not_mixed() -> None:
     with pytest.raises(InputError, match="several robots"):
         replay(log, MISSION, FIRST)
     assert replay(log, MISSION, Placing(align="first", robot="r2")).placed.source.robot == "r2"
+
+
+def test_poses_of_two_robots_by_turns_are_refused() -> None:
+    """Nearly all were left out, and the others were "never near a stop"."""
+    mission, other = wandering(4), wandering(5)
+    one, two = (logged(driven(item)) for item in (mission, other))
+    count = min(len(one), len(two))
+    ns = np.stack([one.ns[:count], two.ns[:count] + 10**7], axis=1).ravel()
+    xy = np.stack([one.xy[:count], two.xy[:count]], axis=1).reshape(-1, 2)
+    with pytest.raises(InputError, match="% of its poses jump away and back, as of two robots in one log"):
+        replay(log_of(Track.of(ns, xy, np.zeros(2 * count))), mission, Placing(align="first"))
+
+
+@pytest.mark.parametrize(("align", "error"), [("first", InputError), ("stops", Undecided)])
+def test_poses_in_millimetres_are_named(align: Align, error: type[Exception]) -> None:
+    mission = wandering(4)
+    track = logged(driven(mission))
+    millimetres = Track.of(track.ns, track.xy * 1000, track.heading)
+    with pytest.raises(error, match=r"; its poses move at \d+ m/s: give them in metres"):
+        replay(log_of(millimetres), mission, Placing(align=align))
 
 
 def test_a_time_offset_moves_the_run_and_is_reported() -> None:

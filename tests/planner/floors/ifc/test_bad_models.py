@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -117,6 +118,18 @@ def test_a_product_without_a_shape_is_named_and_the_rest_goes_on(read: Read) -> 
     assert not [item for item in floor.elements if item.kind == "columns"]
     (told,) = [item for item in floor.findings if item.code == "no_geometry"]
     assert column.GlobalId in told.message
+
+
+def test_a_product_without_a_body_is_named(read: Read) -> None:
+    """A column was not there, and a room had no name, without a word."""
+    house = two_rooms()
+    for name in ("column", "right", "door"):
+        house.things[name].Representation = None
+    floor = read(house)
+    told = {item.code: item.message for item in floor.findings}
+    assert len(floor.openings) == 1, "its opening shows where the door is"
+    assert re.search("no body in the model and are left out: IfcColumn .* 'column'$", told["no_body"])
+    assert re.search("no body in the model: .*: IfcSpace .* 'right'$", told["space_without_body"])
 
 
 def test_a_product_that_crashes_the_kernel_is_left_out_and_named(

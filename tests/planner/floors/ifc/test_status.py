@@ -268,6 +268,7 @@ def test_a_schedule_whose_global_ids_lost_their_capitals_is_reported_as_unrelate
         ("guid,finish\nx,soon\n", "line 2: finish = 'soon' is no day; write days as YYYY-MM-DD"),
         ("guid,finish\nx,31-13-2024\n", "line 2: finish = '31-13-2024' is no day"),
         ("guid,finish\nx,3/4/2024\n", "'3/4/2024' may be day/month or month/day"),
+        ("guid,finish\nx,03-04-2024\n", "'03-04-2024' may be day/month or month/day"),
         ("guid,finish\nx,24-02-01\n", "line 2: finish = '24-02-01' may be day/month/year or year/month/day"),
         ("guid,finish\nx,\ny,5/4/24\n", "line 3: finish = '5/4/24' may be day/month/year or month/day/year"),
         ("guid,finish\nx,24-02-01\nx,45-02-01\nx,01-02-45\n", "'45-02-01' is no day"),
