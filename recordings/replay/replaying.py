@@ -51,6 +51,8 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
         return _compared(log, placed(log, mission, placing), mission, placing, sights)
     except (InputError, Undecided) as error:
         hint = _unit_hint(chosen(log, placing), mission) if log.poses else ""
+        if not hint:
+            raise
         raise type(error)(f"{error}{hint}") from None
 
 
