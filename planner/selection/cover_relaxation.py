@@ -32,7 +32,7 @@ class CoverRelaxation:
 
     def solution(self) -> Solution | None:
         """The cheapest solution, with knapsack cover inequalities added; None if the solver fails."""
-        solution, cuts = tightened(self._programme, self._cover)
+        solution, cuts = tightened(self._programme, self._cover, whole=True)
         self._take(cuts.fractions, np.ones(len(cuts)))
         return solution
 

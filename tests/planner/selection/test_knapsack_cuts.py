@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import cast
 
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
+from stopgo.mission.geometry import FloatArray
 from stopgo.planner.selection import bound, knapsack_cuts
 from stopgo.planner.selection.bound import lower_bound, relaxation_bound
 from stopgo.planner.selection.bound_by_parts import bound_by_parts
 from stopgo.planner.selection.cover import Cover
 from stopgo.planner.selection.greedy import greedy
-from stopgo.planner.selection.knapsack_cuts import violated_cuts
+from stopgo.planner.selection.knapsack_cuts import KnapsackCuts, tightened, violated_cuts
+from stopgo.planner.selection.linear_programme import LinearProgramme, Solution
 from tests.faults.sizes import size
 from tests.planner.selection.test_selection import is_enough, small_covers
 from tests.planner.selection.test_swaps import cover_of_rooms
@@ -63,7 +66,7 @@ def test_bounds_are_higher_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bounds of a relaxation, by parts, and of a relaxation whose columns are grouped."""
     sums = np.zeros((2, 3), dtype=np.int64)
     for number, rounds in enumerate((0, knapsack_cuts.ROUNDS)):
-        monkeypatch.setattr(knapsack_cuts, "ROUNDS", rounds)
+        monkeypatch.setattr(knapsack_cuts, "MOST_ROUNDS", rounds)
         for seed in range(size(short=3, full=6)):
             cover, again = (cover_of_rooms(seed, rows=100, columns=100, rooms=12) for _ in range(2))
             monkeypatch.setattr(bound, "FINE", 100_000)
@@ -71,6 +74,33 @@ def test_bounds_are_higher_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
             monkeypatch.setattr(bound, "FINE", 300)
             sums[number, 2] += relaxation_bound(again)
     assert (sums[1] > sums[0]).all()
+
+
+class Programme:
+    """A programme whose costs are given, one for each time that it is solved."""
+
+    def __init__(self, costs: list[float]) -> None:
+        self.costs = costs
+
+    def add(self, rows: csr_array, least: FloatArray) -> None:
+        """Take a demand, which changes no cost."""
+
+    def solution(self) -> Solution:
+        """The next cost, of no row."""
+        return Solution(np.zeros(1), np.zeros(1), self.costs.pop(0))
+
+
+@pytest.mark.parametrize(("whole", "cost"), [(False, 10.93), (True, 11.01)])
+def test_a_bound_just_below_a_whole_number_is_raised_by_more_rounds(
+    monkeypatch: pytest.MonkeyPatch, *, whole: bool, cost: float
+) -> None:
+    """The gain is small, and the next whole number is near until it is passed."""
+    cut = KnapsackCuts(csr_array(np.ones((1, 1), np.int64)), np.ones(1, np.int64))
+    monkeypatch.setattr(knapsack_cuts, "violated_cuts", lambda *_: cut)
+    programme = cast(LinearProgramme, Programme([10.8, 10.9, 10.93, 10.95, 10.97, 10.99, 11.01, 11.02]))
+    solution, _ = tightened(programme, rooms_of(1), whole=whole)
+    assert solution is not None
+    assert solution.cost == cost
 
 
 def test_a_problem_without_demands_needs_nothing() -> None:
