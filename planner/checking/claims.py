@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,7 +21,7 @@ from stopgo.mission.document.problems import Problem
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import DIGITS, Coverage
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
-from stopgo.mission.stages import Candidates, NavigableSpace, weights_of
+from stopgo.mission.stages import Candidates, NavigableSpace, Visibility, weights_of
 from stopgo.mission.stages.coverage_totals import totals_of
 from stopgo.mission.stages.figures import percent
 from stopgo.planner.candidates import STRATEGIES, candidates
@@ -131,6 +131,29 @@ def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
 
     Candidates that count for overlap only are left out.
     """
+    if found.space.settings.fov < 360 and (len(found.must_rows) or len(found.doorway_rows)):
+        return frozen(_seen_by_heading(found, lines).visible, np.int64)
+    seen_by = _viewer(found, lines)
+    views = np.zeros(found.space.targets.total, dtype=np.int64)
+    for k in np.setdiff1d(np.arange(len(found.kept)), found.extra_rows).tolist():
+        views[seen_by(k, views < found.space.settings.least_views)] += 1
+    return frozen(views, np.int64)
+
+
+def candidates_by_heading(mission: Mission, space: NavigableSpace) -> Candidates:
+    """All candidates in the mission's part; with a field of view, one for each heading of the scanner."""
+    found = candidates_of(mission, space)
+    return found if space.settings.fov >= 360 else _seen_by_heading(found, SightLines(space)).candidates
+
+
+def _seen_by_heading(found: Candidates, lines: SightLines) -> Visibility:
+    """Units that each candidate sees along each heading of the scanner."""
+    seen = map(_viewer(found, lines), range(len(found.kept)))
+    return with_headings(visibility_of(found, seen, method="line by line"))
+
+
+def _viewer(found: Candidates, lines: SightLines) -> Callable[..., IntArray]:
+    """Return the function of the units that a kept candidate sees all round, among some of them if given."""
     eyes, row = viewpoints_of(found)
     scanners = found.xy[found.kept]
 
@@ -138,14 +161,7 @@ def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
         views = [lines.seen_from(eye, among, scanner=scanners[k]) for eye in eyes[row == k]]
         return np.unique(np.concatenate(views))
 
-    if found.space.settings.fov < 360 and (len(found.must_rows) or len(found.doorway_rows)):
-        alone = (seen_by(k) for k in range(len(scanners)))
-        seen = with_headings(visibility_of(found, alone, method="line by line"))
-        return frozen(seen.visible, np.int64)
-    views = np.zeros(found.space.targets.total, dtype=np.int64)
-    for k in np.setdiff1d(np.arange(len(scanners)), found.extra_rows).tolist():
-        views[seen_by(k, views < found.space.settings.least_views)] += 1
-    return frozen(views, np.int64)
+    return seen_by
 
 
 def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) -> Iterator[Problem]:
