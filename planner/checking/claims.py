@@ -25,6 +25,7 @@ from stopgo.mission.stages import Candidates, NavigableSpace, Visibility, weight
 from stopgo.mission.stages.coverage_totals import totals_of
 from stopgo.mission.stages.figures import percent
 from stopgo.planner.candidates import STRATEGIES, candidates
+from stopgo.planner.checking.coverage_claims import OTHER_FLOOR, coverage_overclaims
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door, viewpoints_of
@@ -175,7 +176,7 @@ def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) ->
     if mission.share is UNSET and claimed:  # else the other missions cover the rest
         yield from _shortfalls(counted)
     if coverage is not None:
-        yield from _coverage_overclaims(coverage, counted)
+        yield from _coverage_overclaims(coverage, mission, counted)
 
 
 def _shortfalls(counted: Recount) -> Iterator[Problem]:
@@ -196,13 +197,22 @@ def _less(path: str, claimed: int, counted: int, who: str) -> Problem:
     return Problem(path, f"is {claimed}, but {who} {counted}, counted line by line")
 
 
-def _coverage_overclaims(coverage: Coverage, counted: Recount) -> Iterator[Problem]:
-    """Every figure of coverage.json, total and by element, that exceeds the recount."""
-    targets, elements = counted.space.targets, counted.space.floor.elements
+def _coverage_overclaims(coverage: Coverage, mission: Mission, counted: Recount) -> Iterator[Problem]:
+    """Every figure of coverage.json that exceeds the recount."""
+    elements = counted.space.floor.elements
     wanted = [k for k, element in enumerate(elements) if element.target]
     if [elements[k].id for k in wanted] != [element.id for element in coverage.elements]:
-        yield Problem("coverage $.elements", "are not those of the floor; plan again")
+        yield Problem("coverage $.elements", OTHER_FLOOR)
         return
+    told = tuple(_unseen_units(coverage, wanted, counted))
+    yield from told
+    more = coverage_overclaims(coverage, mission, counted.space, counted.seen, counted.visible)
+    yield from (problem for problem in more if problem.path not in {item.path for item in told})
+
+
+def _unseen_units(coverage: Coverage, wanted: list[int], counted: Recount) -> Iterator[Problem]:
+    """Units seen, of all and of each element, that exceed the recount; and the coverage of the whole."""
+    targets, elements = counted.space.targets, counted.space.floor.elements
     if (seen := int(counted.seen.sum())) < coverage.total.seen:
         yield _less("coverage $.total.seen", coverage.total.seen, seen, "all stops see")
     share, claimed = counted.share, coverage.total.coverage
