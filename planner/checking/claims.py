@@ -210,6 +210,13 @@ def _coverage_overclaims(coverage: Coverage, mission: Mission, counted: Recount)
     yield from (problem for problem in more if problem.path not in {item.path for item in told})
 
 
+def stated_fractions(mission: Mission, space: NavigableSpace, coverage: Coverage) -> Iterator[Problem]:
+    """Every coverage of the whole, a room or a kind in coverage.json that exceeds a recount."""
+    for problem in _coverage_overclaims(coverage, mission, recount(mission, space)):
+        if problem.path.endswith(".coverage") and ".elements" not in problem.path:
+            yield problem
+
+
 def _unseen_units(coverage: Coverage, wanted: list[int], counted: Recount) -> Iterator[Problem]:
     """Units seen, of all and of each element, that exceed the recount; and the coverage of the whole."""
     targets, elements = counted.space.targets, counted.space.floor.elements
