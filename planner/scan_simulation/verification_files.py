@@ -74,10 +74,15 @@ def verify_file(
         )
     model = _model(planned, floor, simulation)
     found = _coverage(path, coverage, mission, warn)
-    if found is not None and mission.stops:
-        for problem in islice(stated_fractions(mission, planned.space, found), 1):
-            raise NegativeResult(f"{problem} (stopgo check --floor --coverage-file lists all)")
+    _check_fractions(mission, planned, found)
     return verify(mission, planned.space, simulation, found, say, model=model), planned
+
+
+def _check_fractions(mission: Mission, planned: PlannedFloor, coverage: Coverage | None) -> None:
+    """Refuse a coverage.json with a coverage that the stops do not have: it would count as simulated."""
+    if coverage is not None and mission.stops:
+        for problem in islice(stated_fractions(mission, planned.space, coverage), 1):
+            raise NegativeResult(f"{problem} (stopgo check --floor --coverage-file lists all)")
 
 
 def _model(planned: PlannedFloor, floor: Path, simulation: Simulation) -> ModelSolids | None:
