@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from stopgo.bridge.commands.checks import Check
 from stopgo.bridge.link.link import endpoints_in
 from stopgo.bridge.ros2.ros_graph import actions_of, discords
+from stopgo.mission.console.table import counted
 
 if TYPE_CHECKING:
     from stopgo.bridge.ros2.ros_zenoh import HeardTopic, RosListener
@@ -47,7 +48,7 @@ def graph_checks(listener: RosListener) -> Iterator[Check]:
     """Check what a listener has heard."""
     entities = listener.entities
     nodes = sorted({one.node for one in entities})
-    yield Check("ros2", bool(nodes), f"{len(nodes)} nodes: {', '.join(nodes) or 'none'}")
+    yield Check("ros2", bool(nodes), f"{counted(len(nodes), 'node')}: {', '.join(nodes) or 'none'}")
     if not nodes:
         return
     for name, (kind, _) in listener.wanted.items():

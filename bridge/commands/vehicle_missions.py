@@ -27,7 +27,7 @@ from stopgo.bridge.mavlink.vehicle_link.parameter_reading import read_parameters
 from stopgo.bridge.mavlink.vehicle_link.peer import Peer, reached
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import read_link
-from stopgo.mission.console.table import table
+from stopgo.mission.console.table import counted, table
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
@@ -149,7 +149,7 @@ def _report_push(
     how = "already held" if done.already else "read back and compared"
     print_line(
         f"{peer} holds {mission.name} ({mission.id[:12]} revision {mission.revision}): "
-        f"{done.items} items for {len(mission.stops)} stops, {how}"
+        f"{counted(done.items, 'item')} for {counted(len(mission.stops), 'stop')}, {how}"
     )
 
 
@@ -224,4 +224,4 @@ def _items_table(peer: Peer, own: tuple[Item, ...]) -> str:
         for index, item in enumerate(own)
     ]
     head = ("item", "command", "param1", "param2", "param3", "param4", "x", "y")
-    return f"{peer} holds {len(own)} items\n{table(head, rows)}"
+    return f"{peer} holds {counted(len(own), 'item')}\n{table(head, rows)}"

@@ -17,7 +17,7 @@ from stopgo.bridge.station.logged_run import LoggedReport
 from stopgo.bridge.station.station import Station
 from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.comparing.spans import paused_s
-from stopgo.mission.console.table import printable
+from stopgo.mission.console.table import counted, printable
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import OutcomeUnknown
@@ -144,7 +144,7 @@ class EventLines:
 
     def mission(self, mission: Mission) -> None:
         self._errors = StopErrors(mission)
-        self._say(f"{mission.name}: {len(mission.stops)} stops")
+        self._say(f"{mission.name}: {counted(len(mission.stops), 'stop')}")
 
     def show(self, report: Followed) -> None:
         if isinstance(report, Silence):

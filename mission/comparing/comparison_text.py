@@ -7,7 +7,7 @@ from typing import Any
 from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.comparison import COLUMNS, Comparison
 from stopgo.mission.comparing.run_verdict import judge
-from stopgo.mission.console.table import duration, printable, table
+from stopgo.mission.console.table import counted, duration, printable, table
 from stopgo.mission.run.events import JUMPED_OVER, Aborted, Finished
 from stopgo.mission.stages.figures import GroupCoverage, pair_cells
 from stopgo.mission.stages.network import apart_in_words, network_of
@@ -78,7 +78,7 @@ def _coverage_lines(acquired: Acquired) -> list[str]:
     rows = [(*pair_cells(planned, group), "" if group.met else "too little") for planned, group in pairs]
     lines = [table(("coverage", "planned %", "acquired %", "required %", ""), rows)]
     rest = len(acquired.rooms) - MOST_ROOMS
-    return [*lines, f"and {rest} more rooms, with higher coverage"] if rest > 0 else lines
+    return [*lines, f"and {counted(rest, 'more room')}, with higher coverage"] if rest > 0 else lines
 
 
 def comparison_json(comparison: Comparison) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stopgo.mission.console.table import duration
+from stopgo.mission.console.table import counted, duration
 from stopgo.mission.document import Point
 from stopgo.mission.stages.figures import percent
 
@@ -79,7 +79,7 @@ class SightedPath:
     def lines(self) -> tuple[str, ...]:
         """A line for each of the longest gaps, and the number of the others."""
         rest = len(self.gaps) - MOST_GAPS
-        return (*(gap.words for gap in self.longest), *([f"{rest} shorter gaps"] if rest > 0 else []))
+        return (*(gap.words for gap in self.longest), *([counted(rest, "shorter gap")] if rest > 0 else []))
 
     @property
     def limits(self) -> str:

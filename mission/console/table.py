@@ -53,6 +53,11 @@ def shortened(word: str, longest: int = 400) -> str:
     return word if len(word) <= longest else f"{word[:80]}… ({len(word)} characters)"
 
 
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """Return a count with its noun: `1 gap`, `0 gaps`; a plural that is not noun + s is given."""
+    return f"{count} {noun if count == 1 else plural or f'{noun}s'}"
+
+
 def duration(seconds: float) -> str:
     """Return seconds as text: `0:42`, `12:05`, `1:02:03`."""
     minutes, rest = divmod(round(seconds), 60)

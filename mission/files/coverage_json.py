@@ -15,8 +15,8 @@ from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import bytes_of
 from stopgo.mission.floor import Element
-from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.stages import Route, Targets
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.stages import NavigableSpace, Route, Targets
 from stopgo.mission.stages.covered_intervals import runs_of, seen_units
 from stopgo.mission.stages.figures import Figures, GroupCoverage
 from stopgo.mission.stages.network import network_of, network_table
@@ -41,9 +41,12 @@ class CoverageCounts(msgspec.Struct, frozen=True):
     visible: int
     seen: int
     coverage: float | None
+    length_m: float | None = None
+    visible_m: float | None = None
+    seen_m: float | None = None
 
 
-class CoverageElement(CoverageCounts, frozen=True):
+class CoverageElement(CoverageCounts, frozen=True, kw_only=True):
     id: str
     segments: tuple[CoverageSegment, ...]
     global_id: str | None = None
@@ -51,10 +54,13 @@ class CoverageElement(CoverageCounts, frozen=True):
 
 
 class CoverageRoom(msgspec.Struct, frozen=True):
-    """A room by name, and the coverage of its visible targets."""
+    """A room by name, and the coverage of its visible targets; amounts in the plan's unit."""
 
     room: str
     coverage: float | None
+    total: float | None = None
+    visible: float | None = None
+    seen: float | None = None
 
 
 class CoverageArea(msgspec.Struct, frozen=True):
@@ -88,6 +94,7 @@ class Coverage(msgspec.Struct, frozen=True):
     kinds: dict[str, CoverageCounts] = {}
     rooms: tuple[CoverageRoom, ...] = ()
     surface: CoverageSurface | None = None
+    network: dict[str, Any] | None = None
 
 
 def read_coverage(path: Path, mission: Mission) -> Coverage:
@@ -133,7 +140,8 @@ def coverage_json(
     """
     space = route.space
     floor = space.floor
-    counts = _Counts.of(route)
+    visible = route.visibility.visible
+    counts = CoverageSums.of(space, visible, seen_units(route.selection))
     targets = [index for index, element in enumerate(floor.elements) if element.target]
     by_kind: dict[str, list[int]] = {}
     for index in targets:
@@ -146,7 +154,7 @@ def coverage_json(
         "rule": space.settings.coverage_rule,
         "total": counts.summary(targets),
         "kinds": {kind: counts.summary(rows) for kind, rows in sorted(by_kind.items())},
-        **({} if figures is None else {"rooms": [_room(group) for group in figures.rooms]}),
+        **({} if figures is None else {"rooms": [room_row(group) for group in figures.rooms]}),
         **({} if surface is None else {"surface": surface.as_json()}),
         **network_table(network_of(mission)),
     }
@@ -163,7 +171,7 @@ def coverage_json(
 
 
 @dataclass(frozen=True, eq=False)
-class _Counts:
+class CoverageSums:
     """Sums of each element of the floor: all, visible and seen (elements, 3)."""
 
     units: IntArray
@@ -172,13 +180,12 @@ class _Counts:
     """True if coverage is a fraction of units, the paper's rule."""
 
     @classmethod
-    def of(cls, route: Route) -> _Counts:
-        visibility = route.visibility
-        space, targets = visibility.space, visibility.targets
+    def of(cls, space: NavigableSpace, visible: BoolArray, seen: BoolArray) -> CoverageSums:
+        """Return the sums of the visible units, and of the seen ones among them (n,)."""
+        targets = space.targets
         elements = targets.element[targets.unit_segment]
         size, length = len(space.floor.elements), np.rint(targets.unit_length * 1e6) * 1e-6
-        seen = visibility.visible & seen_units(route.selection)
-        masks = (np.ones(targets.total, dtype=bool), visibility.visible, seen)
+        masks = (np.ones(targets.total, dtype=bool), visible, visible & seen)
         units = [np.bincount(elements[mask], minlength=size) for mask in masks]
         metres = [np.bincount(elements[mask], length[mask], minlength=size) for mask in masks]
         by_units = space.settings.coverage_rule == "paper"
@@ -203,7 +210,7 @@ class _Counts:
         }
 
 
-def _room(group: GroupCoverage) -> dict[str, Any]:
+def room_row(group: GroupCoverage) -> dict[str, Any]:
     """Return a room's row, in the plan's unit."""
     numbers = (group.total, group.visible, group.seen)
     total, visible, seen = (round(number, 4) for number in numbers)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.files.floor_drawing import PASSABLE, floor_layers, kinds_of, look_of
 from stopgo.mission.files.sheet import PaperMap
 from stopgo.mission.files.svg import FONT, group, line_data, number, path, rect, text
@@ -59,7 +60,8 @@ def _points(floor: FloorPlan) -> Iterator[FloatArray]:
 def _title(floor: FloorPlan | None) -> str:
     if floor is None:
         return NO_FLOOR
-    return f"{floor.name}: {floor.area:.0f} m², {len(floor.rooms)} rooms, {len(floor.openings)} openings"
+    parts = f"{counted(len(floor.rooms), 'room')}, {counted(len(floor.openings), 'opening')}"
+    return f"{floor.name}: {floor.area:.0f} m², {parts}"
 
 
 def _floor(floor: FloorPlan, beneath: str, paper: PaperMap) -> Iterator[str]:

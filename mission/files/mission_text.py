@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from stopgo.mission.console.table import duration, printable, table
+from stopgo.mission.console.table import counted, duration, printable, table
 from stopgo.mission.document import Mission
 from stopgo.mission.document.limits import limits_in_words
 from stopgo.mission.document.schedule import Schedule
@@ -60,7 +60,7 @@ def _totals(mission: Mission, times: Schedule) -> str:
     units = sum(stop.sees.new_units for stop in mission.stops)
     ends = "and back to the start" if mission.return_ is not None else "ending at the last stop"
     return (
-        f"{len(mission.stops)} stops, {doorways} of them in doorways; {units} units covered; "
+        f"{counted(len(mission.stops), 'stop')}, {doorways} of them in doorways; {units} units covered; "
         f"route {route_length(mission):.2f} m {ends}\n"
         f"driving {duration(times.drive_s)}, turning {duration(times.turn_s)}, "
         f"settling {duration(times.settle_s)}, scanning {duration(times.scan_s)}: "

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from msgspec import UNSET
 
-from stopgo.mission.console.table import duration
+from stopgo.mission.console.table import counted, duration
 from stopgo.mission.document import Mission
 from stopgo.mission.document.limits import limits_in_words
 from stopgo.mission.document.schedule import schedule
@@ -307,7 +307,7 @@ def shared_rows(missions: Sequence[Mission], stops: Sequence[Sequence[ListedStop
     rows: list[Row] = []
     for k, (mission, own) in enumerate(zip(missions, stops, strict=True)):
         taken = duration(schedule(mission).total_s)
-        told = f"{letter(k)}: {allocation_in_words(mission)}, {len(own)} stops, {taken}"
+        told = f"{letter(k)}: {allocation_in_words(mission)}, {counted(len(own), 'stop')}, {taken}"
         rows += [_words(told, bold=True), *stop_rows(own, most, before=letter(k))]
     return rows
 

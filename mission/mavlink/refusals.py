@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import InputError, NegativeResult
@@ -68,7 +69,8 @@ def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, 
     enough = "which is enough" if least <= most else "which is not enough"
     with_hold = f"--settle-item hold makes it {least}, {enough}; or " if least < count else ""
     raise NegativeResult(
-        f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
+        f"{mission.name}: {counted(len(mission.stops), 'stop makes', 'stops make')} {count} items, "
+        f"{vehicle.name} holds {most}; "
         f"{with_hold}plan fewer stops at once"
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.floor import Finding, Rank
 from stopgo.mission.stages import Unreached
 
@@ -97,7 +98,7 @@ class LimitCost:
     def text(self) -> str:
         """The cost in words."""
         more = self.stops - self.without
-        cost = "costs no stop" if more <= 0 else f"costs about {more} stop{'s' * (more > 1)}"
+        cost = "costs no stop" if more <= 0 else f"costs about {counted(more, 'stop')}"
         return f"{cost} (about {self.without} without, at least {self.bound})"
 
 

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.document import Mission, Overlap, Stop
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages.figures import percent
@@ -219,7 +220,7 @@ def network_lines(network: Network | None) -> list[str]:
     number, pairs = len(network.pieces), len(network.overlaps)
     lines = [
         f"  network     {'connected' if number == 1 else f'{number} COMPONENTS'}: "
-        f"{pairs} pair{'s' * (pairs != 1)} of {len(network.stops)} scans register with one another"
+        f"{counted(pairs, 'pair')} of {len(network.stops)} scans register with one another"
     ]
     if network.weakest is not None:
         lines.append(f"    weakest   {network.in_words(network.weakest)}")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Route, Visibility, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE, CoverageTotals, totals_of_plan
@@ -101,7 +102,7 @@ class StopReason:
             if lost >= LEAST_PRINTED
         ]
         where = ", ".join(losses[:MOST_ROOMS]) or "less than that in any room"
-        more = f" and {len(losses) - MOST_ROOMS} more rooms" if len(losses) > MOST_ROOMS else ""
+        more = f" and {counted(len(losses) - MOST_ROOMS, 'more room')}" if len(losses) > MOST_ROOMS else ""
         return (
             f"It alone sees {self.alone_units} units, {self.alone:.1f} {self.unit} or"
             f" {percent(self.lost_fraction)} of what is visible; lost without it: {where}{more}."

@@ -22,7 +22,13 @@ from stopgo.planner.appraisal.quality import (
     quality_of,
 )
 from stopgo.planner.appraisal.unreached import unreached
-from stopgo.planner.overlap.registered import SCANS_APART, inaccurate, scans_apart
+from stopgo.planner.overlap.registered import (
+    SCANS_APART,
+    UNSEEN_CONTROL,
+    inaccurate,
+    scans_apart,
+    unseen_control,
+)
 from stopgo.planner.space.reach import room_areas_by_part
 
 
@@ -70,7 +76,13 @@ def figures_of(route: Route, before: FiguresBefore | None = None) -> Figures:
     selection = route.selection
     before = before or FiguresBefore.of(selection.visibility)
     doubts = (*leg_doubts(route), *before.doubts, *before.views, *fewer_views(selection))
-    findings = (*route.space.findings, *doubts, *scans_apart(route), *inaccurate(route))
+    findings = (
+        *route.space.findings,
+        *doubts,
+        *scans_apart(route),
+        *inaccurate(route),
+        *unseen_control(route),
+    )
     groups = coverage_by_group(selection, why={item.room: item.why for item in before.unreached})
     return Figures(
         rule=route.space.settings.coverage_rule,
@@ -88,7 +100,9 @@ def figures_of(route: Route, before: FiguresBefore | None = None) -> Figures:
 def figures_of_share(route: Route, plan: PartPlan, before: FiguresBefore) -> Figures:
     """Return the figures of one mission of a plan; the required coverage applies to all together."""
     whole, groups = plan.figures, plan.totals.coverage(seen_units(route.selection))
-    of_all = (item for item in whole.findings if item.code in (NOT_MET, FEWER_VIEWS, *SCANS_APART))
+    of_all = (
+        item for item in whole.findings if item.code in (NOT_MET, FEWER_VIEWS, UNSEEN_CONTROL, *SCANS_APART)
+    )
     findings = (*route.space.findings, *leg_doubts(route), *before.doubts, *of_all)
     return replace(
         whole,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,10 +21,11 @@ from stopgo.mission.document.problems import Problem
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import DIGITS, Coverage
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
-from stopgo.mission.stages import Candidates, NavigableSpace, weights_of
+from stopgo.mission.stages import Candidates, NavigableSpace, Visibility, weights_of
 from stopgo.mission.stages.coverage_totals import totals_of
 from stopgo.mission.stages.figures import percent
 from stopgo.planner.candidates import STRATEGIES, candidates
+from stopgo.planner.checking.coverage_claims import OTHER_FLOOR, coverage_overclaims
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door, viewpoints_of
@@ -131,6 +132,29 @@ def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
 
     Candidates that count for overlap only are left out.
     """
+    if found.space.settings.fov < 360 and (len(found.must_rows) or len(found.doorway_rows)):
+        return frozen(_seen_by_heading(found, lines).visible, np.int64)
+    seen_by = _viewer(found, lines)
+    views = np.zeros(found.space.targets.total, dtype=np.int64)
+    for k in np.setdiff1d(np.arange(len(found.kept)), found.extra_rows).tolist():
+        views[seen_by(k, views < found.space.settings.least_views)] += 1
+    return frozen(views, np.int64)
+
+
+def candidates_by_heading(mission: Mission, space: NavigableSpace) -> Candidates:
+    """All candidates in the mission's part; with a field of view, one for each heading of the scanner."""
+    found = candidates_of(mission, space)
+    return found if space.settings.fov >= 360 else _seen_by_heading(found, SightLines(space)).candidates
+
+
+def _seen_by_heading(found: Candidates, lines: SightLines) -> Visibility:
+    """Units that each candidate sees along each heading of the scanner."""
+    seen = map(_viewer(found, lines), range(len(found.kept)))
+    return with_headings(visibility_of(found, seen, method="line by line"))
+
+
+def _viewer(found: Candidates, lines: SightLines) -> Callable[..., IntArray]:
+    """Return the function of the units that a kept candidate sees all round, among some of them if given."""
     eyes, row = viewpoints_of(found)
     scanners = found.xy[found.kept]
 
@@ -138,14 +162,7 @@ def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
         views = [lines.seen_from(eye, among, scanner=scanners[k]) for eye in eyes[row == k]]
         return np.unique(np.concatenate(views))
 
-    if found.space.settings.fov < 360 and (len(found.must_rows) or len(found.doorway_rows)):
-        alone = (seen_by(k) for k in range(len(scanners)))
-        seen = with_headings(visibility_of(found, alone, method="line by line"))
-        return frozen(seen.visible, np.int64)
-    views = np.zeros(found.space.targets.total, dtype=np.int64)
-    for k in np.setdiff1d(np.arange(len(scanners)), found.extra_rows).tolist():
-        views[seen_by(k, views < found.space.settings.least_views)] += 1
-    return frozen(views, np.int64)
+    return seen_by
 
 
 def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) -> Iterator[Problem]:
@@ -159,7 +176,7 @@ def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) ->
     if mission.share is UNSET and claimed:  # else the other missions cover the rest
         yield from _shortfalls(counted)
     if coverage is not None:
-        yield from _coverage_overclaims(coverage, counted)
+        yield from _coverage_overclaims(coverage, mission, counted)
 
 
 def _shortfalls(counted: Recount) -> Iterator[Problem]:
@@ -180,13 +197,29 @@ def _less(path: str, claimed: int, counted: int, who: str) -> Problem:
     return Problem(path, f"is {claimed}, but {who} {counted}, counted line by line")
 
 
-def _coverage_overclaims(coverage: Coverage, counted: Recount) -> Iterator[Problem]:
-    """Every figure of coverage.json, total and by element, that exceeds the recount."""
-    targets, elements = counted.space.targets, counted.space.floor.elements
+def _coverage_overclaims(coverage: Coverage, mission: Mission, counted: Recount) -> Iterator[Problem]:
+    """Every figure of coverage.json that exceeds the recount."""
+    elements = counted.space.floor.elements
     wanted = [k for k, element in enumerate(elements) if element.target]
     if [elements[k].id for k in wanted] != [element.id for element in coverage.elements]:
-        yield Problem("coverage $.elements", "are not those of the floor; plan again")
+        yield Problem("coverage $.elements", OTHER_FLOOR)
         return
+    told = tuple(_unseen_units(coverage, wanted, counted))
+    yield from told
+    more = coverage_overclaims(coverage, mission, counted.space, counted.seen, counted.visible)
+    yield from (problem for problem in more if problem.path not in {item.path for item in told})
+
+
+def stated_fractions(mission: Mission, space: NavigableSpace, coverage: Coverage) -> Iterator[Problem]:
+    """Every coverage of the whole, a room or a kind in coverage.json that exceeds a recount."""
+    for problem in _coverage_overclaims(coverage, mission, recount(mission, space)):
+        if problem.path.endswith(".coverage") and ".elements" not in problem.path:
+            yield problem
+
+
+def _unseen_units(coverage: Coverage, wanted: list[int], counted: Recount) -> Iterator[Problem]:
+    """Units seen, of all and of each element, that exceed the recount; and the coverage of the whole."""
+    targets, elements = counted.space.targets, counted.space.floor.elements
     if (seen := int(counted.seen.sum())) < coverage.total.seen:
         yield _less("coverage $.total.seen", coverage.total.seen, seen, "all stops see")
     share, claimed = counted.share, coverage.total.coverage

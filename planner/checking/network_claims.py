@@ -19,7 +19,7 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of, noise_factor
 from stopgo.planner.candidates.added_scans import with_scans
-from stopgo.planner.checking.claims import candidates_of
+from stopgo.planner.checking.claims import candidates_by_heading
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
 from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
@@ -157,7 +157,7 @@ def _separate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem
         return
     poses = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     doorway = np.array([stop.doorway for stop in mission.stops])
-    found = with_scans(candidates_of(mission, space), poses, doorway)
+    found = with_scans(candidates_by_heading(mission, space), poses, doorway)
     _, region = connected_components(links_of(found), directed=False)
     first = len(region) - len(mission.stops)
     at = {stop.id: first + k for k, stop in enumerate(mission.stops)}

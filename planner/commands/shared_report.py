@@ -9,7 +9,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from stopgo.mission.console.table import duration
+from stopgo.mission.console.table import counted, duration
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.plan import DividedPlan, PartPlan
@@ -132,7 +132,7 @@ class SharedReport(PlanReport):
         name = f"{mission.share.kind} {mission.share.number}"
         taken = duration(schedule(mission).total_s)
         return (
-            f"    {name:<9} {len(mission.stops)} stops, {route.length:.1f} m, {taken}, "
+            f"    {name:<9} {counted(len(mission.stops), 'stop')}, {route.length:.1f} m, {taken}, "
             f"{report.files['mission'].name}"
         )
 

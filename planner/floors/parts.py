@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Element, Finding, IgnoredLine, Opening, Room
 from stopgo.mission.geometry import Polygon
@@ -84,7 +85,7 @@ def outline_of(floor: Drawn) -> tuple[Region, list[Finding]]:
 def _why_no_outline(floor: Drawn) -> str:
     if not floor.open:
         return "no closed outline on layer FLOOR"
-    lines = f"{len(floor.open)} open lines with gaps over {GAP * 100:g} cm"
+    lines = f"{counted(len(floor.open), 'open line')} with gaps over {GAP * 100:g} cm"
     return f"no closed outline on layer FLOOR, only {lines}"
 
 

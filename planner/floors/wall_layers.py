@@ -18,6 +18,7 @@ import numpy as np
 import shapely
 from ezdxf.document import Drawing
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import polyline_length
@@ -237,9 +238,9 @@ def _weighed(found: WallLayers, made: Derived, words: Sequence[Word]) -> WallLay
     seen = _labels(shown.rooms, words)
     if seen.true and not seen.contradict:
         are = "are" if seen.true > 1 else "is"
-        told.append((2, f"{_number(seen.true, 'written area')} {are} true of the rooms"))
+        told.append((2, f"{counted(seen.true, 'written area')} {are} true of the rooms"))
     if shown.doors:
-        told.append((2 if shown.doors >= _MANY else 1, f"{_number(shown.doors, 'door swing')} in gaps"))
+        told.append((2 if shown.doors >= _MANY else 1, f"{counted(shown.doors, 'door swing')} in gaps"))
     if shown.double >= _DOUBLE:
         told.append((1, f"{shown.double:.0%} of the lines are walls of two lines"))
     if seen.known >= _MANY and shown.doors + shown.passages:
@@ -265,10 +266,6 @@ def _is_no_storey(made: Derived, words: Sequence[Word]) -> bool:
     if shown.closed_over > WIDEST_GAP or shown.stray > MOST_STRAY:
         return True
     return any(_NO_PLAN.search(word.text) for word in words)
-
-
-def _number(count: int, thing: str) -> str:
-    return f"{count} {thing}{'s' if count > 1 else ''}"
 
 
 @dataclass(frozen=True)

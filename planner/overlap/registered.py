@@ -111,6 +111,21 @@ def inaccurate(route: Route) -> Iterator[Finding]:
         )
 
 
+def unseen_control(route: Route) -> Iterator[Finding]:
+    """Control points that no stop sees: the network is not in their frame."""
+    origin = local_origin(route.space.floor)
+    reach = _settings(route).farthest_overlap
+    seen = {tuple(point.tolist()) for _, point in seen_control(route.space, route.xy - origin)}
+    for x, y in _settings(route).control:
+        if tuple((np.array([x, y]) - origin).tolist()) not in seen:
+            yield Finding(
+                UNSEEN_CONTROL,
+                f"the control point ({x:g}, {y:g}) is seen by no stop within {reach:g} m "
+                "and not used; give metres of the drawing, for a target on a wall a point just before it",
+                at=(x, y),
+            )
+
+
 def _names(route: Route) -> tuple[str, ...]:
     return tuple(stop_names(len(route.order)))
 
@@ -130,6 +145,8 @@ ERROR_DIGITS, DIRECTION_DIGITS = 5, 2
 """Decimals of an error ellipse in a mission: metres, and radians."""
 ROUND_M = 5e-5
 """Difference of the half axes below which an ellipse is a circle without direction."""
+UNSEEN_CONTROL = "control_unseen"
+"""Code of findings about control points that no stop sees."""
 SCANS_APART = ("scans_apart", "scans_not_joined")
 """Codes of findings about scans that are not connected: with a required overlap, and without."""
 

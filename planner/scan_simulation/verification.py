@@ -17,7 +17,6 @@ from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.limits import ViewLimits, limits_of, section_height
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage
-from stopgo.mission.floor import FloorPlan
 from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.proof.plan_proof import (
@@ -30,8 +29,9 @@ from stopgo.mission.proof.plan_proof import (
     Simulation,
     StopScan,
 )
-from stopgo.mission.stages import NavigableSpace, Targets, weights_of
+from stopgo.mission.stages import NavigableSpace, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE
+from stopgo.planner.checking.coverage_claims import claimed_units
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap.control import seen_control
 from stopgo.planner.scan_simulation.casting import SolidScene
@@ -49,8 +49,6 @@ INCIDENCES_DEG = (45, 60, 70, 80)
 STOPS = (1, 2, 3)
 IN_DOORWAY_M = 0.1
 """A stop this close to a door's line is in the doorway."""
-SAME_PLACE_M = 1e-4
-"""Tolerance for the ends of segments in coverage.json, which are rounded."""
 MOST_DRAWN = 1_000_000
 """Points kept for drawing, of all scans together."""
 BELOW_M = 0.05
@@ -358,7 +356,7 @@ class _PromisedCoverage:
     def of(cls, mission: Mission, space: NavigableSpace, coverage: Coverage | None) -> _PromisedCoverage:
         paper = space.settings.coverage_rule == "paper"
         weight = frozen(weights_of(space.targets, space.settings) * (1.0 if paper else 1e-6))
-        units = None if coverage is None else _promised(coverage, space.targets, space.floor)
+        units = None if coverage is None else claimed_units(coverage, space.targets, space.floor)
         return cls(
             space,
             coverage,
@@ -497,25 +495,3 @@ def _in_view(space: NavigableSpace, pose: ScannerPose, points: FloatArray) -> Bo
     turned = np.abs(np.remainder(aside + np.pi, 2 * np.pi) - np.pi)
     found: BoolArray = turned <= math.radians(space.settings.fov) / 2 + 1e-9
     return found
-
-
-def _promised(coverage: Coverage, targets: Targets, floor: FloorPlan) -> BoolArray:
-    """True for each unit that coverage.json reports as seen."""
-    promised = np.zeros(targets.total, dtype=bool)
-    rows = {item.id: list(item.segments) for item in coverage.elements}
-    for segment, element in enumerate(targets.element.tolist()):
-        name = floor.elements[element].id
-        if not rows.get(name):
-            raise _other_reading(name)
-        row = rows[name].pop(0)
-        ends = np.array([row.a, row.b]) - np.array([targets.a[segment], targets.b[segment]])
-        if np.abs(ends).max() > SAME_PLACE_M:
-            raise _other_reading(name)
-        first, count = int(targets.first_unit[segment]), int(targets.units[segment])
-        for begin, end in row.seen:
-            promised[first + round(begin * count) : first + round(end * count)] = True
-    return promised
-
-
-def _other_reading(element: str) -> InputError:
-    return InputError(f"coverage.json: position of {element} differs from this floor; plan again")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from stopgo.mission.files.coverage_json import Coverage, read_coverage
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.floor.model_solids import ModelSolids
 from stopgo.mission.proof.plan_proof import PlanProof, Simulation
+from stopgo.planner.checking.claims import stated_fractions
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, planned_floor
 from stopgo.planner.scan_simulation.verification import verify
 
@@ -51,7 +53,7 @@ def verify_file(
     Raises
     ------
     NegativeResult
-        If the mission is invalid or has no stops.
+        If the mission is invalid or has no stops, or coverage.json has a fraction that they do not see.
     InputError
         If a file cannot be read, or the floor or coverage.json belongs to another mission.
     """
@@ -72,7 +74,15 @@ def verify_file(
         )
     model = _model(planned, floor, simulation)
     found = _coverage(path, coverage, mission, warn)
+    _check_fractions(mission, planned, found)
     return verify(mission, planned.space, simulation, found, say, model=model), planned
+
+
+def _check_fractions(mission: Mission, planned: PlannedFloor, coverage: Coverage | None) -> None:
+    """Refuse a coverage.json with a coverage that the stops do not have: it would count as simulated."""
+    if coverage is not None and mission.stops:
+        for problem in islice(stated_fractions(mission, planned.space, coverage), 1):
+            raise NegativeResult(f"{problem} (stopgo check --floor --coverage-file lists all)")
 
 
 def _model(planned: PlannedFloor, floor: Path, simulation: Simulation) -> ModelSolids | None:

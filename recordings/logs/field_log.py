@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.document import Mission
 from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
 from stopgo.mission.frames.transform import SiteOrigin
@@ -249,7 +250,7 @@ def oddities_of(ns: IntArray, xy: FloatArray, kept: np.ndarray, not_finite: int)
     step = np.diff(ns[kept]) / 1e9
     back = int((step < 0).sum())
     if back:
-        lines.append(f"time runs back {back} times, by up to {-step.min():.3f} s; ordered by time")
+        lines.append(f"time runs back {counted(back, 'time')}, by up to {-step.min():.3f} s; ordered by time")
     order = np.argsort(ns[kept], kind="stable")
     times, positions = ns[kept][order], xy[kept][order]
     step = np.diff(times) / 1e9
@@ -257,12 +258,13 @@ def oddities_of(ns: IntArray, xy: FloatArray, kept: np.ndarray, not_finite: int)
     gaps = step[step > max(GAP_S, 10 * usual)]
     if len(gaps):
         lines.append(
-            f"{len(gaps)} gaps without poses, {gaps.sum():.1f} s together, the longest {gaps.max():.1f} s"
+            f"{counted(len(gaps), 'gap')} without poses, {gaps.sum():.1f} s together, "
+            f"the longest {gaps.max():.1f} s"
         )
     moved = np.hypot(*np.diff(positions, axis=0).T) if len(positions) > 1 else np.empty(0)
     jumps = moved[(moved > JUMP_M) & (moved > JUMP_M_S * np.maximum(step, 1e-9))]
     if len(jumps):
-        lines.append(f"{len(jumps)} jumps of position, the largest {jumps.max():.2f} m")
+        lines.append(f"{counted(len(jumps), 'jump')} of position, the largest {jumps.max():.2f} m")
     return tuple(lines)
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 from datetime import UTC, datetime
 from typing import Any
 
-from stopgo.mission.console.table import duration, table
+from stopgo.mission.console.table import counted, duration, table
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 
 SHOWN = 12
@@ -25,7 +25,7 @@ def as_text(log: FieldLog) -> str:
     lines += _indented(_poses(log)) if log.poses else ["  no poses"]
     lines += [f"  note: {track.source}: {line}" for track in log.poses for line in track.oddities]
     lines += [
-        f"  mission of {len(upload.items)} items{'' if upload.complete else ', incomplete,'} at "
+        f"  mission of {counted(len(upload.items), 'item')}{'' if upload.complete else ', incomplete,'} at "
         f"{(upload.ns - log.begin_ns) / 1e9:.1f} s"
         for upload in log.uploads
     ]

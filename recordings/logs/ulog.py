@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.frames.transform import SiteOrigin
@@ -100,7 +101,7 @@ def _dropouts(log: Any) -> tuple[str, ...]:
     if not log.dropouts:
         return ()
     seconds = sum(item.duration for item in log.dropouts) / 1000
-    return (f"{len(log.dropouts)} dropouts in the log, {seconds:.3f} s together",)
+    return (f"{counted(len(log.dropouts), 'dropout')} in the log, {seconds:.3f} s together",)
 
 
 def _invalid(log: Any) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import rerun as rr
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.floor import Element, Finding, FloorPlan, Room
 from stopgo.mission.geometry import FloatArray, Polygon, closed, outlines
 from stopgo.recordings.drawing import entities, palette, strokes
@@ -35,7 +36,8 @@ def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
     openings = [opening.line for opening in floor.openings]
     draw(canvas, entities.OPENINGS, openings, Pen(palette.PASSABLE, "line", THICK))
     log_findings(canvas, floor.findings)
-    title = f"floor {floor.name}: {floor.area:.1f} m², {len(floor.rooms)} rooms, {len(openings)} openings"
+    parts = f"{counted(len(floor.rooms), 'room')}, {counted(len(openings), 'opening')}"
+    title = f"floor {floor.name}: {floor.area:.1f} m², {parts}"
     describe_step(canvas, story.FLOOR, title)
 
 

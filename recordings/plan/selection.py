@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.mission.stages.figures import percent
@@ -138,7 +139,7 @@ def _plot_coverage(canvas: Canvas, selection: Selection) -> None:
     canvas.show(chosen, rr.SeriesLines(colors=palette.GREEN, names="coverage of the chosen stops", widths=2))
     canvas.show(required, rr.SeriesLines(colors=palette.OUTLINE, names="required", widths=1))
     canvas.say(
-        f"selection ({selection.method}): {count} stops, coverage {percent(selection.coverage)},"
+        f"selection ({selection.method}): {counted(count, 'stop')}, coverage {percent(selection.coverage)},"
         f" {PlanResults.of({Selection: selection}).bound_text}",
         step=step_of_choice(max(count, 1)),
     )

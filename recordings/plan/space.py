@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import bounds, outlines
 from stopgo.mission.stages import NavigableSpace, OpeningState
@@ -40,7 +41,7 @@ def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
     )
     new = [item for item in space.findings if item not in space.floor.findings]
     log_findings(canvas, new, step=SPACE)
-    title = f"navigable space: {len(space.rooms)} rooms, {targets.total} target units"
+    title = f"navigable space: {counted(len(space.rooms), 'room')}, {targets.total} target units"
     describe_step(canvas, SPACE, title, "Blue: where the robot may drive. Green: where it may stop and scan.")
 
 

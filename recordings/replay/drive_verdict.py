@@ -11,6 +11,7 @@ from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison import DONE, StopComparison
 from stopgo.mission.comparing.measured import Measured
 from stopgo.mission.comparing.run_verdict import Judgement, named
+from stopgo.mission.console.table import counted
 from stopgo.mission.run.events import Settled
 from stopgo.mission.stages.figures import percent
 from stopgo.recordings.replay.replayed import Replay
@@ -80,7 +81,7 @@ def _sentences(replay: Replay, evidence: Sequence[StopEvidence], apart: Sequence
     yield from (f"{line}." for line in apart)
     yield from _floor_sentences(replay)
     if replay.extra:
-        yield f"{len(replay.extra)} standstills were not at a stop."
+        yield f"{counted(len(replay.extra), 'standstill was', 'standstills were')} not at a stop."
     if replay.inferred:
         yield f"Visits are inferred from standstills; {_scans_text(replay)}."
     unseen = [item.stop for item in replay.comparison.asked if item.outcome == "unconfirmed"]

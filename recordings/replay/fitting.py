@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import Undecided
 from stopgo.mission.frames.rigid_fit import least_squares
@@ -59,7 +60,8 @@ def fitted(standstills: Sequence[Standstill], mission: Mission) -> Fit:
     positions = np.array([standstill.xy for standstill in standstills]).reshape(-1, 2)
     if min(len(stops), len(positions)) < LEAST_PAIRS:
         raise Undecided(
-            f"--align stops: {len(positions)} standstills and {len(stops)} stops are too few to match "
+            f"--align stops: {counted(len(positions), 'standstill')} and {counted(len(stops), 'stop')} "
+            "are too few to match "
             f"({LEAST_PAIRS} of each are needed); give --map X,Y,HEADING or --align first"
         )
     tried = [_refined(guess, standstills, mission) for guess in _promising(positions, stops, mission)]

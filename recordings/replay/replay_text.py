@@ -12,7 +12,7 @@ import numpy as np
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_table
 from stopgo.mission.comparing.measured import Absent, Measured
-from stopgo.mission.console.table import printable, table
+from stopgo.mission.console.table import counted, printable, table
 from stopgo.mission.stages.figures import pair_cells, percent
 from stopgo.recordings.logs.field_log import FieldLog
 from stopgo.recordings.replay.drive_verdict import drive_verdict
@@ -127,7 +127,7 @@ def measured_lines(replay: Replay) -> list[str]:
     ]
     worst = sorted(found.deviations, key=lambda item: -abs(item[2]))[:MOST_LOST]
     lines += [
-        f"  deviation  {name}: mean {1000 * mean:+.0f} mm, rms {1000 * rms:.0f} mm, {count} points"
+        f"  deviation  {name}: mean {1000 * mean:+.0f} mm, rms {1000 * rms:.0f} mm, {counted(count, 'point')}"
         for name, count, mean, rms in worst
     ]
     lines += [

@@ -32,6 +32,16 @@ from stopgo.recordings.replay.uploaded import differences_of
 
 FASTER = 50.0
 """Times the mission's speed at which poses are not in metres."""
+SLOWER, MOVES = 200.0, 10
+"""Part of the mission's speed at which times of a table are not seconds, and pieces of path that show it."""
+TABLES = ("CSV trajectory", "TUM trajectory")
+"""Formats whose times have no unit of their own."""
+UNITS = {"feet": 1 / 0.3048, "inches": 1 / 0.0254, "centimetres": 100.0}
+"""Units by their number in a metre."""
+ALIKE = 0.15
+"""Difference of a path and the route, as a fraction, up to which a unit explains their lengths."""
+THINNED_M = 0.2
+"""Least distance of poses that give the length and speed of a path."""
 NEAR_ROUTE_M = 2.0
 LEAST_ON_ROUTE, LEAST_WITHOUT_HALTS = 0.5, 0.9
 """Least fraction of the path within NEAR_ROUTE_M of the route; below it, a log is of another mission."""
@@ -48,7 +58,7 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
         When `--align stops` finds no placing, or several.
     """
     try:
-        return _compared(log, placed(log, mission, placing), mission, placing, sights)
+        return _compared(log, _placed(log, mission, placing), mission, placing, sights)
     except (InputError, Undecided) as error:
         hint = _unit_hint(chosen(log, placing), mission) if log.poses else ""
         if not hint:
@@ -57,13 +67,48 @@ def replay(log: FieldLog, mission: Mission, placing: Placing, sights: Iterable[S
 
 
 def _unit_hint(source: Poses, mission: Mission) -> str:
-    """Return a remark on poses that move much faster than the robot; empty for all others."""
+    """Return a remark on poses that move much faster than the robot, or too far; empty for all others."""
     step, seconds = np.hypot(*np.diff(source.xy, axis=0).T), np.diff(source.ns) / 1e9
     moving = (step > 0) & (seconds > 0)
     speed = float(np.median(step[moving] / seconds[moving])) if moving.any() else 0.0
     if speed < FASTER * mission.robot.speed:
-        return ""
+        return _length_hint(source.xy, mission)
     return f"; its poses move at {speed:.0f} m/s: give them in metres, and their times in the column's unit"
+
+
+def _length_hint(xy: FloatArray, mission: Mission) -> str:
+    """Return a remark on a path as much longer than the route as a unit is shorter than a metre."""
+    route = sum(_length(np.array(leg)) for leg in legs_of(mission))
+    path = _length(_thinned(xy))
+    for unit, per_metre in UNITS.items():
+        if route and abs(path / route / per_metre - 1) <= ALIKE:
+            longer = f"{path / route:.3g} times as long as the route"
+            return f"; its path is {longer}, as in {unit}: give it in metres"
+    return ""
+
+
+def _placed(log: FieldLog, mission: Mission, placing: Placing) -> PlacedLog:
+    """Place a log, unless its times are no seconds."""
+    if log.format in TABLES and log.poses:
+        _check_times(log, chosen(log, placing), mission)
+    return placed(log, mission, placing)
+
+
+def _check_times(log: FieldLog, source: Poses, mission: Mission) -> None:
+    """Refuse a table whose robot moves so slowly that its times are no seconds."""
+    at = [0]
+    for k in range(1, len(source.xy)):
+        if math.dist(source.xy[k], source.xy[at[-1]]) >= THINNED_M:
+            at.append(k)
+    seconds = np.diff(source.ns[at]) / 1e9
+    if len(at) <= MOVES or (seconds <= 0).any():
+        return
+    speed = float(np.median(np.hypot(*np.diff(source.xy[at], axis=0).T) / seconds))
+    if speed < mission.robot.speed / SLOWER:
+        raise InputError(
+            f"{log.path}: its poses move at {1000 * speed:.2g} mm/s with times read as seconds; "
+            "name the column of times after its unit, such as time_ms"
+        )
 
 
 def replay_parts(
@@ -85,7 +130,7 @@ def replay_parts(
         raise InputError(
             "--one-run, --align first: only one log begins at the start; give --map or --align stops"
         )
-    log, placed_log = joined([(log, placed(log, mission, placing)) for log in logs])
+    log, placed_log = joined([(log, _placed(log, mission, placing)) for log in logs])
     return _compared(log, placed_log, mission, placing, sights)
 
 
@@ -227,12 +272,17 @@ def on_route(track: Track, mission: Mission) -> float:
 
 
 def _thinned(xy: FloatArray) -> FloatArray:
-    """Return positions at least 0.2 m apart along the path, so that standstills do not count."""
+    """Return positions at least THINNED_M apart along the path, so that standstills do not count."""
     thinned = [xy[0]]
     for position in xy[:: max(1, len(xy) // 100_000)]:
-        if math.dist(position, thinned[-1]) >= 0.2:
+        if math.dist(position, thinned[-1]) >= THINNED_M:
             thinned.append(position)
     return np.array(thinned)
+
+
+def _length(xy: FloatArray) -> float:
+    """Return the length of a path through points (n, 2)."""
+    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
 
 
 def _distance_to_segment(xy: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:

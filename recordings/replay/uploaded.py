@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.assembling import mission_of
@@ -62,7 +63,7 @@ def differences_of(log: FieldLog, mission: Mission) -> tuple[str, ...]:
     for number, upload in enumerate(log.uploads, 1):
         when = f"mission {number} in the log, {(upload.ns - log.begin_ns) / 1e9:.1f} s after it begins"
         found = list(differences(upload, mission))
-        lines_of = found or [f"the same {len(mission.stops)} stops"]
+        lines_of = found or [f"the same {counted(len(mission.stops), 'stop')}"]
         lines += [f"{when}: {line}" for line in lines_of]
     return tuple(lines)
 
@@ -70,7 +71,7 @@ def differences_of(log: FieldLog, mission: Mission) -> tuple[str, ...]:
 def differences(upload: LoggedMission, mission: Mission) -> Iterator[str]:
     """Yield the differences between an uploaded mission and ours; nothing if they are the same."""
     if not upload.complete:
-        yield f"only {len(upload.items)} items, the upload was interrupted"
+        yield f"only {counted(len(upload.items), 'item')}, the upload was interrupted"
         return
     if mission.georeference is None:
         yield f"{len(upload.items)} items; ours has no georeference for a comparison"

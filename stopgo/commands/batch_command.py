@@ -14,7 +14,7 @@ import typer
 
 from stopgo.mission.console.notice import notice
 from stopgo.mission.console.running_step import RunningStep, running
-from stopgo.mission.console.table import duration, printable, printable_lines, table
+from stopgo.mission.console.table import counted, duration, printable, printable_lines, table
 from stopgo.mission.errors import InputError
 from stopgo.result_files import result_folder
 
@@ -166,7 +166,7 @@ def _run_command(call: BatchCall) -> int:
 def _collect(store: ResultStore, unused_for: str | None, store_gb: float) -> int:
     oldest = None if unused_for is None else _seconds(unused_for)
     removed, freed = store.collect_garbage(most_bytes=int(store_gb * 1e9), oldest_s=oldest)
-    results = _number(removed, "result", "results")
+    results = counted(removed, "result", "results")
     typer.echo(f"{printable(str(store.folder))}: removed {results}, {freed / 1e6:.1f} MB")
     return 0
 
@@ -196,8 +196,8 @@ def _print_problems(found: Expansion) -> int:
     for problem in found.problems:
         notice(str(problem))
     if found.problems:
-        sound = f"{_number(len(found.entries), 'sound entry', 'sound entries')}; correct the file"
-        notice(f"{_number(len(found.problems), 'fault', 'faults')}, {sound}")
+        sound = f"{counted(len(found.entries), 'sound entry', 'sound entries')}; correct the file"
+        notice(f"{counted(len(found.problems), 'fault', 'faults')}, {sound}")
     return 2 if found.problems else 0
 
 
@@ -209,12 +209,7 @@ def _print_entries(entries: Sequence[Entry], *, as_json: bool) -> None:
         typer.echo(json.dumps({"entries": listed}, ensure_ascii=False))
         return
     typer.echo(table(header, rows))
-    typer.echo(_number(len(entries), "entry", "entries"))
-
-
-def _number(count: int, one: str, many: str) -> str:
-    """Return a count with its noun."""
-    return f"{count} {one if count == 1 else many}"
+    typer.echo(counted(len(entries), "entry", "entries"))
 
 
 def _run(batch: Batch, workers: int, scheduler: str | None, store_gb: float) -> BatchRecord:
@@ -222,7 +217,7 @@ def _run(batch: Batch, workers: int, scheduler: str | None, store_gb: float) -> 
     from stopgo.batches.engine import Running, engine_for
     from stopgo.batches.store import ResultStore
 
-    with running(f"looking up {_number(len(batch.entries), 'plan', 'plans')}") as step:
+    with running(f"looking up {counted(len(batch.entries), 'plan', 'plans')}") as step:
         try:
             left = batch.take_kept()
             if left:

@@ -13,7 +13,7 @@ import typer
 from stopgo.bridge.commands.bridge_options import ItemTrigger, ScanWaiting, Settling
 from stopgo.commands.align_command import align
 from stopgo.mission.console.running_step import running
-from stopgo.mission.console.table import printable, printable_lines
+from stopgo.mission.console.table import counted, printable, printable_lines
 from stopgo.mission.errors import InputError, NegativeResult, OtherFloor
 from stopgo.mission.files.atomic import must_not_replace, write_checked
 from stopgo.mission.files.own_floor import must_be_own_floor
@@ -91,11 +91,11 @@ def check(
     elif found.problems:
         typer.echo(printable_lines("\n".join(map(str, found.problems))))
     else:
-        typer.echo(f"{mission}: valid; {identity(document)}, {len(document.stops)} stops")
+        typer.echo(f"{mission}: valid; {identity(document)}, {counted(len(document.stops), 'stop')}")
     if found.coverage_text is not None and not as_json:
         typer.echo(f"coverage {found.coverage_text}")
     if found.problems:
-        raise NegativeResult(f"{mission}: {len(found.problems)} problem{'s' * (len(found.problems) > 1)}")
+        raise NegativeResult(f"{mission}: {counted(len(found.problems), 'problem')}")
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.mission.console.running_step import running
-from stopgo.mission.console.table import printable_lines
+from stopgo.mission.console.table import counted, printable_lines
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import must_not_replace, write_atomic
 from stopgo.mission.files.plan_toml import read_settings
@@ -128,7 +128,8 @@ def _lost_in_drawing(floor: FloorPlan) -> Iterator[str]:
         yield f"a drawing stores no georeference; plan it with --origin {origin}"
     settled = sum(not item.to_scan for item in floor.elements)
     if settled:
-        yield f"{settled} elements are not to be scanned on that date; the drawing marks all as to be scanned"
+        few = counted(settled, "element is", "elements are")
+        yield f"{few} not to be scanned on that date; the drawing marks all as to be scanned"
 
 
 def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:

@@ -17,7 +17,7 @@ from stopgo.mission.files.mission_json import read
 
 FLOORS = (".dxf", ".ifc", ".ifczip", ".ifcxml")
 MOST_FILES, MOST_FOLDERS = 500, 5000
-"""Most floors, and most missions, that a page lists; most folders that are looked into."""
+"""Most missions that a page lists; most folders that are looked into."""
 LONGEST_NAME = 1024
 
 
@@ -78,10 +78,10 @@ class SiteFiles:
         InputError
             If the folder is not there any more.
         """
-        return sorted(name for name in self._walk() if _is_floor(name))[:MOST_FILES]
+        return sorted(name for name in self._walk() if _is_floor(name))
 
-    def missions(self) -> list[dict[str, Any]]:
-        """Return the missions in the folder, the newest first.
+    def missions(self) -> tuple[list[dict[str, Any]], int]:
+        """Return the newest missions in the folder, the newest first, and how many are left out.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class SiteFiles:
         for _, name in sorted(files)[:MOST_FILES]:
             with suppress(InputError, OSError):
                 found.append(_mission_json(name, read(self.root / name)))
-        return found
+        return found, max(0, len(files) - MOST_FILES)
 
     def _walk(self) -> Iterator[str]:
         if not self.root.is_dir():

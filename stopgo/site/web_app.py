@@ -169,7 +169,8 @@ class LivePages:
     def folder(self, request: Request) -> Response:
         """Return the floors and the missions of the folder."""
         folder = self._parts.folder
-        return JSONResponse({"floors": folder.floors(), "missions": folder.missions()})
+        missions, left = folder.missions()
+        return JSONResponse({"floors": folder.floors(), "missions": missions, "left": left})
 
     def mission(self, request: Request) -> Response:
         """Return the drawing of a mission that a robot holds."""

@@ -24,7 +24,7 @@ def test_recordings_do_not_push_floors_and_missions_out_of_the_lists(tmp_path: P
     write(corridor(), tmp_path / "tower" / "mission.json")
     files = SiteFiles.at(tmp_path)
     assert files.floors() == ["storey.dxf"]
-    assert [mission["file"] for mission in files.missions()] == ["tower/mission.json"]
+    assert [mission["file"] for mission in files.missions()[0]] == ["tower/mission.json"]
 
 
 def test_of_too_many_missions_the_newest_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -33,7 +33,16 @@ def test_of_too_many_missions_the_newest_are_listed(tmp_path: Path, monkeypatch:
         made = with_digest(msgspec.structs.replace(corridor(), name=name))
         write(made, tmp_path / f"{name}.json")
         os.utime(tmp_path / f"{name}.json", (1e9 - age, 1e9 - age))
-    assert [mission["name"] for mission in SiteFiles.at(tmp_path).missions()] == ["mission-c", "mission-b"]
+    listed, left = SiteFiles.at(tmp_path).missions()
+    assert [mission["name"] for mission in listed] == ["mission-c", "mission-b"]
+    assert left == 1, "the page says how many are not in its list"
+
+
+def test_every_floor_is_listed(tmp_path: Path) -> None:
+    """A run's floor is looked for in this list by its digest: one left out would count as missing."""
+    for number in range(MOST_FILES + 1):
+        (tmp_path / f"floor-{number:04d}.dxf").touch()
+    assert len(SiteFiles.at(tmp_path).floors()) == MOST_FILES + 1
 
 
 def test_a_folder_that_is_gone_is_not_an_empty_one(tmp_path: Path) -> None:

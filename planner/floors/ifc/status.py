@@ -9,6 +9,7 @@ from typing import Literal
 
 from msgspec.structs import replace
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
 from stopgo.planner.floors.ifc.levels import Level
@@ -95,17 +96,17 @@ def on_day(model: Model, found: Statuses, level: Level) -> tuple[Model, list[Fin
     InputError
         When the slab of the floor is not there on that day.
     """
-    counted = [item for item in model.described.products if _is_on(item, model, level)]
-    counts: Counter[str] = Counter(found.on[item.global_id] for item in counted)
+    items = [item for item in model.described.products if _is_on(item, model, level)]
+    counts: Counter[str] = Counter(found.on[item.global_id] for item in items)
     kept = tuple(item for item in model.described.products if _stands(item, found))
     _check_floor(model, found, level)
     there = Model(replace(model.described, products=kept), model.vertices, model.faces)
-    return there, list(_status_findings(found, counts, counted)), _figures(found, counts, counted)
+    return there, list(_status_findings(found, counts, items)), _figures(found, counts, items)
 
 
-def _figures(found: Statuses, counts: Counter[str], counted: list[Product]) -> dict[str, int]:
-    without = sum(item.global_id in found.without_task for item in counted)
-    standing = sum(item.global_id in found.standing for item in counted)
+def _figures(found: Statuses, counts: Counter[str], items: list[Product]) -> dict[str, int]:
+    without = sum(item.global_id in found.without_task for item in items)
+    standing = sum(item.global_id in found.standing for item in items)
     figures = {key: counts[key] for key in ("built", "in_progress", "not_started", "removed")}
     return {**figures, "without_task": without, **({"built_before": standing} if found.since else {})}
 
@@ -147,13 +148,13 @@ def _check_floor(model: Model, found: Statuses, level: Level) -> None:
         )
 
 
-def _status_findings(found: Statuses, counts: Counter[str], counted: list[Product]) -> list[Finding]:
+def _status_findings(found: Statuses, counts: Counter[str], products: list[Product]) -> list[Finding]:
     words = ", ".join(
         f"{counts[key]} {key.replace('_', ' ')}"
         for key in ("built", "in_progress", "not_started", "removed")
         if counts[key]
     )
-    since = f"; {sum(item.global_id in found.standing for item in counted)} were built by {found.since}"
+    since = f"; {sum(item.global_id in found.standing for item in products)} were built by {found.since}"
     findings = [Finding("status", f"on {found.day}: {words}{since if found.since else ''}")]
     if found.unrelated:
         text = (
@@ -161,15 +162,14 @@ def _status_findings(found: Statuses, counts: Counter[str], counted: list[Produc
             "or were its capitals changed?"
         )
         findings.append(Finding("schedule_unrelated", text))
-    without = sorted(item.global_id for item in counted if item.global_id in found.without_task)
+    without = sorted(item.global_id for item in products if item.global_id in found.without_task)
     if without:
         more = f" and {len(without) - MOST_NAMED} more" if len(without) > MOST_NAMED else ""
+        few = counted(len(without), "element has", "elements have")
         named = f"{', '.join(without[:MOST_NAMED])}{more}"
-        findings.append(
-            Finding("no_task", f"{len(without)} elements have no task and count as built: {named}")
-        )
+        findings.append(Finding("no_task", f"{few} no task, taken as built: {named}"))
     phased = sorted(
-        {name for item in counted if item.global_id in found.without_task for name in item.phases if name}
+        {name for item in products if item.global_id in found.without_task for name in item.phases if name}
     )
     if phased:
         shown = ", ".join(f"'{legible(name)}'" for name in phased[:MOST_NAMED])

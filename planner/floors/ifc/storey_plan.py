@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Element, Finding, FloorPlan
 from stopgo.mission.geometry import frozen
@@ -118,13 +120,17 @@ def odd_products(model: Model) -> list[Finding]:
     ]
 
 
+_OF_ONE = {"have": "has", "are": "is"}
+
+
 def _named(code: str, products: Sequence[str], problem: str) -> list[Finding]:
     """One finding on several products, each by its class, GlobalId and name."""
     if not products:
         return []
     named = legible(", ".join(products[:MOST_NAMED]))
     more = f" and {len(products) - MOST_NAMED} more" if len(products) > MOST_NAMED else ""
-    return [Finding(code, f"{len(products)} elements {problem}: {named}{more}")]
+    told = problem if len(products) > 1 else re.sub("have|are", lambda verb: _OF_ONE[verb[0]], problem)
+    return [Finding(code, f"{counted(len(products), 'element')} {told}: {named}{more}")]
 
 
 def _given_options(options: FloorOptions) -> dict[str, Any]:
@@ -195,7 +201,7 @@ def _near_the_floor(solids: list[Solid], floor: Region) -> tuple[list[Solid], li
     near = [item for item in solids if item.region.distance(floor) <= BESIDE]
     if len(near) == len(solids):
         return near, []
-    text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m outside the floor are left out"
+    text = f"{counted(len(solids) - len(near), 'element')} more than {BESIDE:g} m outside the floor: left out"
     return near, [Finding("beside_floor", text)]
 
 

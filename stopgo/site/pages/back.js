@@ -37,7 +37,7 @@ function mission(one, me, again) {
   return h("section", { class: "card mission", "aria-label": one.name },
     h("h2", {}, one.name), h("p", {}, plan),
     h("div", { class: "buttons" },
-      h("a", { class: "button primary", href: `/reports/${one.key}`, target: "_blank", rel: "noopener" }, t("report", { n: one.runs.length })),
+      h("a", { class: "button primary", href: `/reports/${one.key}`, target: "_blank", rel: "noopener" }, t(one.runs.length === 1 ? "report_one" : "report", { n: one.runs.length })),
       operator && h("button", { type: "button", onclick: () => view(one, result) }, t("open_viewer")),
       one.file && FORMS.map((form) => h("a", { class: "button", href: `/downloads?file=${encodeURIComponent(one.file)}&to=${form}`, download: "" }, form.toUpperCase())),
       operator && one.file && one.runs.length > 0 && h("button", { type: "button", onclick: () => followUp(one, result, again) }, t("follow_up"))),

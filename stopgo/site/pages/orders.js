@@ -97,7 +97,7 @@ function fault(question, error) {
 
 async function offerMissions(name, question) {
   if (question.firstChild) return fill(question);
-  const { missions, error } = await read("/api/folder").catch((error) => ({ error }));
+  const { missions, left, error } = await read("/api/folder").catch((error) => ({ error }));
   if (error) return fill(question, h("p", { class: "bad", role: "alert" }, error.message));
   if (!missions.length) return fill(question, h("p", {}, t("no_missions")));
   const list = h("select", { "aria-label": t("mission_to_push") }, missions.map((one) =>
@@ -108,7 +108,7 @@ async function offerMissions(name, question) {
     say(difference, found.error ?? differenceText(found));
   };
   list.addEventListener("change", show);
-  fill(question, list, difference,
+  fill(question, list, left ? h("p", {}, t("missions_left", { n: left, listed: missions.length })) : "", difference,
     h("button", { type: "button", class: "primary", onclick: () => push(name, list.value, question) }, t("push_to", { robot: name })),
     h("button", { type: "button", onclick: () => fill(question) }, t("cancel")));
   await show();

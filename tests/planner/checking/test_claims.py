@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,9 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Route, Selection
 from stopgo.mission.stages.figures import percent
+from stopgo.planner import plan
 from stopgo.planner.checking.claims import Recount, overclaims, recount
+from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.visibility.sight.sight import sight
 from tests.faults.sizes import some
 from tests.journeys.test_base import without_extras
@@ -200,3 +203,58 @@ def test_without_the_extra_the_digest_is_checked_and_the_rest_is_reported(made: 
     done = without_extras(front_door, "check", str(made), "--floor", str(floor))
     assert (done.returncode, done.stdout) == (2, "")
     assert "is not the floor that" in done.stderr
+
+
+@pytest.fixture
+def hall_claims() -> tuple[Mission, Recount, dict[str, Any]]:
+    """A plan, its recount, and its coverage.json as it was written."""
+    report = PlanReport(plan(two_rooms(0.9), Settings(grid=2)).first, {}, {})
+    mission, route = report.mission, report.part.route
+    written = json.loads(coverage_json(route, mission, report.figures))
+    return mission, recount(mission, report.part.space), written
+
+
+@pytest.mark.parametrize(
+    ("place", "key", "value"),
+    [
+        (("kinds", "walls"), "seen", lambda seen: seen + 1),
+        (("kinds", "walls"), "coverage", lambda coverage: coverage + 1e-3),
+        (("total",), "seen_m", lambda metres: metres + 0.01),
+        (("total",), "visible", lambda visible: visible - 1),
+        (("elements", 0), "coverage", lambda coverage: coverage + 1e-3),
+        (("elements", 0), "visible_m", lambda metres: metres - 0.01),
+        (("elements", 0), "global_id", lambda _: "2O2Fr$t4X7Zf8NOew3FNr2"),
+        (("rooms", 0), "coverage", lambda coverage: coverage + 1e-3),
+        (("rooms", 0), "seen", lambda metres: metres + 0.01),
+        (("rooms", 0), "room", lambda name: f"{name} and more"),
+        (("network", "pairs", 0), "share", lambda share: share + 1e-3),
+    ],
+)
+def test_each_figure_of_coverage_json_is_checked(
+    place: tuple[str | int, ...],
+    key: str,
+    value: Callable[[Any], Any],
+    hall_claims: tuple[Mission, Recount, dict[str, Any]],
+) -> None:
+    mission, found, written = hall_claims
+    assert list(overclaims(mission, found, msgspec.convert(written, Coverage))) == []
+    row: Any = written
+    for step in place:
+        row = row[step]
+    row[key] = value(row[key])
+    (problem,) = overclaims(mission, found, msgspec.convert(written, Coverage))
+    assert problem.path.startswith(f"coverage $.{place[0]}")
+
+
+def test_a_segment_that_no_stop_sees_is_reported(
+    hall_claims: tuple[Mission, Recount, dict[str, Any]],
+) -> None:
+    """Drawings and exports show what segments claim."""
+    mission, found, written = hall_claims
+    row = next(row for item in written["elements"] for row in item["segments"] if not row["seen"])
+    row["seen"] = [[0.0, 1.0]]
+    (problem,) = overclaims(mission, found, msgspec.convert(written, Coverage))
+    assert problem.path == "coverage $.elements[*].segments"
+    row["seen"] = [[-1.0, 2.0]]
+    (problem,) = overclaims(mission, found, msgspec.convert(written, Coverage))
+    assert "differs from this floor" in problem.message

@@ -185,7 +185,7 @@ def test_a_floor_of_open_lines_says_so(tmp_path: Path) -> None:
     drawing.modelspace().add_lwpolyline([(0, 0), (9, 0), (9, 9)], dxfattribs={"layer": "FLOOR"})
     path = tmp_path / "open.dxf"
     drawing.saveas(path)
-    assert "only 1 open lines" in refusal(path)
+    assert "only 1 open line" in refusal(path)
 
 
 def test_a_floor_lost_to_a_bad_coordinate_says_so(tmp_path: Path) -> None:

@@ -79,6 +79,14 @@ def test_a_control_point_behind_a_wall_or_too_far_away_is_not_seen() -> None:
     assert (only[1] + origin).tolist() == pytest.approx([2.0, 1.0])
 
 
+def test_a_control_point_that_no_stop_sees_is_reported() -> None:
+    """Such as one in millimetres, or within a wall: the network was in the frame of a stop without a word."""
+    part = made(control=((2.0, 1.0), (2000.0, 1000.0)))
+    told = [item for item in part.figures.findings if item.code == "control_unseen"]
+    assert [item.at for item in told] == [(2000.0, 1000.0)]
+    assert "the control point (2000, 1000) is seen by no stop within" in told[0].message
+
+
 def test_further_stops_are_added_until_every_scan_is_accurate_enough() -> None:
     loose = made()
     before = worst_mm(loose)

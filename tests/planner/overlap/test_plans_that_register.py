@@ -14,6 +14,7 @@ from stopgo.mission.files.plan_toml import recorded_settings
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.mission.settings.parameter_checks import check_settings
+from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import Network, network_of
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates
@@ -24,7 +25,7 @@ from stopgo.planner.overlap.registered import SCANS_APART, registered_pairs
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
 from stopgo.planner.selection.separators import components_of
 from stopgo.planner.space.navigable import navigable
-from tests.planner.worlds import box, door, floor_of, room, shell, wall
+from tests.planner.worlds import box, door, floor_of, planned, room, shell, two_rooms, wall
 
 ASKED = Settings(d_sec=0.4, edge=0.0, overlap=0.1, seed=1)
 LOOSE = replace(ASKED, register=False, overlap=None)
@@ -100,6 +101,26 @@ def test_rooms_that_cannot_see_one_another_are_reported_with_a_remedy() -> None:
     assert "of 99.0 % required" in apart[0].message
     assert report.strict_exit_code == 1
     assert "COMPONENTS" in report.as_text()
+
+
+@pytest.mark.parametrize("fov", [90.0, 180.0])
+def test_scans_that_no_heading_of_a_limited_view_joins_pass_the_check(fov: float) -> None:
+    """Without their headings, the candidates would see all round, and connect what no stop can."""
+    mission, nouns = planned(two_rooms(1.0), Settings(fov=fov, grid=2.0))
+    network = network_of(mission)
+    assert network is not None and len(network.pieces) > 1
+    assert list(network_overclaims(mission, nouns[NavigableSpace])) == []
+
+
+def test_scans_of_a_limited_view_that_candidates_would_join_fail_the_check() -> None:
+    mission, nouns = planned(two_rooms(1.0), Settings(fov=180.0))
+    last, network = mission.stops[-1].id, network_of(mission)
+    assert network is not None and len(network.pieces) == 1
+    pairs = tuple(pair for pair in network.overlaps if last not in (pair.a, pair.b))
+    stops = tuple(msgspec.structs.replace(stop, error=msgspec.UNSET) for stop in mission.stops)
+    torn = msgspec.structs.replace(mission, network=pairs, stops=stops)
+    (problem,) = network_overclaims(torn, nouns[NavigableSpace])
+    assert problem.path == "$.network" and "apart" in problem.message
 
 
 def test_a_plan_that_nobody_asked_to_register_reports_into_how_many_pieces_its_scans_fall() -> None:

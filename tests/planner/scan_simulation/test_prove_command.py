@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -60,6 +61,25 @@ def test_a_damaged_coverage_next_to_the_mission_is_reported(planned: Path, tmp_p
     assert told.returncode in (0, 1)
     assert "coverage.json: not a coverage.json" in told.stderr and told.stderr.count("\n") == 1
     assert "only the mission's counts are compared with the scans" in told.stderr
+
+
+@pytest.mark.parametrize("place", [("total",), ("kinds", "walls")])
+def test_a_fraction_that_was_raised_is_not_proved(
+    place: tuple[str, ...], planned: Path, tmp_path: Path
+) -> None:
+    """The fraction is of what candidates see, which the simulation of the stops does not count."""
+    shutil.copy(planned / "floor.dxf", tmp_path)
+    half = ("--fov", "120", "--coverage", "0.5", "--room-coverage", "0", "--kind-coverage", "0")
+    assert stopgo("plan", str(tmp_path / "floor.dxf"), "-o", str(tmp_path), *half).returncode == 0
+    coverage = json.loads((tmp_path / "coverage.json").read_text())
+    row = coverage
+    for step in place:
+        row = row[step]
+    row["coverage"] = 0.9999
+    (tmp_path / "coverage.json").write_text(json.dumps(coverage))
+    told = prove(tmp_path)
+    assert told.returncode == 1
+    assert f"coverage $.{'.'.join(place)}.coverage: is 0.9999, but " in told.stderr
 
 
 @pytest.mark.parametrize(

@@ -139,8 +139,8 @@ def test_gaps_jumps_and_poses_that_are_no_numbers_are_reported(tmp_path: Path) -
     log = read_log(write_bag(tmp_path / "a.mcap", [*rows[:25], *late]), Reading(stamps="log"))
     told = " | ".join(log.poses[0].oddities)
     assert "1 of 30 poses are not finite" in told
-    assert "1 gaps without poses, 4.1 s" in told
-    assert "1 jumps of position, the largest 5.01 m" in told
+    assert "1 gap without poses, 4.1 s" in told
+    assert "1 jump of position, the largest 5.01 m" in told
 
 
 def test_two_robots_stay_apart(tmp_path: Path) -> None:

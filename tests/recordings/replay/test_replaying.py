@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.log_placing import Align, Placing
 from stopgo.recordings.replay.path_and_time import driven_path, lost_times
 from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
-from stopgo.recordings.replay.replaying import replay
+from stopgo.recordings.replay.replaying import UNITS, replay
 from tests.recordings.logs.writing import Messages, write_bag
 from tests.recordings.replay.driving import Drive, Odd, Senses, driven, logged, wandering
 
@@ -154,6 +155,30 @@ def test_poses_in_millimetres_are_named(align: Align, error: type[Exception]) ->
     millimetres = Track.of(track.ns, track.xy * 1000, track.heading)
     with pytest.raises(error, match=r"; its poses move at \d+ m/s: give them in metres"):
         replay(log_of(millimetres), mission, Placing(align=align))
+
+
+@pytest.mark.parametrize("unit", ["feet", "inches"])
+def test_poses_in_another_unit_are_named(unit: str) -> None:
+    mission = wandering(4)
+    track = logged(driven(mission))
+    other = Track.of(track.ns, track.xy * UNITS[unit] + 5000, track.heading)
+    with pytest.raises(InputError, match=rf"times as long as the route, as in {unit}: give it in metres"):
+        replay(log_of(other, frame="map"), mission, Placing(to_map=Transform(x=0.0, y=0.0, heading=0.0)))
+
+
+def test_times_in_milliseconds_are_named() -> None:
+    """They are read as seconds: the whole drive was one standstill, and no stop could be judged."""
+    track = logged(driven(MISSION))
+    slow = Track.of(track.ns * 1000, track.xy, track.heading)
+    with pytest.raises(InputError, match="with times read as seconds; name the column of times"):
+        replay(replace(log_of(slow), format="CSV trajectory"), MISSION, FIRST)
+    assert replay(replace(log_of(track), format="CSV trajectory"), MISSION, FIRST).comparison.stops
+
+
+def test_a_table_with_few_poses_a_minute_has_seconds() -> None:
+    track = logged(driven(MISSION))
+    few = Track.of(track.ns[::300], track.xy[::300], track.heading[::300])
+    assert replay(replace(log_of(few), format="CSV trajectory"), MISSION, FIRST).comparison.stops
 
 
 def test_a_time_offset_moves_the_run_and_is_reported() -> None:

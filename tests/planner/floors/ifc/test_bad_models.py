@@ -128,7 +128,9 @@ def test_a_product_without_a_body_is_named(read: Read) -> None:
     floor = read(house)
     told = {item.code: item.message for item in floor.findings}
     assert len(floor.openings) == 1, "its opening shows where the door is"
-    assert re.search("no body in the model and are left out: IfcColumn .* 'column'$", told["no_body"])
+    assert re.search(
+        "1 element has no body in the model and is left out: IfcColumn .* 'column'$", told["no_body"]
+    )
     assert re.search("no body in the model: .*: IfcSpace .* 'right'$", told["space_without_body"])
 
 

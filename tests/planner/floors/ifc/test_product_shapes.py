@@ -114,7 +114,7 @@ def test_a_shape_without_its_openings_is_named(read: Read, monkeypatch: pytest.M
     house = two_rooms()
     (said,) = [item.message for item in read(house).findings if item.code == "uncut_shape"]
     guid = house.things["column"].GlobalId
-    assert said == (f"1 elements are shown without the openings cut out of them: IfcColumn {guid} 'column'")
+    assert said == (f"1 element is shown without the openings cut out of them: IfcColumn {guid} 'column'")
 
 
 def test_what_no_kernel_can_make_is_the_box_around_its_points(
