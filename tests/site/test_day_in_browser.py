@@ -67,7 +67,7 @@ def test_a_day_from_the_floor_to_the_report(world: BrowserWorld) -> None:
         tab.until("document.querySelectorAll('.map .stop.skipped').length == 1")
         tab.until("document.querySelector('.map .target.lost').getAttribute('d').length > 0")
         tab.run("location.hash = '#back'")
-        tab.shows("Report of 1 runs")
+        tab.shows("Report of the run")
         tab.shows("NO", ".missions td")
         report = tab.run("fetch(document.querySelector('a.primary').href).then((one) => one.text())")
         assert "skipped" in report
