@@ -6,6 +6,7 @@ counter-clockwise from +x. Nothing here depends on a mission: `stopgo.recordings
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -229,6 +230,15 @@ GAP_S = 1.0
 """Shortest gap that is reported; it must also be ten times as long as usual."""
 JUMP_M, JUMP_M_S = 0.5, 5.0
 """Distance and speed from which on the step between two poses is a jump."""
+
+
+def apart(xy: FloatArray, least_m: float) -> IntArray:
+    """Return indices of the first position and of each that is so far from the one before it (n, 2)."""
+    at = [0]
+    for k in range(1, len(xy)):
+        if math.dist(xy[k], xy[at[-1]]) >= least_m:
+            at.append(k)
+    return np.array(at)
 
 
 def _astray(ns: IntArray, xy: FloatArray) -> BoolArray:

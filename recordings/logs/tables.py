@@ -21,6 +21,7 @@ from stopgo.recordings.logs.field_log import (
     FieldLog,
     Poses,
     Reading,
+    apart,
     fixes_of,
     poses_of,
 )
@@ -253,10 +254,7 @@ class _Columns:
 
 def _name_by_path(xy: np.ndarray, heading: np.ndarray, column: str) -> str:
     """Return the name for a column of degrees if they follow the path (n, 2), and radians do not."""
-    at = [0]
-    for k in range(1, len(xy)):
-        if math.dist(xy[k], xy[at[-1]]) >= PIECE_M:
-            at.append(k)
+    at = apart(xy, PIECE_M)
     pieces = np.diff(xy[at], axis=0)
     course, turned = np.arctan2(pieces[:, 1], pieces[:, 0]), np.radians(heading[at[1:]])
 

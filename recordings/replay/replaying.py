@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from stopgo.mission.run.events import AnyEvent
 from stopgo.mission.run.route_position import legs_of
 from stopgo.mission.run.run_log import LogSource, RunLog, Track
 from stopgo.mission.stages.sight import Sight
-from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark
+from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark, apart
 from stopgo.recordings.replay.driven_mission import must_be_driven
 from stopgo.recordings.replay.followed import followed_events
 from stopgo.recordings.replay.inferred_events import events_of
@@ -96,10 +95,7 @@ def _placed(log: FieldLog, mission: Mission, placing: Placing) -> PlacedLog:
 
 def _check_times(log: FieldLog, source: Poses, mission: Mission) -> None:
     """Refuse a table whose robot moves so slowly that its times are no seconds."""
-    at = [0]
-    for k in range(1, len(source.xy)):
-        if math.dist(source.xy[k], source.xy[at[-1]]) >= THINNED_M:
-            at.append(k)
+    at = apart(source.xy, THINNED_M)
     seconds = np.diff(source.ns[at]) / 1e9
     if len(at) <= MOVES or (seconds <= 0).any():
         return
@@ -273,11 +269,8 @@ def on_route(track: Track, mission: Mission) -> float:
 
 def _thinned(xy: FloatArray) -> FloatArray:
     """Return positions at least THINNED_M apart along the path, so that standstills do not count."""
-    thinned = [xy[0]]
-    for position in xy[:: max(1, len(xy) // 100_000)]:
-        if math.dist(position, thinned[-1]) >= THINNED_M:
-            thinned.append(position)
-    return np.array(thinned)
+    some = xy[:: max(1, len(xy) // 100_000)]
+    return some[apart(some, THINNED_M)]
 
 
 def _length(xy: FloatArray) -> float:
