@@ -113,12 +113,14 @@ def index_by_parts(
     folder: Path,
     *,
     kept: dict[str, IndexedFile] | None = None,
+    announced: set[Version] | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Iterator[tuple[RunIndex, int]]:
     """Yield the index after each part of the files that must be read, and the number of those left.
 
     A run is compared with its plan, so it is read again after a plan of its mission has come or gone. `kept`
-    holds what is known of a folder in which no index can be written.
+    holds what is known of a folder in which no index can be written. `announced` holds the versions of files
+    whose plans have come, for a reader of one part after the other.
 
     Raises
     ------
@@ -127,7 +129,7 @@ def index_by_parts(
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: not a folder; give a folder of recordings")
-    announced: set[str] = set()
+    announced = set() if announced is None else announced
     kept = {} if kept is None else kept
     left = -1
     while left:
@@ -137,11 +139,12 @@ def index_by_parts(
 
 
 def _next_part(
-    folder: Path, announced: set[str], kept: dict[str, IndexedFile], say: Callable[[str], None]
+    folder: Path, announced: set[Version], kept: dict[str, IndexedFile], say: Callable[[str], None]
 ) -> tuple[RunIndex, int]:
     """Read the next files, and return the index and the number of those left.
 
-    `announced` are the files whose plans are known to the runs of their missions; those read are added.
+    `announced` are versions of files whose plans are known to the runs of their missions; those read are
+    added. So each is announced once, and files with a plan and a run do not have each other read for ever.
     """
     known, stamps = kept or _known(folder / INDEX), dict(sorted(_stamps(folder)))
     files = {name: known[name] for name, stamp in stamps.items() if _is_unchanged(known.get(name), stamp)}
@@ -152,8 +155,8 @@ def _next_part(
         say(f"{folder}: reading {len(stale)} of {len(stamps)} recordings")
     part = stale[:PART]
     files |= _read(folder, {name: stamps[name] for name in part}, files) if part else {}
-    come = _planned(files[name] for name in part if name not in announced)
-    announced.update(part)
+    come = _planned(files[name] for name in part if (name, stamps[name]) not in announced)
+    announced.update((name, stamps[name]) for name in part)
     outdated = {name for name in files if name not in part and _has_run_of(files[name], come)}
     files = {name: files[name] for name in sorted(files.keys() - outdated)}
     if part or len(files) != len(known):
@@ -198,6 +201,8 @@ def _known(path: Path) -> dict[str, IndexedFile]:
 
 Stamp = tuple[int, int]
 """File size, and time of the last change in nanoseconds."""
+Version = tuple[str, Stamp]
+"""Name and stamp of a file."""
 
 
 def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:

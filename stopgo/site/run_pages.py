@@ -20,6 +20,7 @@ from stopgo.mission.files.mission_json import read
 from stopgo.recordings.catalog.run_index import (
     IndexedFile,
     RunIndex,
+    Version,
     index_by_parts,
     index_of,
     run_cells,
@@ -67,6 +68,8 @@ class RunRoom:
         self._one_at_a_time = threading.Lock()
         self._known: dict[str, IndexedFile] = {}
         """State of the files of a folder that takes no index."""
+        self._announced: set[Version] = set()
+        """Versions of files whose plans have come."""
         self._merged: dict[str, MergedFiles] = {}
         self._secrets: dict[str, tuple[str, float]] = {}
 
@@ -76,10 +79,14 @@ class RunRoom:
         Each call reads a part of those that are new or changed, so that a large folder shows its progress.
         """
         with self._one_at_a_time:
-            index, left = next(index_by_parts(self._folder.root, kept=self._known))
+            index, left = self._next_part()
             if _has_gone(self._folder.root, index):
-                index, left = next(index_by_parts(self._folder.root, kept=self._known))
+                index, left = self._next_part()
         return {"missions": self._missions(index), "faults": index.faults(), "left": left}
+
+    def _next_part(self) -> tuple[RunIndex, int]:
+        parts = index_by_parts(self._folder.root, kept=self._known, announced=self._announced)
+        return next(parts)
 
     def _missions(self, whole: RunIndex) -> list[dict[str, Any]]:
         index = without_repeats(whole)

@@ -13,7 +13,14 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.recordings.catalog import run_index
-from stopgo.recordings.catalog.run_index import INDEX, IndexedFile, index_by_parts, index_of, index_text
+from stopgo.recordings.catalog.run_index import (
+    INDEX,
+    IndexedFile,
+    Version,
+    index_by_parts,
+    index_of,
+    index_text,
+)
 from tests.recordings import run, world
 
 
@@ -175,3 +182,19 @@ def test_a_later_revision_of_a_plan_reads_no_earlier_run_again(
     found = msgspec.structs.replace(before.files["plan.rrd"], plans=(later,))
     monkeypatch.setattr(run_index, "_read", lambda folder, stale, others: dict.fromkeys(stale, found))
     assert [left for _, left in index_by_parts(tmp_path)] == [0]
+
+
+def test_files_with_a_plan_and_a_run_do_not_have_each_other_read_for_ever(
+    sighted: Path, skipping: Path, tmp_path: Path
+) -> None:
+    """A reader that takes one part after the other, as the page does."""
+    both, merged = tmp_path / "both.rrd", tmp_path / "merged"
+    main(["review", str(sighted), str(skipping), "-o", str(both)])
+    merged.mkdir()
+    announced: set[Version] = set()
+    for name in ("a.rrd", "b.rrd"):
+        shutil.copy(both, merged / name)
+        left = [next(index_by_parts(merged, announced=announced))[1] for _ in range(4)]
+        assert left[-1] == 0, left
+    index = index_of(merged)
+    assert all(file.plans and file.runs for file in index.files.values())
