@@ -12,12 +12,15 @@ environment variable STOPGO_PURE leaves them out, for a wheel that fits every ma
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 from setuptools import Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
 
 FOLDERS = ("mission", "planner", "bridge", "recordings")
 TYPES = sorted(Path("planner").rglob("*_compiled.pxd"))
+ARRAYS = "stopgo.planner.geometry.arrays_compiled"
+"""Cython's own code that takes arrays: one module for all kernels, each would compile it anew for 5 s."""
 RULES = {
     "language_level": 3,
     "annotation_typing": False,  # `int` there is a Python number; the types are in the .pxd
@@ -39,16 +42,23 @@ def kernels() -> list[Extension]:
     """The extension modules; none where a pure wheel is wanted."""
     if os.environ.get("STOPGO_PURE"):
         return []
-    return [
-        Extension(
-            ".".join(("stopgo", *types.with_suffix("").parts)),
-            [types.with_name(types.name.replace("_compiled.pxd", ".py")).as_posix()],
-            depends=[types.as_posix()],
-            extra_compile_args=FLAGS,
-            optional=True,
-        )
-        for types in TYPES
-    ]
+    return [_kernel(types) for types in TYPES] + [_extension(ARRAYS, "planner/geometry/arrays_compiled.c")]
+
+
+def _kernel(types: Path) -> Extension:
+    """The extension module of the kernel with these types."""
+    source = types.with_name(types.name.replace("_compiled.pxd", ".py"))
+    name = ".".join(("stopgo", *types.with_suffix("").parts))
+    return _extension(name, source.as_posix(), depends=[types.as_posix()])
+
+
+def _extension(name: str, source: str, **more: Any) -> Extension:
+    return Extension(name, [source], extra_compile_args=FLAGS, optional=True, **more)
+
+
+def _as_in_the_tree(one: Extension) -> Extension:
+    """The extension with the name of its source's folders; the kernels import `ARRAYS` by its full name."""
+    return Extension(one.name if one.name == ARRAYS else one.name.removeprefix("stopgo."), one.sources)
 
 
 class BuildKernels(build_ext):
@@ -71,9 +81,16 @@ class BuildKernels(build_ext):
             say("Cython is not installed, so the planner's kernels are not compiled")
             self.extensions = []
             return
-        say(f"compiling {len(self.extensions)} kernels, once; this takes some ten seconds")
-        named = [Extension(one.name.removeprefix("stopgo."), one.sources) for one in self.extensions]
-        made = cythonize(named, compiler_directives=RULES, build_dir="build/kernels", force=True, quiet=True)
+        say(f"compiling {len(TYPES)} kernels, once; this takes some ten seconds")
+        named = [_as_in_the_tree(one) for one in self.extensions]
+        made = cythonize(
+            named,
+            compiler_directives=RULES,
+            shared_utility_qualified_name=ARRAYS,
+            build_dir="build/kernels",
+            force=True,
+            quiet=True,
+        )
         for one, of_c in zip(self.extensions, made, strict=True):
             one.sources = of_c.sources
 
