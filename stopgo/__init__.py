@@ -249,6 +249,9 @@ def main() -> int:
     if trouble:
         print(f"stopgo: {trouble}", file=sys.stderr)  # noqa: T201
         return 2
+    from stopgo.late_methods import compile_when_called
+
+    compile_when_called()
     from stopgo.command_line import main as run
 
     return run()
