@@ -11,8 +11,8 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-LATE = frozenset({"__repr__", "__eq__", "__hash__", "__setattr__", "__delattr__"})
-"""All but `__init__`, whose signature is looked at, and comparisons by order, which none of ours has."""
+LATE = frozenset({"__init__", "__repr__", "__eq__", "__hash__", "__setattr__", "__delattr__"})
+"""All but comparisons by order, which none of ours has."""
 NAME = "_create_fn"
 """Python's function that compiles a method of a dataclass, up to 3.12."""
 
@@ -32,13 +32,17 @@ def compile_when_called() -> None:
 
 
 def _late(name: str, compiled: Callable[[], Callable[..., Any]]) -> Callable[..., Any]:
-    """The method of this name, which is compiled by its first call."""
-    method: Callable[..., Any] | None = None
+    """A method that is compiled by its first call, and then takes this one's place in the class."""
+    known: list[Callable[..., Any]] = []
 
-    def call(*given: Any) -> Any:
-        nonlocal method
-        method = method or compiled()
-        return method(*given)
+    def call(own: Any, *given: Any, **named: Any) -> Any:
+        if not known:
+            known.append(compiled())
+            known[0].__qualname__ = call.__qualname__
+        for kind in type(own).__mro__:
+            if vars(kind).get(name) is call:
+                setattr(kind, name, known[0])
+        return known[0](own, *given, **named)
 
     call.__name__ = name
     return call

@@ -1,7 +1,5 @@
 """Parameters of coverage: what the stops must see, how well, and how firmly scans register."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal

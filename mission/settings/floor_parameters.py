@@ -1,7 +1,5 @@
 """Parameters of the floor: which storey, day, drawing or part of a file is read, and how."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal

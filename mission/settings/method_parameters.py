@@ -1,7 +1,5 @@
 """Parameters of the method: the variant that carries out each stage."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Parameters of the policy: the robot's reaction to a failed scan, a lost link or a low battery."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """Parameters of the route: start and end, required stops, and division among robots or tours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """Parameters of the search: extra candidates, limits, the seed, and the origin on Earth."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated

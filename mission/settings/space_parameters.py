@@ -1,7 +1,5 @@
 """Parameters of space and candidates: clearances, doors, targets, and where stops are offered."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal

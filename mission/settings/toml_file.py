@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from datetime import date, time
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,8 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
     InputError
         Naming the file and the problem.
     """
+    import tomllib
+
     try:
         text = path.read_text(encoding="utf-8-sig")
         return {key: _as_text(value) for key, value in tomllib.loads(text).items()}
