@@ -132,6 +132,13 @@ def with_vehicle(guide: GuideFolder, *, has_origin: bool = True) -> None:
     guide.ends.enter_context(vehicle_on(VEHICLE, setup))
 
 
+def with_own_run(guide: GuideFolder) -> None:
+    """A rover that drives by itself, whose stops are as far off as an autopilot's may be."""
+    planned = guide.run(f"stopgo plan floor.dxf -o out --origin {ORIGIN} --range 3 --tolerance 0.5")
+    assert planned.returncode == 0
+    with_vehicle(guide)
+
+
 def with_gateway(guide: GuideFolder) -> None:
     with_keys(guide)
     with_vehicle(guide)
@@ -200,7 +207,7 @@ def with_log(guide: GuideFolder) -> None:
 PREPARED: dict[str, Callable[[GuideFolder], None]] = {
     "floors": with_models, "conform": with_robot, "deployment": with_keys, "gateway": with_gateway,
     "replay": with_log, "push-to-autopilot": lambda guide: with_vehicle(guide, has_origin=False),
-    "run-on-autopilot": with_vehicle, "tunnel": with_radio, "plugins": with_plugins, "campus": with_campus,
+    "run-on-autopilot": with_own_run, "tunnel": with_radio, "plugins": with_plugins, "campus": with_campus,
     "review": with_runs, "exports": with_parameters, "nav2": with_robot, "README": with_robot,
     "site": with_vehicles,
 }  # fmt: skip
