@@ -84,8 +84,7 @@ def check(
 
     document = read(mission)
     found = _checked(document, floor, coverage)
-    for note in found.notes:
-        typer.echo(f"stopgo: {note}", err=True)
+    _print_notes(found.notes)
     if as_json:
         typer.echo(json_text(_verdict(mission, document, found)))
     elif found.problems:
@@ -138,6 +137,7 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
         (*problems, *found.problems),
         coverage=None if counted is None else counted.as_json(),
         coverage_text=None if counted is None else counted.in_words(),
+        notes=found.notes,
     )
 
 
