@@ -70,9 +70,9 @@ def check(
     """Check that a mission is valid.
 
     It checks schema, digest, numbers, and that the legs join. With --floor it also checks that the mission
-    was planned on that floor, that stops and legs keep every clearance, and that the stops see the targets
-    that the mission claims. All of it is computed again, each line of sight against every wall. With
-    --coverage-file it checks the claims of that file.
+    was planned on that floor with its parameters, that stops and legs keep every clearance, and that the
+    stops see the targets that the mission claims. All of it is computed again, each line of sight against
+    every wall. With --coverage-file it checks the claims of that file.
 
     Exit code 0: valid; 1: readable but invalid, without clearance, or with more coverage claimed than its
     stops have; 2: not readable, or planned on another floor.
