@@ -251,7 +251,26 @@ def mission_id(source: FloorSource, settings: Settings, version: str, part: int 
     Parameters of the floor's reader are hashed as part of the source. Stops that are required or forbidden
     by hand make another revision, not another mission.
     """
-    recorded = recorded_values(settings) | {name: [] for name in BY_HAND}
-    parameters = {key: value for key, value in recorded.items() if key not in FLOOR_PARAMETERS}
+    return _id_of(source, recorded_values(settings), version, part)
+
+
+def _id_of(source: FloorSource, recorded: dict[str, Any], version: str, part: int) -> str:
+    values = recorded | {name: [] for name in BY_HAND}
+    parameters = {key: value for key, value in values.items() if key not in FLOOR_PARAMETERS}
     basis = [source.basis, parameters, version, part]
     return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]
+
+
+UNDIVIDED = -1
+"""Part number of the plan that robots or tours divide: its mission is not driven, and has its own id."""
+
+
+def ids_of_plan(mission: Mission, source: FloorSource, settings: Settings, parts: int) -> frozenset[str]:
+    """Return the ids that a plan of a floor has by the parameters and version that a mission records.
+
+    Parameters count as recorded, and as `settings` read from them have them: a later version may record more.
+    """
+    origin, shares = mission.origin, 1 if mission.share is UNSET else mission.share.of
+    numbers = range(UNDIVIDED, max(parts, shares))
+    recorded = (origin.parameters, recorded_values(settings))
+    return frozenset(_id_of(source, values, origin.stopgo, k) for values in recorded for k in numbers)

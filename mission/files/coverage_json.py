@@ -83,6 +83,11 @@ class CoverageOf(msgspec.Struct, frozen=True):
     digest: str
 
 
+class CoverageFloor(msgspec.Struct, frozen=True):
+    name: str
+    digest: str
+
+
 class Coverage(msgspec.Struct, frozen=True):
     """A coverage.json as it is read."""
 
@@ -91,6 +96,8 @@ class Coverage(msgspec.Struct, frozen=True):
     mission: CoverageOf
     total: CoverageCounts
     elements: tuple[CoverageElement, ...]
+    floor: CoverageFloor | None = None
+    """The floor of its mission; None if the file has none."""
     kinds: dict[str, CoverageCounts] = {}
     rooms: tuple[CoverageRoom, ...] = ()
     surface: CoverageSurface | None = None

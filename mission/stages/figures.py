@@ -155,8 +155,14 @@ class Figures:
         """True if a leg crosses lines of unknown meaning."""
         return any(item.code == LEG_OVER_IGNORED for item in self.findings)
 
+    @property
+    def is_inaccurate(self) -> bool:
+        """True if a scan's predicted error exceeds the accuracy required."""
+        return any(item.code == ACCURACY_NOT_MET for item in self.findings)
+
 
 LEG_OVER_IGNORED = "leg_over_ignored"
+ACCURACY_NOT_MET = "accuracy_not_met"
 
 
 def worst_first(groups: Sequence[GroupCoverage]) -> tuple[GroupCoverage, ...]:

@@ -10,7 +10,7 @@ from stopgo.mission.plan import PartPlan
 from stopgo.mission.stages import Candidates, Route, Selection, Unreached, Visibility
 from stopgo.mission.stages.coverage_totals import totals_of_plan
 from stopgo.mission.stages.covered_intervals import seen_units
-from stopgo.mission.stages.figures import CoverageByGroup, Figures
+from stopgo.mission.stages.figures import ACCURACY_NOT_MET, CoverageByGroup, Figures
 from stopgo.planner.appraisal.plausibility import floor_doubts, floor_of_rooms, leg_doubts, near_legs
 from stopgo.planner.appraisal.quality import (
     FEWER_VIEWS,
@@ -97,12 +97,14 @@ def figures_of(route: Route, before: FiguresBefore | None = None) -> Figures:
     )
 
 
+OF_ALL_MISSIONS = (NOT_MET, FEWER_VIEWS, UNSEEN_CONTROL, ACCURACY_NOT_MET, *SCANS_APART)
+"""Codes of findings about all stops of a plan, whichever mission has them."""
+
+
 def figures_of_share(route: Route, plan: PartPlan, before: FiguresBefore) -> Figures:
     """Return the figures of one mission of a plan; the required coverage applies to all together."""
     whole, groups = plan.figures, plan.totals.coverage(seen_units(route.selection))
-    of_all = (
-        item for item in whole.findings if item.code in (NOT_MET, FEWER_VIEWS, UNSEEN_CONTROL, *SCANS_APART)
-    )
+    of_all = (item for item in whole.findings if item.code in OF_ALL_MISSIONS)
     findings = (*route.space.findings, *leg_doubts(route), *before.doubts, *of_all)
     return replace(
         whole,

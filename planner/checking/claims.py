@@ -198,7 +198,11 @@ def _less(path: str, claimed: int, counted: int, who: str) -> Problem:
 
 
 def _coverage_overclaims(coverage: Coverage, mission: Mission, counted: Recount) -> Iterator[Problem]:
-    """Every figure of coverage.json that exceeds the recount."""
+    """Every figure of coverage.json that exceeds the recount, and a floor that is not the mission's."""
+    floor, origin = coverage.floor, mission.origin
+    if floor is not None and (floor.name, floor.digest) != (origin.floor, origin.floor_digest):
+        text = f"is {floor.name}, sha256 {floor.digest[:12]}…, and $.origin"
+        yield Problem("coverage $.floor", f"{text} {origin.floor}, {origin.floor_digest[:12]}…; plan again")
     elements = counted.space.floor.elements
     wanted = [k for k, element in enumerate(elements) if element.target]
     if [elements[k].id for k in wanted] != [element.id for element in coverage.elements]:

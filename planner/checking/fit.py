@@ -13,11 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
+from msgspec import UNSET
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.document import Mission, Point, Stop
+from stopgo.mission.document import Mission, Point, Policy, ScannerSpec, Stop
 from stopgo.mission.document.problems import Problem
-from stopgo.mission.document.specs import limits_spec_of, robot_of
+from stopgo.mission.document.specs import limits_spec_of, policy_of, robot_of, scanner_of
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
@@ -65,17 +66,47 @@ def other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
 
 
 def _bolder_than_planned(mission: Mission, settings: Settings) -> Iterator[Problem]:
-    """Motion faster, scans shorter and positions less accurate than the plan's parameters."""
+    """Motion faster, scans shorter or of another scanner, and positions less accurate than planned."""
     planned, robot = robot_of(settings), mission.robot
+    yield from _other_scanner(mission.scanner, scanner_of(settings))
+    yield from _bolder_policy(mission.policy, policy_of(settings))
     yield from _above("$.robot.speed", robot.speed, min(planned.speed, FASTEST))
     yield from _above("$.robot.turn_rate", robot.turn_rate, planned.turn_rate)
     yield from _above("$.robot.acceleration", robot.acceleration, planned.acceleration)
     for index, stop in enumerate(mission.stops):
         path = f"$.stops[{index}]"
         yield from _above(f"{path}.tolerance_m", stop.tolerance_m, min(settings.tolerance, LOOSEST))
-        if stop.scan.duration_s < settings.scan_time * (1 - 1e-6):
-            duration = f"is {stop.scan.duration_s:g}, but the plan's scans take {settings.scan_time:g} s"
-            yield Problem(f"{path}.scan.duration_s", duration)
+        yield from _hastier_scan(path, stop, settings)
+
+
+def _other_scanner(sent: ScannerSpec, planned: ScannerSpec) -> Iterator[Problem]:
+    """Properties of the scanner that are not the plan's; a mission of an earlier version has fewer."""
+    for key in ("profile", "model", "step_deg", "near", "blind_cone_deg", "height"):
+        value = getattr(sent, key)
+        if value is not UNSET and value != getattr(planned, key):
+            yield Problem(f"$.scanner.{key}", f"is {value}, which $.origin.parameters did not plan with")
+
+
+def _bolder_policy(policy: Policy, planned: Policy) -> Iterator[Problem]:
+    """A robot that may leave the legs, of which all clearances are, or that drives with less battery."""
+    if policy.own_way is True and planned.own_way is not True:
+        yield Problem("$.policy.own_way", "is true, but the plan is of legs that the robot drives")
+    if policy.battery_min < planned.battery_min * (1 - 1e-6):
+        text = f"is {policy.battery_min:g}; the plan asks for at least {planned.battery_min:g}"
+        yield Problem("$.policy.battery_min", text)
+
+
+def _hastier_scan(path: str, stop: Stop, settings: Settings) -> Iterator[Problem]:
+    """A scan that takes or waits less time than planned, or is made with another profile."""
+    for key, sent, least, what in (
+        ("scan.duration_s", stop.scan.duration_s, settings.scan_time, "scans take"),
+        ("settle_s", stop.settle_s, settings.settle, "stops settle for"),
+    ):
+        if sent < least * (1 - 1e-6):
+            yield Problem(f"{path}.{key}", f"is {sent:g}, but the plan's {what} {least:g} s")
+    if stop.scan.profile != settings.profile:
+        text = f"is {stop.scan.profile!r}, but the plan's scans are {settings.profile!r}"
+        yield Problem(f"{path}.scan.profile", text)
 
 
 def _above(path: str, sent: float, most: float) -> Iterator[Problem]:

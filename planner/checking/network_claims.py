@@ -13,13 +13,14 @@ import shapely
 from msgspec.structs import replace
 from scipy.sparse.csgraph import connected_components
 
-from stopgo.mission.document import Mission, Stop, mission_id
+from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.problems import Problem
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of, noise_factor
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_by_heading
+from stopgo.planner.checking.plan_identity import is_of_plan
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
 from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
@@ -32,7 +33,6 @@ from stopgo.planner.overlap.network_error import (
     worst_errors,
 )
 from stopgo.planner.overlap.pairs import Overlaps
-from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door
 from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
@@ -53,7 +53,7 @@ def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Prob
             yield Problem("$.network", f"is missing, but {REQUIRED}")
         return
     yield from _weak_pairs(mission, space)
-    if required and mission.share is msgspec.UNSET and _is_whole(mission, space):
+    if required and mission.share is msgspec.UNSET and is_of_plan(mission, space):
         yield from _separate_scans(known, space)
         yield from _inaccurate_scans(known, space)
 
@@ -141,13 +141,6 @@ def _covariances(mission: Mission, space: NavigableSpace, anchors: Sequence[int]
     if anchors:
         return scan_covariances(xy, ends, information, anchors)
     return network_errors(xy, ends, information, seen_control(space, xy))[0]
-
-
-def _is_whole(mission: Mission, space: NavigableSpace) -> bool:
-    """True for a plan's own mission; a follow-up mission (another id) also joins earlier scans."""
-    floor, made_by = space.floor, mission.origin.stopgo
-    parts = range(len(reach_of(space).parts.areas))
-    return mission.id in {mission_id(floor.source, space.settings, made_by, part) for part in parts}
 
 
 def _separate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:

@@ -17,6 +17,7 @@ from stopgo.planner.checking.claims import Recount, overclaims, recount
 from stopgo.planner.checking.fit import misfits_on, other_machine
 from stopgo.planner.checking.model_clearance import too_near
 from stopgo.planner.checking.network_claims import network_overclaims
+from stopgo.planner.checking.plan_identity import foreign_identity, unverified
 from stopgo.planner.floors import options_of, read_floor, standing_bodies
 from stopgo.planner.geometry.shapes import FARTHEST_STEPS, GRID, local_origin
 from stopgo.planner.space.navigable import navigable
@@ -28,6 +29,8 @@ class Verdict:
 
     problems: tuple[Problem, ...]
     counted: Recount | None = None
+    notes: tuple[str, ...] = ()
+    """What the floor's file does not show, in words."""
 
 
 def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
@@ -52,8 +55,10 @@ def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
     except NegativeResult as error:
         claims = any(stop.sees.units for stop in mission.stops)
         return Verdict((*misfits, Problem("$.stops", f"see nothing: {error}")) if claims else misfits)
-    overclaimed = (*overclaims(mission, counted, coverage), *network_overclaims(mission, counted.space))
-    return Verdict((*misfits, *overclaimed), counted)
+    space, is_own = counted.space, floor.digest == mission.origin.floor_digest
+    foreign, notes = (foreign_identity(mission, space), unverified(mission, space)) if is_own else ((), ())
+    overclaimed = (*overclaims(mission, counted, coverage), *network_overclaims(mission, space))
+    return Verdict((*misfits, *foreign, *overclaimed), counted, tuple(notes))
 
 
 def _is_countable(mission: Mission, floor: FloorPlan) -> bool:

@@ -55,8 +55,12 @@ class PlanReport:
 
     @property
     def exit_code(self) -> int:
-        """Exit code of the plan: 1 if it comes too near a body or drives over lines that were not read."""
-        return 1 if self.too_near or self.figures.crosses_ignored else 0
+        """Exit code of the plan: 1 if it is one that `check` refuses.
+
+        It comes too near a body, drives over lines that were not read, or is less accurate than required.
+        """
+        figures = self.figures
+        return 1 if self.too_near or figures.crosses_ignored or figures.is_inaccurate else 0
 
     @property
     def strict_exit_code(self) -> int:

@@ -15,6 +15,7 @@ from ezdxf.entities import DXFEntity, DXFTagStorage, Insert, MLine
 from ezdxf.math import Matrix44
 from ezdxf.xclip import XClip
 
+from stopgo.mission.console.table import counted
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
 from stopgo.planner.floors.drawing import BROKEN_INPUT
@@ -154,6 +155,7 @@ class _OutlineWalk:
         self._hidden = {layer.dxf.name.upper(): layer.is_frozen() for layer in _hidden_layers(drawing)}
         self._plain: dict[str, str] = {}
         self._found: Counter[tuple[str, str]] = Counter()
+        self._unseen: Counter[str] = Counter()
         self.met: list[_Met] = list(self._through(drawing.modelspace(), _Placement()))
 
     def _through(self, entities: Iterable[DXFEntity], placed: _Placement) -> Iterator[_Met]:
@@ -161,7 +163,11 @@ class _OutlineWalk:
             self._count += 1
             if self._count > _MOST:
                 raise _TooMany
-            if entity.dxftype() in _NOT_DRAWN or _attribute(entity, "invisible", 0):
+            if entity.dxftype() in _NOT_DRAWN:
+                continue
+            if _attribute(entity, "invisible", 0):
+                if not placed.blocks:  # else most are of another state of a dynamic block
+                    self._unseen[legible(_layer(entity, placed))] += 1
                 continue
             if isinstance(entity, Insert):
                 yield from self._insert(entity, placed)
@@ -215,8 +221,13 @@ class _OutlineWalk:
         return _Met(entity, layer, self._plain[layer], placed, hidden)
 
     def findings(self) -> list[Finding]:
-        """Findings on blocks and multilines."""
-        return [Finding(code, text) for (code, text), count in self._found.items() for _ in range(count)]
+        """Findings on blocks, multilines and invisible entities."""
+        found = [Finding(code, text) for (code, text), count in self._found.items() for _ in range(count)]
+        for layer, count in sorted(self._unseen.items()):
+            left_out = f"{counted(count, 'invisible entity', 'invisible entities')} left out"
+            remedy = "show all objects in CAD if they belong to the floor (UNISOLATEOBJECTS)"
+            found.append(Finding("invisible", f"layer {layer}: {left_out}; {remedy}"))
+        return found
 
 
 class _Meanings:

@@ -17,7 +17,7 @@ from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, OpeningState, Route
-from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.figures import ACCURACY_NOT_MET, percent
 from stopgo.mission.stages.network import (
     CONFIDENCE,
     CONTROL_FRAME,
@@ -101,11 +101,13 @@ def inaccurate(route: Route) -> Iterator[Finding]:
     beyond = np.flatnonzero(np.isfinite(errors) & (errors > asked))
     if len(beyond):
         worst = int(beyond[np.argmax(errors[beyond])])
+        called, frame = _called(route), predicted.frame
+        within = frame if frame == CONTROL_FRAME else called[_names(route).index(frame)]
         x, y = route.xy[worst].tolist()
         yield Finding(
-            "accuracy_not_met",
-            f"the predicted error of {_names(route)[worst]} is {errors[worst]:.1f} mm (99 %) in the frame of "
-            f"{predicted.frame}, with {asked:g} mm required, and no other stop lowers it; measure a target "
+            ACCURACY_NOT_MET,
+            f"the predicted error of {called[worst]} is {errors[worst]:.1f} mm (99 %) in the frame of "
+            f"{within}, with {asked:g} mm required, and no other stop lowers it; measure a target "
             f"that it sees as a control point, near ({x:.1f}, {y:.1f}), and give it as --control",
             at=(x, y),
         )
@@ -128,6 +130,13 @@ def unseen_control(route: Route) -> Iterator[Finding]:
 
 def _names(route: Route) -> tuple[str, ...]:
     return tuple(stop_names(len(route.order)))
+
+
+def _called(route: Route) -> list[str]:
+    """Name of each stop in findings: its place if several missions, each with its own s01, have the stops."""
+    if _settings(route).divided:
+        return [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]
+    return list(_names(route))
 
 
 @instance_cached
@@ -165,7 +174,7 @@ def scans_apart(route: Route) -> Iterator[Finding]:
                 f"target spheres, or plan {how}",
             )
         return
-    called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]
+    called = _called(route)
     for piece in others:
         here = np.array([names.index(stop) for stop in piece])
         stops = _listed([called[k] for k in here])

@@ -228,15 +228,11 @@ def _part(
     return PartPlan(proved, figures, mission)
 
 
-UNDIVIDED = -1
-"""Part number of the plan that is divided: its mission is not driven, and has its own id."""
-
-
 def _plan_divided(
     found: Candidates, planned: frozenset[int], observe: Observe, keep_graph: Callable[[], None]
 ) -> Plan:
     """Plan one part, and divide its stops among robots or tours."""
-    from stopgo.mission.document import MissionAllocation
+    from stopgo.mission.document import UNDIVIDED, MissionAllocation
     from stopgo.mission.plan import DividedPlan, PartPlan, Plan
     from stopgo.planner.appraisal.figures_of_route import figures_of_share
     from stopgo.planner.routing.assemble import assemble

@@ -16,7 +16,7 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace as changed
 
 from stopgo.mission.comparing.as_driven import AsDriven
-from stopgo.mission.document import Mission, Stop, mission_id, with_digest
+from stopgo.mission.document import Mission, Stop, with_digest
 from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.own_floor import must_be_own_floor
@@ -30,6 +30,7 @@ from stopgo.mission.stages import NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.candidates.added_scans import with_scans
+from stopgo.planner.checking.plan_identity import FOLLOW_UP, is_follow_up
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
@@ -43,8 +44,6 @@ from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.sight.sightlines import SightLines
 from stopgo.planner.visibility.unit_ranges import visibility_of
 
-NAME = "-top-up"
-"""End of the name of a follow-up mission."""
 ScanPoses = FloatArray
 """x, y and heading of each scan (n, 3)."""
 
@@ -80,11 +79,7 @@ class PlannedFloor:
     @cached_property
     def is_follow_up(self) -> bool:
         """True if the mission is for what an earlier run left out: nothing is required but its own stops."""
-        if self.is_part or not self.mission.name.endswith(NAME):
-            return False
-        made_by, parts = self.mission.origin.stopgo, range(len(reach_of(self.space).parts.areas))
-        own = {mission_id(self.floor.source, self.settings, made_by, part) for part in parts}
-        return self.mission.id not in own
+        return not self.is_part and is_follow_up(self.mission, self.space)
 
     def left_of(self, poses: ScanPoses) -> BoolArray:
         """Return the units of the stops without a pose within tolerance, which no pose sees (n,).
@@ -304,7 +299,7 @@ def _follow_up(known: PlannedFloor, selection: Selection, done: IntArray, eviden
         changed(
             mission,
             id=hashlib.sha256(basis.encode()).hexdigest()[:32],
-            name=f"{before.name}{NAME}",
+            name=f"{before.name}{FOLLOW_UP}",
             frame=before.frame,
             georeference=before.georeference,
             limits=limits_spec_of(settings),

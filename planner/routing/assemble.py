@@ -34,6 +34,7 @@ from stopgo.mission.document.specs import (
     site_origin_of,
 )
 from stopgo.mission.errors import StopgoError
+from stopgo.mission.floor import FloorPlan
 from stopgo.mission.frames.transform import SAME, SiteOrigin
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
@@ -66,8 +67,8 @@ def assemble(
             revision=revision,
             name=_name(floor.name, part, allocation),
             digest="",
-            frame=Frame(name="map", to_map=SAME) if floor.on_robots_map else Frame(name="site"),
-            georeference=_georeference(space),
+            frame=frame_of_floor(floor),
+            georeference=georeference_of(space),
             robot=robot_of(settings),
             scanner=scanner_of(settings),
             limits=limits_spec_of(settings),
@@ -93,7 +94,13 @@ def _name(floor: str, part: int, allocation: MissionAllocation | UnsetType) -> s
     return floor if part <= 0 else f"{floor}-{part + 1}"
 
 
-def _georeference(space: NavigableSpace) -> SiteOrigin | None:
+def frame_of_floor(floor: FloorPlan) -> Frame:
+    """Return the frame of a floor's coordinates; `align` later places a site's frame in the robot's map."""
+    return Frame(name="map", to_map=SAME) if floor.on_robots_map else Frame(name="site")
+
+
+def georeference_of(space: NavigableSpace) -> SiteOrigin | None:
+    """Return the position on earth: the one given, else the floor's."""
     given, known = site_origin_of(space.settings), space.floor.georeference
     if given is not None or known is None:
         return given

@@ -131,10 +131,21 @@ def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings
 
 
 def _check_targets(floor: FloorPlan, targets: Targets) -> None:
-    """Refuse a floor without targets."""
-    if targets.total == 0:
-        kinds = ", ".join(sorted({item.kind for item in floor.elements})) or "none"
-        raise NegativeResult(f"{floor.name}: no target on the floor; elements: {kinds} (see --targets)")
+    """Refuse a floor without targets; one without elements with the reason that its file gives."""
+    if targets.total:
+        return
+    kinds = ", ".join(sorted({item.kind for item in floor.elements})) or "none"
+    width, height = np.ptp(np.concatenate([polygon.exterior for polygon in floor.outline]), axis=0).tolist()
+    remedy = "see --targets"
+    if max(width, height) < NARROWEST:
+        remedy = f"it is only {max(width, height):.2g} m across: correct the unit of length of its file"
+    elif not floor.elements and floor.findings:
+        remedy = min(floor.findings, key=lambda finding: finding.rank).message
+    raise NegativeResult(f"{floor.name}: no target on the floor; elements: {kinds} ({remedy})")
+
+
+NARROWEST = 1.0
+"""Extent in metres below which no floor holds a robot: its file's unit of length is wrong."""
 
 
 def _closed_doors(ground: Ground, settings: Settings) -> FloatArray:

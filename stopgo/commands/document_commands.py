@@ -70,9 +70,9 @@ def check(
     """Check that a mission is valid.
 
     It checks schema, digest, numbers, and that the legs join. With --floor it also checks that the mission
-    was planned on that floor, that stops and legs keep every clearance, and that the stops see the targets
-    that the mission claims. All of it is computed again, each line of sight against every wall. With
-    --coverage-file it checks the claims of that file.
+    was planned on that floor with its parameters, that stops and legs keep every clearance, and that the
+    stops see the targets that the mission claims. All of it is computed again, each line of sight against
+    every wall. With --coverage-file it checks the claims of that file.
 
     Exit code 0: valid; 1: readable but invalid, without clearance, or with more coverage claimed than its
     stops have; 2: not readable, or planned on another floor.
@@ -84,8 +84,7 @@ def check(
 
     document = read(mission)
     found = _checked(document, floor, coverage)
-    for note in found.notes:
-        typer.echo(f"stopgo: {note}", err=True)
+    _print_notes(found.notes)
     if as_json:
         typer.echo(json_text(_verdict(mission, document, found)))
     elif found.problems:
@@ -138,6 +137,7 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
         (*problems, *found.problems),
         coverage=None if counted is None else counted.as_json(),
         coverage_text=None if counted is None else counted.in_words(),
+        notes=found.notes,
     )
 
 

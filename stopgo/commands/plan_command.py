@@ -90,8 +90,8 @@ def plan_command(
 ) -> int:
     """Plan where the scanner must stand on a floor, and the route that visits those stops.
 
-    Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
-    also where floor is left out or the plan is doubtful.
+    Exit code 1: no plan can be made, the robot would drive over lines that were not read, or --accuracy is
+    not met; with --strict also where floor is left out or the plan is doubtful.
     """
 
     settings = read_settings(parameters, values_of(given), notify=notice)

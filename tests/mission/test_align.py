@@ -6,6 +6,7 @@ import json
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -101,6 +102,15 @@ def test_the_mission_gets_the_transform_on_demand(tmp_path: Path) -> None:
     assert placed.frame.to_map.x == pytest.approx(10)
     assert placed.revision == square_tour().revision + 1
     assert placed.stops == square_tour().stops
+
+
+def test_a_placed_mission_in_a_file_of_its_own_is_a_later_revision(tmp_path: Path) -> None:
+    """A robot that holds the plan takes no other content as that revision; the same place changes none."""
+    plan, placed = tmp_path / "mission.json", tmp_path / "placed.json"
+    write(msgspec.structs.replace(square_tour(), revision=4), plan)
+    for at, revision in ((QUARTER, 5), (QUARTER, 5), (QUARTER + 1.0, 6)):
+        assert main(["align", *options(CORNERS, at), "--mission", str(plan), "-o", str(placed)]) == 0
+        assert read(placed).revision == revision
 
 
 @pytest.mark.parametrize(

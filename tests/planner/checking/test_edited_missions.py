@@ -95,6 +95,32 @@ def test_a_scan_shorter_than_planned_is_reported() -> None:
     assert list(other_machine(longer, Settings())) == []
 
 
+@pytest.mark.parametrize(
+    ("edited", "path"),
+    [
+        (lambda mission: first_stop(mission, settle_s=0.0), "$.stops[0].settle_s"),
+        (
+            lambda mission: first_stop(mission, scan=change(mission.stops[0].scan, profile="quick")),
+            "$.stops[0].scan.profile",
+        ),
+        (
+            lambda mission: change(mission, scanner=change(mission.scanner, step_deg=0.01)),
+            "$.scanner.step_deg",
+        ),
+        (lambda mission: change(mission, policy=change(mission.policy, own_way=True)), "$.policy.own_way"),
+        (
+            lambda mission: change(mission, policy=change(mission.policy, battery_min=0.0)),
+            "$.policy.battery_min",
+        ),
+    ],
+)
+def test_scans_and_drives_bolder_than_planned_are_reported(
+    edited: Callable[[Mission], Mission], path: str
+) -> None:
+    """Each of them sends a robot to do what the plan did not count with."""
+    assert paths(other_machine(edited(mission_of_hall()), Settings())) == [path]
+
+
 def test_a_position_tolerance_wider_than_planned_is_reported() -> None:
     mission = mission_of_hall()
     (problem,) = other_machine(first_stop(mission, tolerance_m=8.0), Settings())

@@ -576,6 +576,24 @@ def test_hidden_layers_count_only_if_their_name_is_known(read: Read, state: str)
     assert codes(plan) == ["hidden_layer"]
 
 
+def test_entities_that_were_made_invisible_are_left_out_and_reported(read: Read) -> None:
+    """Those in a block are not: a dynamic block holds every other state of itself as invisible entities."""
+
+    def draw(model: Modelspace) -> None:
+        for x in (1, 4):
+            rectangle(model, "WALLS", x, 1, x + 1, 2)
+        state = model.doc.blocks.new("state")
+        rectangle(state, "WALLS", 7, 1, 8, 2)
+        model.add_blockref("state", (0, 0))
+        for entity in (*list(model)[-2:-1], *state):
+            entity.dxf.invisible = 1
+
+    plan = read(draw)
+    assert [element.kind for element in plan.elements] == ["walls"]
+    assert codes(plan) == ["invisible"]
+    assert "layer WALLS: 1 invisible entity left out" in plan.findings[0].message
+
+
 def test_a_polyline_drawn_as_a_band_is_reported(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         model.add_lwpolyline([(1, 1), (4, 1)], dxfattribs={"layer": "WALLS", "const_width": 0.24})

@@ -110,9 +110,22 @@ def test_an_accuracy_that_cannot_be_reached_is_reported_with_a_position_for_a_co
     assert "with 0.01 mm required" in told.message
     assert "--control" in told.message
     assert told.at is not None
+    assert report.exit_code == 1, "as check and prove, which refuse its mission"
     assert report.strict_exit_code == 1
     problems = list(network_overclaims(part.mission, part.space))
     assert [problem.path for problem in problems] == ["$.origin.parameters.accuracy"]
+
+
+def test_missions_of_robots_report_an_accuracy_that_all_their_stops_do_not_reach() -> None:
+    """By places: each mission has its own stop s01. They had no such finding, not even with --strict."""
+    made_for_two = plan(
+        three_rooms(), replace(ASKED, accuracy=0.01, grid=2.0, robots=2, start=(1.0, 1.0, 0.0))
+    )
+    for share in made_for_two.parts:
+        (told,) = [item for item in share.figures.grave if item.code == "accuracy_not_met"]
+        assert told.message.startswith("the predicted error of the stop at (")
+        assert "in the frame of the stop at (" in told.message
+        assert PlanReport(share, {}, {}).exit_code == 1
 
 
 def test_check_finds_an_accuracy_that_missing_pairs_no_longer_give() -> None:
