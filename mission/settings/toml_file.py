@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import tomllib
 from datetime import date, time
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.whole_file import whole_file
 
 
 def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
@@ -22,7 +24,7 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
         Naming the file and the problem.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = io.TextIOWrapper(io.BytesIO(whole_file(path)), encoding="utf-8-sig").read()
         return {key: _as_text(value) for key, value in tomllib.loads(text).items()}
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from None
