@@ -13,8 +13,8 @@ import numpy as np
 
 from stopgo.mission.console.plugins import loader
 from stopgo.mission.errors import InputError
-from stopgo.mission.whole_file import must_end
 from stopgo.mission.geometry import FloatArray
+from stopgo.mission.whole_file import must_end
 
 CloudChunks = Iterator[FloatArray]
 """Points (n, 3), one station or one part of a file at a time."""
