@@ -245,6 +245,14 @@ def replay(
 
 def main() -> int:
     """The `stopgo` command."""
+    try:
+        return _run()
+    except KeyboardInterrupt:  # while that is loaded which has a line for it
+        print("stopgo: stopped by Ctrl-C", file=sys.stderr)  # noqa: T201
+        return 130
+
+
+def _run() -> int:
     trouble = _too_old() or _incomplete()
     if trouble:
         print(f"stopgo: {trouble}", file=sys.stderr)  # noqa: T201

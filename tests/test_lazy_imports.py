@@ -24,6 +24,7 @@ REASONS = {
     "stopgo.bridge.robot.journal_file": "Windows has no fcntl; everything else of the bridge runs there",
     "stopgo.mission.console.plugins": "importlib.metadata takes 25 ms, and few plans use plug-ins",
     "stopgo.mission.console.freed_memory": "Windows has no resource; it needs no call for this",
+    "stopgo.mission.console.process": "only commands that start workers need multiprocessing",
     "stopgo.mission.settings.toml_file": "tomllib takes 7 ms, and most commands read no TOML file",
     "stopgo.mission.plan": "a plan is drawn where a notebook shows it",
     "stopgo.planner.candidates.triangulation": "scipy.spatial takes 0.4 s, and few plans triangulate",

@@ -33,6 +33,7 @@ from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.session_socket import SessionOptions
+    from stopgo.bridge.station.shown_stop import ShownStopFile
     from stopgo.bridge.station.station import Station
     from stopgo.mission.run.run_commands import Verb
 
@@ -98,6 +99,16 @@ class Connection:
         if self.mavlink is None:
             return self
         return replace(self, mavlink=replace(self.mavlink, read_only=not compares, compares=compares))
+
+
+def shown_stop_of(connection: Connection) -> ShownStopFile:
+    """Return the memory of the stop that was shown last of the robot or vehicle."""
+    from stopgo.bridge.station.shown_stop import ShownStopFile
+
+    vehicle = connection.mavlink
+    if vehicle is None:
+        return ShownStopFile(connection.endpoint, connection.site, connection.robot)
+    return ShownStopFile(vehicle.url, None if vehicle.vehicle is None else str(vehicle.vehicle))
 
 
 def connection_of(

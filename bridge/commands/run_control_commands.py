@@ -43,15 +43,19 @@ from stopgo.bridge.commands.connection import (
     given_options,
     in_time,
     refuse_options,
+    shown_stop_of,
     with_connection,
     with_presets,
 )
 from stopgo.bridge.commands.ros_checks import ros_status, ros_status_text
 from stopgo.bridge.console import print_json, print_line, refusals_printed, reporting_done, say
+from stopgo.mission.errors import NegativeResult
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.fleet import FleetMember
     from stopgo.bridge.station.roster import LastSeen
+    from stopgo.bridge.station.shown_stop import ShownStopFile
+    from stopgo.bridge.station.station import Station
     from stopgo.mission.run.events import StateReport
     from stopgo.mission.run.run_commands import Answer, Verb
 
@@ -95,7 +99,7 @@ def start(
 ABOUT: dict[Verb, str] = {
     "pause": "Pause the robot at standstill; a scan in progress is finished. Any station may.",
     "resume": "Resume a paused robot, from its present position.",
-    "skip": "Skip the current stop; the robot still drives its path.",
+    "skip": "Skip the stop that this station showed last, or --stop; the robot still drives its path.",
     "retry": "Let a robot that is held try again.",
     "abort": "End the run at the robot's present position. Any station may.",
     "home": "End the run and drive back along the legs that were driven.",
@@ -138,13 +142,31 @@ def order_of(verb: Verb) -> Callable[..., None]:
         driving = driving.for_stopping(verb) if stops(verb) else driving
         at_once = verb in FREE_VERBS
         with refusals_printed(as_json=json_), in_time(driving, at_once=at_once) as station:
-            answer = station.command(verb, stop=stop, take_over=take_over)
-            report_answer(
-                answer, station.keys.robot, json_
-            )  # before the link is closed, which may take a moment
+            if verb == "skip":
+                answer = skip_stop(station, shown_stop_of(connection), stop, take_over=take_over)
+            else:
+                answer = station.command(verb, stop=stop, take_over=take_over)
+            # before the link is closed, which may take a moment
+            report_answer(answer, station.keys.robot, json_, stop=station.meant_stop)
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
     return with_connection(without=NO_EFFECT[verb])(command)
+
+
+def skip_stop(station: Station, shown: ShownStopFile, stop: str | None, *, take_over: bool) -> Answer:
+    """Skip a stop, else the one that this station showed last: the robot may be at another by now."""
+    before = shown.read() if stop is None else None
+    try:
+        answer = station.command("skip", stop=stop, take_over=take_over, shown=before)
+    except NegativeResult as no:
+        if no.reason != "not_at_stop" or stop is not None:
+            raise
+        raise NegativeResult(
+            f"{no}, which this station showed last; see stopgo status, or name the stop with --stop",
+            reason=no.reason,
+        ) from None
+    shown.remember(answer.run_id, station.meant_stop)
+    return answer
 
 
 def status(
@@ -217,6 +239,7 @@ def print_status(connection: Connection, *, as_json: bool) -> None:
     with in_time(connection.for_reading()) as station:
         report = station.status()
         age_s = time.monotonic() - station.asked_at
+    shown_stop_of(connection).remember(report.run_id, report.stop)
     if as_json:
         print_json(status_json(report) | {"age_s": round(age_s, 3)})
     else:
@@ -236,6 +259,7 @@ def fleet_status(
     from stopgo.bridge.link.keys import now_utc
     from stopgo.bridge.station.fleet import fleet
     from stopgo.bridge.station.roster import LastSeen, forget, read_sightings, remember
+    from stopgo.bridge.station.shown_stop import ShownStopFile
 
     path = sightings_file(named)
     if forgotten:
@@ -251,6 +275,10 @@ def fleet_status(
     }
     if seen:
         remember(path, seen)
+    for member in members:
+        if member.state is not None:
+            shown = ShownStopFile(named["connect"], named["site"], member.robot)
+            shown.remember(member.state.run_id, member.state.stop)
     if as_json:
         print_json({"robots": [member_json(member, before.get(member.robot)) for member in members]})
     else:
@@ -305,15 +333,16 @@ def status_json(report: StateReport) -> dict[str, Any]:
     return {key: getattr(report, key) for key in STATUS_KEYS} | {"battery": report.charge}
 
 
-def report_answer(answer: Answer, robot: str, json_: bool) -> None:
-    """Print the robot's answer to a command."""
+def report_answer(answer: Answer, robot: str, json_: bool, *, stop: str | None = None) -> None:
+    """Print the robot's answer to a command, and the stop that it was meant for."""
     with reporting_done(f"{robot}: {answer.verb} was carried out"):
         if json_:
             told = {key: getattr(answer, key) for key in ("verb", "outcome", "run_id", "state", "message")}
-            print_json({"robot": robot} | told)
+            print_json({"robot": robot} | told | ({} if stop is None else {"stop": stop}))
         else:
             noted = f"; {answer.message}" if answer.message else ""
-            print_line(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}{noted}")
+            done = answer.verb if stop is None else f"{answer.verb} {stop}"
+            print_line(f"{robot}: {done} ok; {answer.state}, run {answer.run_id}{noted}")
 
 
 def state_line(report: StateReport) -> str:

@@ -24,6 +24,7 @@ from stopgo.bridge.commands.connection import (
     given_options,
     reached,
     refuse_options,
+    shown_stop_of,
     with_connection,
     with_parameters,
 )
@@ -33,8 +34,11 @@ from stopgo.bridge.commands.run_control_commands import status_json
 from stopgo.bridge.console import print_json, print_line, print_text, say
 
 if TYPE_CHECKING:
+    from stopgo.bridge.station.follow import Followed
+    from stopgo.bridge.station.shown_stop import ShownStopFile
     from stopgo.bridge.station.watch import RunDisplay
     from stopgo.mission.comparing.run_collector import RunCollector
+    from stopgo.mission.document import Mission
     from stopgo.mission.run.events import StateReport
 
 
@@ -134,10 +138,29 @@ def follow_and_judge(
     from stopgo.bridge.station.watch import watch_with
 
     with reached(connection.for_reading(compares=True)) as station:
-        state = watch_with(station, collector, _display(as_json=as_json), run_id=run_id)
+        display = RememberingDisplay(_display(as_json=as_json), shown_stop_of(connection))
+        state = watch_with(station, collector, display, run_id=run_id)
         code = print_comparison(collector, state, as_json=as_json)
         if code:  # takes precedence over a failure to close the recording
             raise typer.Exit(code)
+
+
+class RememberingDisplay:
+    """A display that remembers the stop which it shows: a skip is meant for that one."""
+
+    def __init__(self, display: RunDisplay, shown: ShownStopFile) -> None:
+        self._display = display
+        self._shown = shown
+
+    def mission(self, mission: Mission) -> None:
+        self._display.mission(mission)
+
+    def show(self, report: Followed) -> None:
+        from stopgo.mission.run.events import Arrived, StateReport
+
+        if isinstance(report, Arrived | StateReport):
+            self._shown.remember(report.run_id, report.stop)
+        self._display.show(report)
 
 
 def _display(*, as_json: bool) -> RunDisplay:

@@ -22,6 +22,7 @@ import msgspec
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.whole_file import whole_file
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -117,7 +118,7 @@ def read_revoked(path: Path, authority: x509.Certificate) -> Revoked:
 
 def _list_bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return whole_file(path)
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read ({error.strerror}); copy it from the site's folder of keys, or have the"
@@ -324,7 +325,7 @@ def read_certificate(path: Path) -> x509.Certificate:
     from cryptography import x509
 
     try:
-        return x509.load_pem_x509_certificate(path.read_bytes())
+        return x509.load_pem_x509_certificate(whole_file(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); make keys with stopgo keys") from None
     except (ValueError, x509.InvalidVersion):
@@ -338,7 +339,7 @@ def read_key(path: Path) -> Ed25519PrivateKey:
 
     try:
         mode = path.stat().st_mode
-        key = load_pem_private_key(path.read_bytes(), password=None)
+        key = load_pem_private_key(whole_file(path), password=None)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); make keys with stopgo keys") from None
     except (ValueError, TypeError):

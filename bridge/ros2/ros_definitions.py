@@ -20,6 +20,7 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 
 from stopgo.bridge.ros2.ros_types import RosFields
 from stopgo.mission.errors import InputError
+from stopgo.mission.whole_file import whole_file
 
 Undecodable = (SerdeError, ValueError, KeyError, IndexError)
 """Errors of messages that are not what their type says."""
@@ -315,7 +316,7 @@ def _with_messages(folder: str) -> DefinitionStore:
         name = f"{path.parent.parent.name}/msg/{path.stem}"
         if name not in store.types.fielddefs:
             try:
-                store.add(name, path.read_text(encoding="utf-8"))
+                store.add(name, whole_file(path).decode())
             except (TypesysError, UnicodeDecodeError) as error:
                 raise InputError(f"{path}: no definition of a message ({error})") from None
     return store
@@ -331,7 +332,7 @@ def _parts_in(folder: str, name: str, count: int) -> tuple[str, ...]:
         where = f"{folder} has no {suffix}" if folder else "name its folder with scan.definitions"
         raise InputError(f"scan.type = {name!r}: there is no such type here ({where}); without: {ours}")
     parts: list[list[str]] = [[]]
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in whole_file(path).decode().splitlines():
         if line.strip() == "---":
             parts.append([])
         else:

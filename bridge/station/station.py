@@ -43,6 +43,7 @@ from stopgo.bridge.link.protocol import (
 from stopgo.bridge.link.tls_probe import why_no_link
 from stopgo.bridge.station import follow
 from stopgo.bridge.station.robot_replies import read_reply
+from stopgo.bridge.station.shown_stop import ShownStop
 from stopgo.bridge.station.window import Window, windowed
 from stopgo.mission.document import Mission, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
@@ -137,6 +138,8 @@ class Station:
         """Lease that the robot reported last; it may have ended."""
         self.lease_left_s = 0.0
         """Time that the lease still lasted then."""
+        self.meant_stop: str | None = None
+        """Stop that the last command was meant for."""
         self.asked_at = time.monotonic()
         """Time of the last query for the robot's state: its answer is no older than that."""
         self.direct: Callable[..., DirectQuestion] | None = None
@@ -433,10 +436,14 @@ class Station:
         }
         return RunCommand(cmd_id=uuid.uuid4().hex, verb=verb, **(plain | given))
 
-    def order(self, verb: Verb, **details: Any) -> RunCommand:
-        """Make a command for the robot's present state: a late command meets another state and is refused."""
+    def order(self, verb: Verb, *, shown: ShownStop | None = None, **details: Any) -> RunCommand:
+        """Make a command for the robot's present state: a late command meets another state and is refused.
+
+        A skip that names no stop is meant for the one that was `shown` of this run, else the present one.
+        """
         info = self.info()
         state = info.state
+        stop = shown.stop if shown is not None and shown.run_id == state.run_id else state.stop
         expected: dict[str, Any] = {
             "commander": self.commander,
             "valid_for_s": min(self.timeout_s, LONGEST_VALID_S),
@@ -446,10 +453,12 @@ class Station:
             "expect_state": (state.state,),
             "boot_id": info.boot_id,
             "fence": info.lease.fence if info.lease else None,
-            "stop": state.stop if verb in ("skip", "retry") else None,
+            "stop": stop if verb in ("skip", "retry") else None,
         }
         given = {key: value for key, value in details.items() if value is not None}
-        return RunCommand(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(expected | given))
+        order = RunCommand(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(expected | given))
+        self.meant_stop = order.stop
+        return order
 
     def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
         """Read all events of the journal above number `since`, of one run if given."""

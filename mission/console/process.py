@@ -12,8 +12,13 @@ import select
 import signal
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, ProcessPoolExecutor
 
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
 """Signals that end a command: Ctrl-C, a service manager, a terminal that was closed."""
@@ -63,6 +68,44 @@ class Signals:
         if number == signal.SIGINT:
             raise KeyboardInterrupt
         raise SystemExit(128 + number)
+
+
+@contextmanager
+def without_ctrl_c() -> Iterator[None]:
+    """Keep Ctrl-C from the processes that are started in the block, also while they load: this one ends them.
+
+    In this process a Ctrl-C counts after the block.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # started in the block, it would let Ctrl-C through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def ended_at_once(pool: ProcessPoolExecutor) -> Iterator[None]:
+    """Wait for a pool's processes at the end of the block; after an error or a signal, kill them."""
+    try:
+        yield
+    except BaseException:
+        kill_workers(pool)
+        raise
+    pool.shutdown()
+
+
+def kill_workers(pool: Executor) -> None:
+    """End a pool's processes in the middle of their work."""
+    processes = list((getattr(pool, "_processes", None) or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.kill()
 
 
 def ending_signals() -> list[signal.Signals]:

@@ -8,6 +8,7 @@ import io
 from pathlib import Path
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.whole_file import must_end, whole_file
 
 
 def bytes_of(path: Path, remedy: str, *, most: int | None = None) -> bytes:
@@ -21,16 +22,23 @@ def bytes_of(path: Path, remedy: str, *, most: int | None = None) -> bytes:
     try:
         if most is not None and path.stat().st_size > most:
             raise InputError(f"{path}: is larger than {most // 1_000_000} MB, too large for a mission")
-        return path.read_bytes()
+        return whole_file(path)
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path}: cannot be read ({why}); {remedy}") from None
 
 
 def file_digest(*paths: Path) -> str:
-    """Return the sha256 of the files' bytes, one after another, hexadecimal."""
+    """Return the sha256 of the files' bytes, one after another, hexadecimal.
+
+    Raises
+    ------
+    InputError
+        If one is a pipe or a device.
+    """
     digest = hashlib.sha256()
     for path in paths:
+        must_end(path)
         with path.open("rb") as file:
             while chunk := file.read(1 << 20):
                 digest.update(chunk)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import re
 from datetime import date, time
 from pathlib import Path
 from typing import Any
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.whole_file import whole_file
 
 
 def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
@@ -23,7 +25,7 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
     import tomllib
 
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = io.TextIOWrapper(io.BytesIO(whole_file(path)), encoding="utf-8-sig").read()
         return {key: _as_text(value) for key, value in tomllib.loads(text).items()}
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from None

@@ -13,6 +13,7 @@ from typing import Any
 
 import typer
 
+from stopgo.mission.console.process import ended_at_once, without_ctrl_c
 from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import printable_lines, table
 from stopgo.mission.errors import InputError
@@ -48,8 +49,10 @@ def plan_storeys(floor: Path, out: Path, settings: Settings, plan_one: PlanOne, 
     folders = [out / name for name in folder_names(names)]
     each = [replace(settings, storey=name) for name in names]
     pool = ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn"))
-    with running(f"planning {len(storeys)} storeys"), pool:
-        planned = list(pool.map(plan_one, [floor] * len(storeys), folders, each))
+    with running(f"planning {len(storeys)} storeys"), ended_at_once(pool):
+        with without_ctrl_c():
+            plans = pool.map(plan_one, [floor] * len(storeys), folders, each)
+        planned = list(plans)
     _print_storeys(list(zip(storeys, folders, planned, strict=True)), left_out, as_json=as_json)
     return max(*(code for code, _, _ in planned), int(any(item.has_rooms for item in left_out)))
 

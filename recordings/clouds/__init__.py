@@ -14,6 +14,7 @@ import numpy as np
 from stopgo.mission.console.plugins import loader
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray
+from stopgo.mission.whole_file import must_end
 
 CloudChunks = Iterator[FloatArray]
 """Points (n, 3), one station or one part of a file at a time."""
@@ -48,7 +49,7 @@ def clouds_in(folder: Path) -> tuple[Path, ...]:
     Raises
     ------
     InputError
-        When there is none.
+        When there is none, or one is a pipe.
     """
     known = ", ".join(CLOUD_READERS)
     if not folder.exists():
@@ -57,6 +58,8 @@ def clouds_in(folder: Path) -> tuple[Path, ...]:
     found = tuple(path for path in files if path.suffix.lower() in CLOUD_READERS)
     if not found:
         raise InputError(f"--clouds {folder}: contains no cloud; give files of {known}")
+    for path in found:
+        must_end(path)
     return found
 
 

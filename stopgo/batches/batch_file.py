@@ -12,6 +12,7 @@ import msgspec
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings.toml_file import read_toml, with_quotes
+from stopgo.mission.whole_file import whole_file
 
 AXES = ("file", "storey", "date", "variant")
 DEEPEST = 20
@@ -182,7 +183,7 @@ def _group(place: str, folder: Path, table: Mapping[str, Any], shared: Mapping[s
 
 def _lines_of_tables(path: Path) -> list[int]:
     """Line numbers of the tables `[[floors]]`."""
-    text = path.read_text(encoding="utf-8-sig")
+    text = whole_file(path).decode("utf-8-sig")
     return [n for n, line in enumerate(text.splitlines(), 1) if re.match(r"\s*\[\[\s*floors\s*\]\]", line)]
 
 

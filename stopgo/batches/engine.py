@@ -14,13 +14,15 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass, field
-from multiprocessing import get_context, parent_process
+from multiprocessing import forkserver, get_context, parent_process
 from multiprocessing.context import BaseContext
 from typing import Protocol
 
 from stopgo.batches.cluster_engine import ClusterEngine
 from stopgo.batches.work import PlanOutcome, PlanTask, work
+from stopgo.mission.console.process import kill_workers, without_ctrl_c
 
 TRIES = 2
 TICK_S = 0.5
@@ -100,10 +102,12 @@ class LocalEngine:
         for pool in self._pools:
             if pool is None:
                 continue
-            processes = list((getattr(pool, "_processes", None) or {}).values())
-            pool.shutdown(wait=not at_once, cancel_futures=True)
-            for process in processes if at_once else ():
-                process.kill()
+            if at_once:
+                kill_workers(pool)
+            else:
+                pool.shutdown(cancel_futures=True)
+        if at_once:
+            _end_forking()
 
 
 def worker_process(count: int = 1) -> ProcessPoolExecutor:
@@ -117,7 +121,17 @@ def _context() -> BaseContext:
         return get_context("spawn")
     context = get_context("forkserver")
     context.set_forkserver_preload([PRELOADED])
+    with without_ctrl_c():
+        forkserver.ensure_running()
     return context
+
+
+def _end_forking() -> None:
+    """End the process that forks workers: one that still loads would fork for a batch that is gone."""
+    process = getattr(getattr(forkserver, "_forkserver", None), "_forkserver_pid", None)
+    if process is not None:
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
 
 
 def _begin_worker() -> None:

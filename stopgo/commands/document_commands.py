@@ -19,6 +19,7 @@ from stopgo.mission.files.atomic import must_not_replace, write_checked
 from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import read_settings, recorded_settings
 from stopgo.mission.settings import PARAMETERS
+from stopgo.mission.whole_file import whole_file
 
 if TYPE_CHECKING:
     from stopgo.mission.document import Mission
@@ -282,7 +283,7 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
             f"--floor {path}: layers can be drawn only over a .dxf; leave --floor out to write them alone"
         )
     must_be_own_floor(path, mission)
-    data = path.read_bytes()
+    data = whole_file(path)
     drawing, _ = open_drawing(data, source=path)
     options = options_of(recorded_settings(mission.origin.parameters))
     metres = metres_in(drawing, source=path, options=options)

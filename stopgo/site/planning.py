@@ -19,6 +19,7 @@ from typing import Any
 
 import msgspec
 
+from stopgo.mission.console.process import without_ctrl_c
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.atomic import replacing
 from stopgo.mission.files.file_name import file_name
@@ -132,7 +133,8 @@ class WorkLane:
             self._connection, theirs = context.Pipe()
             with theirs:
                 process = context.Process(target=work_on, args=(theirs,), daemon=True)
-                process.start()
+                with without_ctrl_c():
+                    process.start()
             self._process = process
         return self._connection
 

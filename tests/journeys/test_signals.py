@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import pytest
 
+import stopgo
 import stopgo.command_line as front
 from tests.journeys.readme import ROOT
 
@@ -56,6 +57,19 @@ def process(body: str, **options: object) -> subprocess.CompletedProcess[str]:
 def test_a_signal_closes_what_is_open(number: signal.Signals) -> None:
     done = process(f"with left_open():\n    hit({int(number)})\n    signal.pause()")
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "closed\n", "")
+
+
+def test_a_ctrl_c_before_the_command_line_is_loaded_has_its_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first tenth of a second of a command printed a traceback."""
+
+    def interrupted() -> str:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stopgo, "_incomplete", interrupted)
+    assert stopgo.main() == 130
+    assert capsys.readouterr().err == "stopgo: stopped by Ctrl-C\n"
 
 
 def test_a_second_ctrl_c_during_the_exit_leaves_no_traceback() -> None:

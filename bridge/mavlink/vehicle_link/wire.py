@@ -26,6 +26,7 @@ from stopgo.bridge.mavlink.vehicle_link.url import Url, check_guarded, read_url
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.telemetry import Message
+from stopgo.mission.whole_file import whole_file
 
 QUEUE_SIZE = 10_000
 APART_LINK = 1
@@ -353,7 +354,7 @@ def read_signing_key(path: Path) -> bytes:
         If the file holds no key.
     """
     try:
-        text = path.read_text(encoding="utf-8").strip()
+        text = whole_file(path).decode().strip()
         shared = path.stat().st_mode & READ_BY_OTHERS
     except OSError as error:
         raise InputError(f"--signing-key {path}: cannot be read ({error.strerror})") from None

@@ -18,6 +18,7 @@ from scipy import ndimage
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import frozen
+from stopgo.mission.whole_file import whole_file
 from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.linework import completed
 from stopgo.planner.floors.parts import in_order, parts_of
@@ -104,7 +105,7 @@ def _opened(file: FloorFile) -> tuple[MapDescription, bytes]:
     description = read_description(file.data, name=str(file.path))
     path = file.path.parent / description.image
     try:
-        return description, path.read_bytes()
+        return description, whole_file(path)
     except (OSError, ValueError):
         raise InputError(
             f"{file.path}: its image {description.image} cannot be read; put it in the same folder, "
