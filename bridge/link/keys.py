@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
-from stopgo.mission.whole_file import whole_file
 
 if TYPE_CHECKING:
     from cryptography import x509

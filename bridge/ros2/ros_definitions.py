@@ -19,8 +19,8 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from stopgo.bridge.ros2.ros_types import RosFields
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.errors import InputError
-from stopgo.mission.whole_file import whole_file
 
 Undecodable = (SerdeError, ValueError, KeyError, IndexError)
 """Errors of messages that are not what their type says."""

@@ -7,8 +7,8 @@ import hashlib
 import io
 from pathlib import Path
 
+from stopgo.mission.console.whole_file import must_end, whole_file
 from stopgo.mission.errors import InputError
-from stopgo.mission.whole_file import must_end, whole_file
 
 
 def bytes_of(path: Path, remedy: str, *, most: int | None = None) -> bytes:

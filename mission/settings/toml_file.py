@@ -8,8 +8,8 @@ from datetime import date, time
 from pathlib import Path
 from typing import Any
 
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.errors import InputError
-from stopgo.mission.whole_file import whole_file
 
 
 def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:

@@ -20,7 +20,6 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of, noise_factor
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_by_heading
-from stopgo.planner.checking.plan_identity import is_of_plan
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
 from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
@@ -33,6 +32,7 @@ from stopgo.planner.overlap.network_error import (
     worst_errors,
 )
 from stopgo.planner.overlap.pairs import Overlaps
+from stopgo.planner.routing.planned_mission import is_of_plan
 from stopgo.planner.visibility.exact_sight import sides_of_door
 from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 

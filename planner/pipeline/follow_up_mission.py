@@ -30,12 +30,12 @@ from stopgo.mission.stages import NavigableSpace, Route, Selection, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, totals_of_plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.candidates.added_scans import with_scans
-from stopgo.planner.checking.plan_identity import FOLLOW_UP, is_follow_up
 from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing import route
 from stopgo.planner.routing.assemble import assemble
+from stopgo.planner.routing.planned_mission import FOLLOW_UP, is_follow_up
 from stopgo.planner.selection import select_follow_up
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.reach import reach_of

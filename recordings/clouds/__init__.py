@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from stopgo.mission.console.plugins import loader
+from stopgo.mission.console.whole_file import must_end
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.whole_file import must_end
 
 CloudChunks = Iterator[FloatArray]
 """Points (n, 3), one station or one part of a file at a time."""

@@ -10,9 +10,9 @@ from typing import Any
 
 import msgspec
 
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings.toml_file import read_toml, with_quotes
-from stopgo.mission.whole_file import whole_file
 
 AXES = ("file", "storey", "date", "variant")
 DEEPEST = 20

@@ -14,12 +14,12 @@ from stopgo.bridge.commands.bridge_options import ItemTrigger, ScanWaiting, Sett
 from stopgo.commands.align_command import align
 from stopgo.mission.console.running_step import running
 from stopgo.mission.console.table import counted, printable, printable_lines
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.errors import InputError, NegativeResult, OtherFloor
 from stopgo.mission.files.atomic import must_not_replace, write_checked
 from stopgo.mission.files.own_floor import must_be_own_floor
 from stopgo.mission.files.plan_toml import read_settings, recorded_settings
 from stopgo.mission.settings import PARAMETERS
-from stopgo.mission.whole_file import whole_file
 
 if TYPE_CHECKING:
     from stopgo.mission.document import Mission

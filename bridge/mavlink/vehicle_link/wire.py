@@ -23,10 +23,10 @@ from stopgo.bridge.mavlink.vehicle_link.frames import UNREADABLE, Frames, dialec
 from stopgo.bridge.mavlink.vehicle_link.sender_addresses import SenderAddresses
 from stopgo.bridge.mavlink.vehicle_link.transport import Address, End, Transport, open_transport
 from stopgo.bridge.mavlink.vehicle_link.url import Url, check_guarded, read_url
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.enums import Component, MessageId
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.whole_file import whole_file
 
 QUEUE_SIZE = 10_000
 APART_LINK = 1

@@ -15,10 +15,10 @@ import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import frozen
-from stopgo.mission.whole_file import whole_file
 from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.linework import completed
 from stopgo.planner.floors.parts import in_order, parts_of

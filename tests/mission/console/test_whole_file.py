@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from stopgo.mission.console.whole_file import whole_file
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import file_digest
-from stopgo.mission.whole_file import whole_file
 from tests.called import stopgo
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
