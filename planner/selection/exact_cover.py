@@ -38,7 +38,8 @@ def exact(
     first.col_value = _as_solution(cover, start)
     solver.setSolution(first)
     solver.run()
-    bound = math.ceil(solver.getInfo().mip_dual_bound - WHOLE)
+    dual = solver.getInfo().mip_dual_bound
+    bound = math.ceil(dual - WHOLE) if math.isfinite(dual) else 0  # a time limit may end it before the first
     values = np.array(solver.getSolution().col_value[: cover.rows])
     rows = np.flatnonzero(values > 0.5) if len(values) == cover.rows else start
     met = not cover.missing(cover.covered_by(rows)).any()

@@ -71,10 +71,7 @@ class InThisProcess:
 
     def __init__(self, *_: object, **__: object) -> None: ...
 
-    def __enter__(self) -> InThisProcess:
-        return self
-
-    def __exit__(self, *_: object) -> None: ...
+    def shutdown(self, **_: object) -> None: ...
 
     map = staticmethod(map)
 
