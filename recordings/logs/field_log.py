@@ -86,6 +86,8 @@ class Poses:
     """Times at which the clock was set: how much time passed there is unknown."""
     own_clock: bool = False
     """True if the times are of the clock that all messages in the log have: a step forward is a gap."""
+    rate: float = 1.0
+    """Seconds that passed for the robot in a second of these times: another number in a fast simulation."""
 
     @property
     def seconds(self) -> float:

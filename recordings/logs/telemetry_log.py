@@ -248,8 +248,29 @@ class _Vehicle:
     mode: str = ""
     boots: int = 0
     boot_ms: int = 0
+    clocks: list[tuple[int, int]] = field(default_factory=list)
+    """Time of receipt, and ns since boot, of messages that are WINDOW_NS apart."""
+    rates: list[float] = field(default_factory=list)
+    """Seconds of the vehicle in a second of receipt, between two of them."""
+
+    def note_clock(self, ns: int, boot_ms: int) -> None:
+        """Compare the vehicle's clock with that of the station."""
+        if boot_ms < self.boot_ms:
+            self.clocks.clear()
+        if not self.clocks or ns - self.clocks[-1][0] >= WINDOW_NS:
+            self.clocks.append((ns, boot_ms * 10**6))
+            if len(self.clocks) > 1:
+                (begin, since), (end, until) = self.clocks[-2:]
+                self.rates.append((until - since) / (end - begin))
+
+    @property
+    def rate(self) -> float:
+        """The usual one of these; 1 where they are few, or the vehicle reports no time."""
+        usual = float(np.median(self.rates)) if len(self.rates) >= FEWEST_WINDOWS else 1.0
+        return usual if usual > 0 else 1.0
 
 
+WINDOW_NS, FEWEST_WINDOWS = 2 * 10**9, 3
 CHECKED = 5
 UNKNOWN_BEARING = 65_535
 MISSION_TYPE = 0
@@ -308,6 +329,7 @@ class _VehicleSorter:
 
     def _attitude(self, packet: Packet, message: Any, vehicle: _Vehicle) -> None:
         vehicle.attitude.append((packet.ns, message.yaw))
+        vehicle.note_clock(packet.ns, message.time_boot_ms)
         if message.time_boot_ms + 1000 < vehicle.boot_ms:
             vehicle.boots += 1
         vehicle.boot_ms = message.time_boot_ms
@@ -457,6 +479,7 @@ def _name(number: int) -> str:
 
 def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
     rule = autopilot_named(vehicle.kind).rule
+    clock: dict[str, Any] = {"own_clock": True, "rate": vehicle.rate}
     if vehicle.local:
         ns, table = _columns(vehicle.local)
         heading = np.pi / 2 - _yaw_at(vehicle, ns)
@@ -472,18 +495,16 @@ def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
             rank=rank,
             origin=vehicle.origin,
             rule=rule,
-            own_clock=True,
+            **clock,
         )
     if vehicle.odometry:
         ns, table = _columns(vehicle.odometry)
         xy, heading, height = table[:, :2], table[:, 2], table[:, 3]
-        yield poses_of(
-            "ODOMETRY", "odometry", ns, xy, heading, height=height, robot=robot, rank=3, own_clock=True
-        )
+        yield poses_of("ODOMETRY", "odometry", ns, xy, heading, height=height, robot=robot, rank=3, **clock)
     if vehicle.earth:
         ns, table = _columns(vehicle.earth)
         degrees, bearing = table[:, :2], table[:, 2]
-        yield fixes_of("GLOBAL_POSITION_INT", rule, ns, degrees, bearing, robot=robot, rank=2, own_clock=True)
+        yield fixes_of("GLOBAL_POSITION_INT", rule, ns, degrees, bearing, robot=robot, rank=2, **clock)
 
 
 def _columns(rows: list[Any]) -> tuple[IntArray, FloatArray]:

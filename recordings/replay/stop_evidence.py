@@ -70,6 +70,7 @@ def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
         evidence = _with_shifted_part(replay, k, evidence, errors)
         common_m = float(errors.unsure_m[k] + fit_m[k])
         evidence = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
+        evidence = _with_other_clock(replay, evidence)
         one = _with_heading(replay, k, evidence, drifts=errors.drifts)
         placed = one.is_placed and item.deviation_m is not None
         unsure_m = None if not placed else common_m + max(jump_m, hidden_m) + float(errors.spread_m[k])
@@ -136,6 +137,31 @@ def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: boo
     ):
         return evidence
     return StopEvidence(item, "unknown", FIT if headings else NO_HEADINGS)
+
+
+def _with_other_clock(replay: Replay, evidence: StopEvidence) -> StopEvidence:
+    """Return the answer as undecided that standstills of other lengths than the log's could turn.
+
+    That a reported scan was made elsewhere does not depend on them.
+    """
+    rate, reported = replay.placed.source.rate, not replay.inferred and evidence.item.outcome in DONE
+    turns = evidence.answer == ("no" if rate > 1 else "yes")
+    if abs(rate - 1) <= SAME_RATE or not turns or (reported and is_off(evidence.item)):
+        return evidence
+    why = (
+        f"{rate:.3g} s passed for the vehicle in each second of the log, as in a simulation, so that its "
+        "standstills are of other lengths; give the autopilot's own log"
+    )
+    return changed(evidence, answer="unknown", why=why)
+
+
+def is_off(item: StopComparison) -> bool:
+    """True if it was visited outside of its tolerance."""
+    return is_outside(item.deviation_m or 0.0, item.tolerance_m or 0.0)
+
+
+SAME_RATE = 0.05
+"""Difference of two clocks' rates up to which both measure standstills."""
 
 
 def _with_heading(replay: Replay, number: int, evidence: StopEvidence, *, drifts: bool) -> StopEvidence:

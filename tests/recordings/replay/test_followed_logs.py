@@ -8,17 +8,20 @@ import msgspec
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from stopgo.mission.document import Mission
 from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Arrived, Scanned, Skipped
 from stopgo.recordings.replay.drive_verdict import drive_verdict
 from stopgo.recordings.replay.replay_text import as_text
 from tests.mission.mavlink.following.worlds import told
+from tests.recordings.logs.writing import write_telemetry_log
 from tests.recordings.replay.auto_vehicle import (
     AUTO_MODE,
     HOLD_MODE,
     FromVehicle,
     Orders,
+    heard,
     in_mode,
     item_of,
     logged,
@@ -51,6 +54,38 @@ def test_stops_scanned_outside_their_tolerance_are_reported_and_not_driven_as_pl
         away = f"{item.stop}: position error {1000 * (item.deviation_m or 0.0):.0f} mm (tolerance 50 mm)."
         assert away in drive_verdict(laid).text and away in as_text(laid)
     assert drive_verdict(replayed(path, wide)).exit_code == 0
+
+
+def stamped(path: Path, plan: Mission, faster: float, *, only: frozenset[str] | None = None) -> Path:
+    """A log of a vehicle whose clock is so much faster than that of the station."""
+    rows = [row for row in heard(path, plan) if only is None or row[2].get_type() in only]
+    begin = rows[0][0]
+    told = [(begin + round((ns - begin) / faster), system, message) for ns, system, message in rows]
+    return write_telemetry_log(path / "a.tlog", told)
+
+
+POSES = frozenset({"HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "GPS_GLOBAL_ORIGIN"})
+
+
+@pytest.mark.parametrize(
+    ("faster", "only", "answer"),
+    [(5.0, POSES, "unknown"), (1.0, POSES, "yes"), (0.2, POSES, "unknown"), (0.2, None, "unknown")],
+)
+def test_standstills_by_another_clock_are_undecided(
+    tmp_path: Path, faster: float, only: frozenset[str] | None, answer: str
+) -> None:
+    """A simulation that runs faster or slower than time."""
+    plan = mission(tolerance_m=0.4)
+    verdict = drive_verdict(replayed(stamped(tmp_path, plan, faster, only=only), plan))
+    assert verdict.answer == answer, verdict.text
+    why = f"{faster:g} s passed for the vehicle in each second of the log"
+    assert (why in verdict.text) == (faster != 1.0)
+
+
+@pytest.mark.parametrize("faster", [5.0, 0.2])
+def test_a_scan_that_was_reported_elsewhere_is_no_stop_by_any_clock(tmp_path: Path, faster: float) -> None:
+    plan = mission()
+    assert drive_verdict(replayed(stamped(tmp_path, plan, faster), plan)).answer == "no"
 
 
 def test_a_scan_that_failed_is_reported_and_the_drive_goes_on(tmp_path: Path) -> None:
