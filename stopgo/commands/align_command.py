@@ -116,9 +116,8 @@ def _with_transform(mission: Path, out: Path, fit: RigidFit) -> str:
 
     document = read(mission)
     placed = replace(document, frame=replace(document.frame, to_map=fit.transform))
-    later = document.revision + (
-        placed != document
-    )  # a robot that holds the one refuses the other as the same
+    # A robot that holds the one would refuse the other as the same revision.
+    later = document.revision + (placed != document)
     made = with_digest(replace(placed, revision=max(later, next_revision(out, placed))))
     write_checked(out, encode(made))
     return f"{out}: {made.name}, revision {made.revision}"
