@@ -6,7 +6,6 @@ robot the time and state of its last answer.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Annotated
 import msgspec
 
 from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.mission.console.state_folder import state_folder
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
@@ -49,9 +49,8 @@ class RosterVehicle(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 def default_sightings_file(endpoint: str, site: str | None) -> Path:
     """Return the file of the robots seen through an endpoint, in `$XDG_STATE_HOME/stopgo/seen`."""
-    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     name = file_name(endpoint if site is None else f"{endpoint} {site}")
-    return Path(home) / "stopgo" / "seen" / f"{name}.json"
+    return state_folder() / "seen" / f"{name}.json"
 
 
 def read_sightings(path: Path) -> Sightings:

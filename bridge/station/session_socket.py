@@ -19,6 +19,7 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
+from stopgo.mission.console.state_folder import state_folder
 from stopgo.mission.errors import InputError
 
 SESSION_VERSION: Final = 1
@@ -82,8 +83,7 @@ class SessionOptions:
 
 def session_folder() -> Path:
     """Return the folder of the user's sessions, in `$XDG_STATE_HOME/stopgo/session`."""
-    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    return Path(home) / "stopgo" / "session"
+    return state_folder() / "session"
 
 
 def has_unix_sockets() -> bool:

@@ -6,11 +6,9 @@ operator, and a command typed twice would skip two stops.
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import msgspec
 
+from stopgo.mission.console.state_folder import state_folder
 from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
@@ -29,9 +27,8 @@ class ShownStopFile:
 
     def __init__(self, endpoint: str, *names: str | None) -> None:
         """`names` distinguish the robots at one endpoint."""
-        home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
         name = file_name(" ".join([endpoint, *filter(None, names)]))
-        self._path = Path(home) / "stopgo" / "shown" / f"{name}.json"
+        self._path = state_folder() / "shown" / f"{name}.json"
         self._last: ShownStop | None = None
 
     def read(self) -> ShownStop | None:
@@ -47,9 +44,9 @@ class ShownStopFile:
         if run_id is None or stop is None:
             return
         shown = ShownStop(run_id=run_id, stop=stop)
-        if shown == self._last:
+        before, self._last = self._last or self.read(), shown
+        if shown == before:
             return
-        self._last = shown
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             write_atomic(self._path, msgspec.json.encode(shown))

@@ -31,6 +31,7 @@ from stopgo.bridge.station.roster import RosterVehicle
 from stopgo.bridge.station.station import Station, whoami
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.console.ports import free_port
+from stopgo.mission.console.state_folder import state_folder
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.file_name import file_name
 from stopgo.site.event_feed import EventFeed
@@ -79,9 +80,8 @@ class SiteOptions:
 
 def state_file(options: SiteOptions) -> Path:
     """Return the file with the sessions of a folder's site, in `$XDG_STATE_HOME/stopgo/site`."""
-    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     name = file_name(f"{options.folder.resolve()} {options.listen}")
-    return Path(home) / "stopgo" / "site" / f"{name}.json"
+    return state_folder() / "site" / f"{name}.json"
 
 
 @contextmanager

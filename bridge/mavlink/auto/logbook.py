@@ -8,7 +8,6 @@ and no run goes back.
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 import shlex
 from collections.abc import Callable, Iterator
@@ -26,6 +25,7 @@ from stopgo.bridge.mavlink.auto.vehicle_boots import VehicleBoots
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import shared_journal
+from stopgo.mission.console.state_folder import state_folder
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.following.capture_reports import ScanFile
@@ -283,8 +283,7 @@ def name_of(vehicle: int) -> str:
 
 def usual_folder(url: Url, vehicle: int) -> Path:
     """Folder `$XDG_STATE_HOME/stopgo/…`, named by URL and vehicle."""
-    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    return Path(home) / "stopgo" / f"{re.sub(r'[^A-Za-z0-9.-]+', '-', str(url))}-vehicle-{vehicle}"
+    return state_folder() / f"{re.sub(r'[^A-Za-z0-9.-]+', '-', str(url))}-vehicle-{vehicle}"
 
 
 def recorded_vehicles(url: Url, state: Path | None = None) -> tuple[int, ...]:
