@@ -31,6 +31,7 @@ Invariants
 
 from __future__ import annotations
 
+import threading
 from contextlib import AbstractContextManager
 from typing import TypeVar
 
@@ -47,6 +48,10 @@ ANSWERS_KEPT = 10_000
 NONCES_KEPT = 10_000
 
 S = TypeVar("S", bound=msgspec.Struct)
+
+
+_DECODING = threading.Lock()
+"""msgspec crashes where two threads decode the first value of a kind at once, while it prepares the kind."""
 
 
 class Journal:
@@ -80,7 +85,8 @@ class Journal:
         if before is not None and before[0] is stored and isinstance(before[1], kind):
             return before[1]
         try:
-            found = msgspec.json.decode(stored, type=kind)
+            with _DECODING:
+                found = msgspec.json.decode(stored, type=kind)
         except msgspec.ValidationError as error:
             raise InputError(
                 f"the journal's {name}: {error}; a newer stopgo wrote it: update stopgo"
