@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -178,6 +179,13 @@ def test_the_dialect_of_mavlink_is_known_to_its_edges_alone() -> None:
     users = {name for name, path in MODULES.items() if "dialect" in path.read_text(encoding="utf-8")}
     edges = {"frames", "messages", "wire", "tunnel", "vehicle_telemetry", "replies"}
     assert {name.rpartition(".")[2] for name in users if folder_of(name) == "bridge"} <= edges
+
+
+def test_one_module_decodes_into_kinds() -> None:
+    """Two threads that prepare a kind of `msgspec` at once end the process."""
+    prepares = re.compile(r"msgspec\.(?:convert|\w+\.Decoder)\b|msgspec\.\w+\.decode\([^#]*?,\s*type=")
+    users = {name for name, path in MODULES.items() if prepares.search(path.read_text(encoding="utf-8"))}
+    assert users == {"stopgo.mission.document.decoding"}
 
 
 PURE = ("stopgo.mission.run", "stopgo.mission.mavlink")

@@ -26,6 +26,7 @@ from stopgo.bridge.robot.journal_file import memory_journal
 from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.mission.document import Mission
+from stopgo.mission.document.decoding import decoded
 
 AnswerFault = Callable[[Request, Answering], bytes]
 """Returns the answer to a query in place of the robot; may raise `Unanswered`."""
@@ -159,7 +160,7 @@ class ForgedAnswers:
 
 
 def _falsified(attachment: bytes) -> bytes:
-    valid = msgspec.json.decode(attachment, type=SignatureAttachment)
+    valid = decoded(attachment, SignatureAttachment)
     signature = bytes([valid.signature[0] ^ 1]) + valid.signature[1:]
     return msgspec.json.encode(msgspec.structs.replace(valid, signature=signature))
 

@@ -15,6 +15,7 @@ from stopgo.bridge.link.signatures import (
     SignedAnswering,
     SignedHearing,
 )
+from stopgo.mission.document.decoding import decoded
 
 Falsifying = Callable[[Question, MessageSigning], Question]
 """Returns a query with an invalid signature, made from a valid one."""
@@ -53,7 +54,7 @@ def unsigned(question: Question, signing: MessageSigning) -> Question:
 
 def flipped(question: Question, signing: MessageSigning) -> Question:
     """Change one bit of the signature."""
-    attachment = msgspec.json.decode(question.attachment, type=SignatureAttachment)
+    attachment = decoded(question.attachment, SignatureAttachment)
     signature = bytes([attachment.signature[0] ^ 1]) + attachment.signature[1:]
     return replace(
         question, attachment=msgspec.json.encode(msgspec.structs.replace(attachment, signature=signature))
@@ -80,7 +81,7 @@ def of_other_parameters(question: Question, signing: MessageSigning) -> Question
 
 def without_certificate(question: Question, signing: MessageSigning) -> Question:
     """Remove the certificate."""
-    attachment = msgspec.json.decode(question.attachment, type=SignatureAttachment)
+    attachment = decoded(question.attachment, SignatureAttachment)
     return replace(
         question, attachment=msgspec.json.encode(msgspec.structs.replace(attachment, certificate=None))
     )

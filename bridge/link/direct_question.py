@@ -18,6 +18,7 @@ import msgspec
 from stopgo.bridge.link.keys import HeldKeys
 from stopgo.bridge.link.link import Request, Unanswered
 from stopgo.bridge.link.signatures import KeySigning, SignedAnswering
+from stopgo.mission.document.decoding import decoded
 
 PROTOCOL: Final = "stopgo-question/1"
 MOST_BYTES: Final = 16_384
@@ -102,4 +103,4 @@ def _read(line: ssl.SSLSocket) -> DirectMessage:
         received += data
         if not data or len(received) > MOST_BYTES:
             raise ConnectionResetError
-    return msgspec.json.decode(received, type=DirectMessage)
+    return decoded(received, DirectMessage)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import msgspec
 
 from stopgo.mission.console.whole_file import whole_file
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 
@@ -133,10 +133,9 @@ def _revoked_in(data: bytes, path: Path, authority: x509.Certificate) -> Revoked
     public = authority.public_key()
     assert isinstance(public, Ed25519PublicKey)
     try:
-        with one_decode_error():
-            signed = msgspec.json.decode(data, type=SignedList)
-            public.verify(signed.signature, REVOKED + bytes(signed.revoked))
-            return msgspec.json.decode(signed.revoked, type=Revoked)
+        signed = decoded(data, SignedList)
+        public.verify(signed.signature, REVOKED + bytes(signed.revoked))
+        return decoded(signed.revoked, Revoked)
     except msgspec.DecodeError:
         raise InputError(f"{path}: not a list of revoked keys; copy it from the site's folder") from None
     except InvalidSignature:

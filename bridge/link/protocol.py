@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import (
@@ -369,8 +369,7 @@ def decode(payload: bytes, kind: type[M]) -> M:
     msgspec.DecodeError
         Whatever is wrong with it; `ValidationError`, which is one, with the JSON path.
     """
-    with one_decode_error():
-        return msgspec.json.decode(payload, type=kind)
+    return decoded(payload, kind)
 
 
 _PLACE = re.compile(rf"(?P<root>(?:.+?/)?sx/{VERSION}/(?P<robot>[^/]+))/(?P<rest>[^\n]*)")

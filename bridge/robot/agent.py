@@ -45,6 +45,7 @@ from stopgo.bridge.robot.reported_journal import ReportedJournal
 from stopgo.bridge.robot.runner import Runner, state_report
 from stopgo.bridge.robot.station_contact import StationContact
 from stopgo.mission import __version__
+from stopgo.mission.document.decoding import converted
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import StateReport
 from stopgo.mission.run.lease import Lease, renewed
@@ -143,7 +144,7 @@ class Agent:
         self._contact = StationContact(command_clock)
         self._poses = PublishedPoses(keys.robot, runner.boot_id)
         self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
-        self._to_map = None if to_map is None else msgspec.convert(to_map, OwnMap, from_attributes=True)
+        self._to_map = None if to_map is None else converted(to_map, OwnMap, from_attributes=True)
         self._twin_check_ns = command_clock.now_ns()
         self._closing, self._news, self._failed = threading.Event(), threading.Event(), threading.Event()
         self._error: Exception | None = None

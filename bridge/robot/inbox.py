@@ -166,10 +166,8 @@ class Inbox:
         # digest shows, which is of what was read.
         try:
             mission = read_mission(document)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except msgspec.DecodeError as error:
             return _no("malformed", f"the document: {error}")
-        except RecursionError:
-            return _no("malformed", "the document is nested too deeply")
         if digest_of(mission) != mission.digest:
             return _no("digest", "the document does not have the digest it claims")
         if (mission.id, mission.revision, mission.digest) != (

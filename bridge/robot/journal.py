@@ -31,7 +31,6 @@ Invariants
 
 from __future__ import annotations
 
-import threading
 from contextlib import AbstractContextManager
 from typing import TypeVar
 
@@ -39,6 +38,7 @@ import msgspec
 
 from stopgo.bridge.robot.journal_rows import JournalRows
 from stopgo.bridge.robot.stored_missions import StoredMissions
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.mission.run.run_commands import Answer
@@ -48,10 +48,6 @@ ANSWERS_KEPT = 10_000
 NONCES_KEPT = 10_000
 
 S = TypeVar("S", bound=msgspec.Struct)
-
-
-_DECODING = threading.Lock()
-"""msgspec crashes where two threads decode the first value of a kind at once, while it prepares the kind."""
 
 
 class Journal:
@@ -85,8 +81,7 @@ class Journal:
         if before is not None and before[0] is stored and isinstance(before[1], kind):
             return before[1]
         try:
-            with _DECODING:
-                found = msgspec.json.decode(stored, type=kind)
+            found = decoded(stored, kind)
         except msgspec.ValidationError as error:
             raise InputError(
                 f"the journal's {name}: {error}; a newer stopgo wrote it: update stopgo"
@@ -161,7 +156,7 @@ class Journal:
     def answer(self, cmd_id: str) -> tuple[str, Answer] | None:
         """Return the stored answer of a command, after the hash of that command."""
         rows = self.rows.read("answers", "WHERE cmd_id = ?", cmd_id)
-        return (rows[0][1], msgspec.json.decode(rows[0][2], type=Answer)) if rows else None
+        return (rows[0][1], decoded(rows[0][2], Answer)) if rows else None
 
     def store_answer(self, order_sha: str, answer: Answer) -> None:
         self.rows.write("answers", answer.cmd_id, order_sha, msgspec.json.encode(answer))

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 import msgspec
 
 from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document.decoding import decoded
 
 
 class MissionOfRawStops(Mission, frozen=True, kw_only=True):
@@ -26,21 +27,18 @@ def read_mission(document: bytes) -> Mission:
 
     Raises
     ------
-    msgspec.DecodeError, UnicodeDecodeError, RecursionError
+    msgspec.DecodeError
         If it is not a mission.
     """
     with _collector_off():
-        raw = msgspec.json.decode(document, type=MissionOfRawStops)
+        raw = decoded(document, MissionOfRawStops)
         stops = tuple(_stop(number, body) for number, body in enumerate(raw.stops))
         return Mission(**(msgspec.structs.asdict(raw) | {"stops": stops}))
 
 
-_STOP = msgspec.json.Decoder(Stop)
-
-
 def _stop(number: int, body: msgspec.Raw) -> Stop:
     try:
-        return _STOP.decode(body)
+        return decoded(body, Stop)
     except msgspec.ValidationError as error:
         message = str(error)
         where = f"$.stops[{number}]"

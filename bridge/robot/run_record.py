@@ -9,6 +9,7 @@ import msgspec
 
 from stopgo.bridge.link.protocol import RECORD_PAGE, PoseRow, RecordEntry, RecordPage, encode
 from stopgo.bridge.record_file import RecordFile
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport
 
 RESTARTED = "the robot's program was restarted"
@@ -130,7 +131,7 @@ class RunRecord:
     def _entry(self, number: int) -> RecordEntry | None:
         body = self.file.read(number)
         with suppress(msgspec.DecodeError):  # a newer stopgo's
-            return None if body is None else msgspec.json.decode(body, type=RecordEntry)
+            return None if body is None else decoded(body, RecordEntry)
         return None
 
     def _damaged(self, number: int) -> RecordEntry:

@@ -19,6 +19,7 @@ from stopgo.bridge.robot.base import BaseHealth, Outcome, Rest
 from stopgo.bridge.robot.motion import Brake, Motion, along
 from stopgo.bridge.robot.simulated_faults import NO_FAULTS, RobotFaults
 from stopgo.mission.document import Mission, Point, RobotSpec, Scan
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
@@ -269,7 +270,7 @@ def _remembered(record: Path | None) -> dict[str, ScanResult]:
     found: dict[str, ScanResult] = {}
     for line in _memory(record).read_bytes().splitlines():
         with contextlib.suppress(msgspec.DecodeError):
-            label, result = msgspec.json.decode(line, type=tuple[str, ScanResult])
+            label, result = decoded(line, tuple[str, ScanResult])
             found[label] = result
     return found
 
@@ -278,7 +279,7 @@ def read_world(keep: Path | None) -> World:
     if keep is None or not keep.exists():
         return World()
     try:
-        return msgspec.json.decode(keep.read_bytes(), type=World)
+        return decoded(keep.read_bytes(), World)
     except (OSError, msgspec.DecodeError) as error:
         raise InputError(
             f"{keep}: no pose of the simulated robot ({error}); remove it to start at the mission's start"

@@ -10,6 +10,7 @@ import msgspec
 from stopgo.bridge.link.protocol import Manifest
 from stopgo.bridge.robot.journal_format import put_chunks
 from stopgo.bridge.robot.journal_rows import JournalRows
+from stopgo.mission.document.decoding import decoded
 
 MISSIONS_KEPT = 4
 """Missions stored beyond those that are needed; of older ones only the names stay."""
@@ -36,7 +37,7 @@ class StoredMissions:
         rows = self._rows.read(
             "missions", "WHERE mission_id = ? AND revision = ? AND document != 0", mission_id, revision
         )
-        return msgspec.json.decode(rows[0][2], type=Manifest) if rows else None
+        return decoded(rows[0][2], Manifest) if rows else None
 
     def part(self, manifest: Manifest, start: int, size: int) -> bytes:
         """Return `size` bytes of a stored mission's document, from byte `start` on."""
@@ -63,9 +64,7 @@ class StoredMissions:
     def _arriving(self, manifest: Manifest) -> int:
         """Return the number of this document if it is the one that is arriving, else 0."""
         rows = self._rows.read("transfers", "WHERE mission_id = ?", manifest.mission_id)
-        same = rows and _document_key(msgspec.json.decode(rows[0][1], type=Manifest)) == _document_key(
-            manifest
-        )
+        same = rows and _document_key(decoded(rows[0][1], Manifest)) == _document_key(manifest)
         return int(rows[0][2]) if same else 0
 
     def store(self, manifest: Manifest, document: bytes) -> None:
@@ -88,7 +87,7 @@ class StoredMissions:
         """Return the manifest of the newest revision, even if only its name is still stored."""
         statement = "SELECT manifest FROM missions WHERE mission_id = ? ORDER BY revision DESC LIMIT 1"
         rows = self._rows.select(statement, mission_id)
-        return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
+        return decoded(rows[0][0], Manifest) if rows else None
 
     def complete_transfer(self, manifest: Manifest) -> None:
         """End the transfer, and make what has arrived a stored mission, unless it is one already.
@@ -124,7 +123,7 @@ class StoredMissions:
     def transfer(self, mission_id: str) -> Manifest | None:
         """Return the manifest of the transfer of this mission; `None` if none is open."""
         rows = self._rows.read("transfers", "WHERE mission_id = ?", mission_id)
-        return msgspec.json.decode(rows[0][1], type=Manifest) if rows else None
+        return decoded(rows[0][1], Manifest) if rows else None
 
     def begin_transfer(self, manifest: Manifest) -> None:
         """Begin to receive a mission, and end any other transfer; chunks of the same document stay."""

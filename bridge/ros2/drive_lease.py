@@ -16,6 +16,7 @@ import msgspec
 
 from stopgo.bridge.ros2.goal_guard import DRIVES, SIGN_S, STANDS, GoalStop, Signs
 from stopgo.bridge.ros2.zenoh_node import ZenohNode
+from stopgo.mission.document.decoding import converted, decoded
 
 LEASE_S = 1.0
 """Time without a sign of life after which a driving program counts as gone; as long for a guard's answers."""
@@ -48,7 +49,7 @@ class DriveLease:
     ) -> None:
         """`wanted` names what stops the robot; `report` takes why no guard counts, or an empty text."""
         self._signs = {
-            moves: msgspec.json.encode(msgspec.convert({"drives": moves, **wanted}, DriveSign))
+            moves: msgspec.json.encode(converted({"drives": moves, **wanted}, DriveSign))
             for moves in (False, True)
         }
         self._drives = drives
@@ -90,7 +91,7 @@ class LeaseGuard:
 
     def _hear(self, sample: Any) -> None:
         try:
-            sign = msgspec.json.decode(bytes(sample.payload), type=DriveSign)
+            sign = decoded(bytes(sample.payload), DriveSign)
         except msgspec.MsgspecError:
             return
         with self._lock:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from stopgo.mission.document.decoding import converted
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings.toml_file import read_toml, with_quotes
 
@@ -154,7 +155,7 @@ def read_ros_settings(path: Path | None) -> RosSettings:
         return RosSettings()
     document = read_toml(path)
     try:
-        return msgspec.convert(document, RosSettings)
+        return converted(document, RosSettings)
     except msgspec.ValidationError as error:
         what, _, where = str(error).partition(" - at ")
         keys = where.strip("`").removeprefix("$").lstrip(".")
@@ -174,7 +175,7 @@ def changed_settings(settings: RosSettings, changes: dict[str, Any]) -> RosSetti
     for name, value in changes.items():
         document[name] = document[name] | value if isinstance(value, dict) else value
     try:
-        return msgspec.convert(document, RosSettings)
+        return converted(document, RosSettings)
     except msgspec.ValidationError as error:
         what, _, where = str(error).partition(" - at ")
         keys = where.strip("`").removeprefix("$").lstrip(".")

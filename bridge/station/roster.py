@@ -15,7 +15,7 @@ import msgspec
 
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.mission.console.state_folder import state_folder
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import converted, decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.file_name import file_name
@@ -56,8 +56,7 @@ def default_sightings_file(endpoint: str, site: str | None) -> Path:
 def read_sightings(path: Path) -> Sightings:
     """Read the robots of a file of sightings; none if it does not exist or is damaged."""
     try:
-        with one_decode_error():
-            return msgspec.json.decode(path.read_bytes(), type=dict[str, LastSeen])
+        return decoded(path.read_bytes(), dict[str, LastSeen])
     except (OSError, msgspec.DecodeError):
         return {}
 
@@ -128,8 +127,7 @@ def read_roster_vehicles(path: Path) -> dict[str, RosterVehicle]:
         if name in robots:
             raise InputError(f"{path}: {name} is a robot and a vehicle; give one another name")
         try:
-            with one_decode_error():
-                found = msgspec.convert(entry, RosterVehicle)
+            found = converted(entry, RosterVehicle)
         except msgspec.DecodeError as error:
             raise InputError(f"{path}: vehicle {name}: {error}") from None
         key = None if found.signing_key is None else str(path.parent / found.signing_key)

@@ -20,6 +20,7 @@ from typing import Any, Final, TypeVar
 import msgspec
 
 from stopgo.mission.console.state_folder import state_folder
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 
 SESSION_VERSION: Final = 1
@@ -145,7 +146,7 @@ class Conversation:
             self._received += arrived
         line, _, rest = self._received.partition(b"\n")
         self._received = rest
-        return msgspec.json.decode(line, type=kind)
+        return decoded(line, kind)
 
     def close(self) -> None:
         self._socket.close()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import msgspec
 
 from stopgo.mission.console.state_folder import state_folder
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.file_name import file_name
@@ -34,8 +34,7 @@ class ShownStopFile:
     def read(self) -> ShownStop | None:
         """Return the stop; none if there was none, or nothing could be stored."""
         try:
-            with one_decode_error():
-                return msgspec.json.decode(self._path.read_bytes(), type=ShownStop)
+            return decoded(self._path.read_bytes(), ShownStop)
         except (OSError, msgspec.DecodeError):
             return None
 

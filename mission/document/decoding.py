@@ -1,22 +1,59 @@
-"""Decoding of third-party JSON: every fault raises one kind of error."""
+"""Decoding of JSON and MessagePack into typed objects, safe in threads; every fault is one kind of error."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import threading
+from typing import Any, TypeVar
 
 import msgspec
 
+K = TypeVar("K")
 
-@contextmanager
-def one_decode_error() -> Iterator[None]:
-    """Turn every decoding fault into `msgspec.DecodeError` (of which `ValidationError` is one).
+_PREPARING = threading.RLock()
+_PREPARED: dict[Any, msgspec.json.Decoder[Any]] = {}
 
-    Bytes that are no text, brackets nested too deeply (also in ignored parts), and database values that are
-    neither text nor bytes raise other errors by themselves.
+
+def decoder_of(kind: Any) -> msgspec.json.Decoder[Any]:
+    """Return the decoder of JSON documents of this kind, a class or any other type.
+
+    `msgspec` prepares the fields of a class when the class is first decoded. The process ends in a
+    segmentation fault if two threads do that at once, so one thread at a time prepares kinds here.
     """
+    decoder = _PREPARED.get(kind)
+    if decoder is None:
+        with _PREPARING:
+            decoder = _PREPARED[kind] = msgspec.json.Decoder(kind)
+    return decoder
+
+
+def decoded(document: bytes | bytearray | str | msgspec.Raw, kind: type[K]) -> K:
+    """Return the object in a JSON document.
+
+    Raises
+    ------
+    msgspec.DecodeError
+        Whatever is wrong with it; `ValidationError`, which is one, with the JSON path.
+    """
+    return _of_one_error(decoder_of(kind).decode, document)
+
+
+def unpacked(data: bytes, kind: type[K]) -> K:
+    """Return the object in MessagePack bytes; raises as `decoded` does."""
+    decoder_of(kind)
+    return _of_one_error(msgspec.msgpack.Decoder(kind).decode, data)
+
+
+def converted(values: object, kind: type[K], *, from_attributes: bool = False) -> K:
+    """Return the object that these values describe; raises `msgspec.ValidationError` if they do not."""
+    decoder_of(kind)
+    return msgspec.convert(values, kind, from_attributes=from_attributes)
+
+
+def _of_one_error(decode: Any, document: Any) -> Any:
+    """Decode; bytes that are no text, brackets nested too deeply (also in ignored parts), and database values
+    that are neither text nor bytes raise other errors by themselves."""
     try:
-        yield
+        return decode(document)
     except (UnicodeDecodeError, TypeError) as error:
         raise msgspec.DecodeError(str(error)) from None
     except RecursionError:

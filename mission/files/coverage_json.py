@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from stopgo.mission.document import Mission
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import bytes_of
 from stopgo.mission.floor import Element
@@ -114,8 +114,7 @@ def read_coverage(path: Path, mission: Mission) -> Coverage:
     """
     data = bytes_of(path, "give a coverage.json").removeprefix(BOM_UTF8)
     try:
-        with one_decode_error():
-            coverage = msgspec.json.decode(data, type=Coverage)
+        coverage = decoded(data, Coverage)
     except msgspec.DecodeError as error:
         raise InputError(f"{path}: not a coverage.json of this version ({error}); plan again") from None
     _check_mission(coverage.mission, mission, path)

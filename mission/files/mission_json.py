@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 
 from stopgo.mission.document import SCHEMA, VERSION, Mission, canonical, digest_of, with_digest
+from stopgo.mission.document.decoding import converted
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.given_file import bytes_of
@@ -164,7 +165,7 @@ def _check_schema(document: dict[str, Any], name: str) -> None:
 
 def _convert(document: dict[str, Any], name: str) -> Mission:
     try:
-        return msgspec.convert(document, Mission)
+        return converted(document, Mission)
     except msgspec.ValidationError as error:
         reason, _, place = str(error).partition(" - at ")
         path = place.strip("`") or "$"

@@ -31,6 +31,8 @@ def read_settings(
     """
     import msgspec
 
+    from stopgo.mission.document.decoding import converted
+
     values = {} if path is None else _values_of(path, notify)
     for key, value in overrides.items():
         if key not in _NAMES:
@@ -38,7 +40,7 @@ def read_settings(
         if value is not None:
             values[_NAMES[key]] = value
     try:
-        typed = msgspec.convert(values, Settings)
+        typed = converted(values, Settings)
     except msgspec.ValidationError as error:
         raise InputError(_refused(str(error), values, path)) from None
     given = {key: getattr(typed, key) for key in values}  # typed itself lacks the defaults

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import converted, decoded
 
 State = Literal["IDLE", "READY", "RUNNING", "PAUSED", "HELD", "HOMING", "FINISHED", "ABORTED"]
 StopState = Literal[
@@ -195,19 +195,14 @@ def event_of(body: bytes) -> AnyEvent:
     msgspec.DecodeError
         If it is not an event.
     """
-    with one_decode_error():
-        try:
-            return _EVENTS.decode(body)
-        except msgspec.ValidationError:
-            fields = _ENVELOPE.decode(body)
-            if fields.get("event") in KINDS:
-                raise
-            kind = fields.get("event")
-            return msgspec.convert({**fields, "event": "UnknownKind", "kind": kind}, UnknownKind)
-
-
-_EVENTS = msgspec.json.Decoder(AnyEvent)
-_ENVELOPE = msgspec.json.Decoder(dict[str, Any])
+    try:
+        return decoded(body, AnyEvent)
+    except msgspec.ValidationError:
+        fields = decoded(body, dict[str, Any])
+        if fields.get("event") in KINDS:
+            raise
+        kind = fields.get("event")
+        return converted({**fields, "event": "UnknownKind", "kind": kind}, UnknownKind)
 
 
 STOPS_LISTED = 50

@@ -14,7 +14,7 @@ import msgspec
 
 from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.console.table import duration, table
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.stages.figures import percent
@@ -192,8 +192,7 @@ def _is_written(folder: Path, files: dict[str, IndexedFile], say: Callable[[str]
 def _known(path: Path) -> dict[str, IndexedFile]:
     """Return the entries of the index; none if it is missing, damaged or of another version."""
     try:
-        with one_decode_error():
-            index = msgspec.json.decode(path.read_bytes(), type=RunIndex)
+        index = decoded(path.read_bytes(), RunIndex)
     except (OSError, msgspec.DecodeError):
         return {}
     return index.files if index.version == VERSION else {}

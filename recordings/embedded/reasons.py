@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import msgspec
 import rerun as rr
 
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.stages.stop_reasons import StopReason
 from stopgo.recordings.drawing import entities
@@ -33,7 +33,6 @@ def reasons_in(values: Values, name: str) -> tuple[StopReason, ...]:
     if not rows:
         return ()
     try:
-        with one_decode_error():
-            return msgspec.json.decode(rows[-1]["document"][0], type=tuple[StopReason, ...])
+        return decoded(rows[-1]["document"][0], tuple[StopReason, ...])
     except (KeyError, msgspec.DecodeError) as error:
         raise InputError(f"{name}: reasons of its stops are damaged ({error}); plan again") from None

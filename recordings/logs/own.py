@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from stopgo.mission.document import Mission
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import file_digest
 from stopgo.mission.geometry import frozen
@@ -80,8 +80,8 @@ def _documents(connection: sqlite3.Connection) -> Iterator[bytes]:
 
 def _missions(documents: Iterable[bytes]) -> Iterator[Mission]:
     for document in documents:
-        with suppress(msgspec.DecodeError), one_decode_error():
-            yield msgspec.json.decode(document, type=Mission)
+        with suppress(msgspec.DecodeError):
+            yield decoded(document, Mission)
 
 
 def poses_of_events(events: Iterable[AnyEvent]) -> Poses:

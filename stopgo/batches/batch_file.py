@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from stopgo.mission.console.whole_file import whole_file
+from stopgo.mission.document.decoding import converted
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings.toml_file import read_toml, with_quotes
 
@@ -124,7 +125,7 @@ def read_day(path: Path) -> DayTable:
 
 def _document(path: Path) -> BatchDocument:
     try:
-        return msgspec.convert(read_toml(path), BatchDocument)
+        return converted(read_toml(path), BatchDocument)
     except msgspec.ValidationError as error:
         raise InputError(f"{path}: {_plain(error)}") from None
 
@@ -156,7 +157,7 @@ def _groups(
 
 def _group(place: str, folder: Path, table: Mapping[str, Any], shared: Mapping[str, Any]) -> FloorGroup:
     try:
-        group = msgspec.convert(table, FloorTable)
+        group = converted(table, FloorTable)
     except msgspec.ValidationError as error:
         raise InputError(_plain(error)) from None
     for rule in (*group.exclude, *(item.when for item in group.override)):

@@ -10,6 +10,7 @@ import msgspec
 
 from stopgo.batches.content import changes
 from stopgo.batches.store import Result
+from stopgo.mission.document.decoding import decoded
 
 ENTRY_FILE = "content.json"
 
@@ -57,6 +58,6 @@ def _as_text(settings: Mapping[str, Any]) -> dict[str, str]:
 def read_content(folder: Path) -> EntryContent | None:
     """Return the content that the plan in an entry's folder was made of; None if there is none."""
     try:
-        return msgspec.json.decode((folder / ENTRY_FILE).read_bytes(), type=EntryContent)
+        return decoded((folder / ENTRY_FILE).read_bytes(), EntryContent)
     except (OSError, msgspec.DecodeError):
         return None

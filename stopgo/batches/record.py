@@ -12,6 +12,7 @@ import msgspec
 
 from stopgo.batches.store import Result
 from stopgo.batches.work import NOTHING, PlanOutcome
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 
@@ -120,7 +121,7 @@ def read_record(out: Path) -> BatchRecord | None:
     """
     path = out / FILE
     try:
-        return msgspec.json.decode(path.read_bytes(), type=BatchRecord)
+        return decoded(path.read_bytes(), BatchRecord)
     except FileNotFoundError:
         return None
     except (OSError, msgspec.DecodeError) as error:

@@ -29,6 +29,7 @@ from typing import Any
 
 import msgspec
 
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.given_file import file_digest
@@ -140,7 +141,7 @@ class ResultStore:
         """Return a result whose files are all whole; one that is damaged is removed."""
         folder = self.result_folder(key)
         try:
-            result = msgspec.json.decode((folder / RESULT).read_bytes(), type=Result)
+            result = decoded((folder / RESULT).read_bytes(), Result)
         except OSError:
             return None
         except msgspec.DecodeError:
@@ -283,7 +284,7 @@ def _create(path: Path, claim: Claim) -> bool:
 
 def _claim_in(path: Path, default: Claim | None = None) -> Any:
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Claim)
+        return decoded(path.read_bytes(), Claim)
     except (OSError, msgspec.DecodeError):
         return default or Claim("", "", 0)
 

@@ -10,6 +10,7 @@ import msgspec
 
 from stopgo.batches.entries import Entry
 from stopgo.batches.record import EntryRecord
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.recordings.catalog.run_index import IndexedRun, index_of
@@ -67,7 +68,7 @@ def read_visits(out: Path, recordings: Path | None) -> Visits:
     """
     path = out / FILE
     try:
-        missions = msgspec.json.decode(path.read_bytes(), type=dict[str, PlannedMission])
+        missions = decoded(path.read_bytes(), dict[str, PlannedMission])
     except FileNotFoundError:
         missions = {}
     except (OSError, msgspec.DecodeError) as error:

@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 
@@ -46,7 +47,7 @@ class KeptVariants:
         for folder in sorted(self._place.iterdir()):
             kept = None
             with suppress(OSError, msgspec.DecodeError):
-                kept = msgspec.json.decode((folder / FILE).read_bytes(), type=KeptVariant)
+                kept = decoded((folder / FILE).read_bytes(), KeptVariant)
             if kept is not None and folder.name == str(kept.number):
                 found.append(kept)
             else:

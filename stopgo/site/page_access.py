@@ -21,7 +21,7 @@ from typing import Literal
 
 import msgspec
 
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.files.atomic import write_atomic
 
 TOKEN_S = 3600.0
@@ -114,8 +114,7 @@ def holds_key(session: PageSession, key: str) -> bool:
 def read_stored(file: Path) -> StoredAccess | None:
     """Return the stored sessions; `None` if there are none, or the file is damaged."""
     try:
-        with one_decode_error():
-            return msgspec.json.decode(file.read_bytes(), type=StoredAccess)
+        return decoded(file.read_bytes(), StoredAccess)
     except (OSError, msgspec.DecodeError):
         return None
 

@@ -20,6 +20,7 @@ from typing import Any
 import msgspec
 
 from stopgo.mission.console.process import without_ctrl_c
+from stopgo.mission.document.decoding import converted
 from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.atomic import replacing
 from stopgo.mission.files.file_name import file_name
@@ -180,7 +181,7 @@ class PlanningRoom:
     def _show_again(self, kept: KeptVariant) -> None:
         """Show a variant that an earlier server made."""
         try:
-            request = msgspec.convert(kept.shown.get("request"), VariantRequest)
+            request = converted(kept.shown.get("request"), VariantRequest)
         except msgspec.ValidationError:  # of another version
             self._kept.remove(kept.number)
             return

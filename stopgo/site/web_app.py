@@ -20,7 +20,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError, NegativeResult, StopgoError
 from stopgo.mission.files.mission_json import read
 from stopgo.site.event_feed import EventFeed
@@ -117,8 +117,7 @@ def page_file(request: Request) -> Response:
 async def body_of(request: Request, kind: type[M]) -> M:
     """Return the body of a request; raises `InputError` if it is something else."""
     try:
-        with one_decode_error():
-            return msgspec.json.decode(await request.body(), type=kind)
+        return decoded(await request.body(), kind)
     except msgspec.DecodeError as error:
         raise InputError(f"the request cannot be read: {error}") from None
 

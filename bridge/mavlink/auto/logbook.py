@@ -27,6 +27,7 @@ from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.journal_file import shared_journal
 from stopgo.mission.console.state_folder import state_folder
 from stopgo.mission.document import Mission
+from stopgo.mission.document.decoding import decoded, unpacked
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.following.capture_reports import ScanFile
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
@@ -126,8 +127,8 @@ class Logbook:
         stored = self.journal.missions.read(sent.mission_id, sent.revision)
         items = self.journal.fact("items", PackedItems)
         assert stored is not None and items is not None
-        mission = msgspec.json.decode(stored[1], type=Mission)
-        return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList), self.address)
+        mission = decoded(stored[1], Mission)
+        return listed_mission(mission, unpacked(items.packed, ItemList), self.address)
 
     def was_sent(self, mission: Mission, sent: ItemList) -> bool:
         """True if this very mission was the last that was sent, as this list."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from stopgo.mission.document.decoding import unpacked
 from stopgo.mission.errors import InputError
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.run.events import Pose
@@ -63,7 +64,7 @@ def _read(path: Path | None) -> StoredState:
     if path is None or not path.exists():
         return StoredState()
     try:
-        return msgspec.msgpack.decode(path.read_bytes(), type=StoredState)
+        return unpacked(path.read_bytes(), StoredState)
     except (OSError, msgspec.DecodeError) as error:
         raise InputError(
             f"{path}: not a simulated vehicle's state ({error}); remove it to begin again"

@@ -10,6 +10,7 @@ from functools import cached_property
 import msgspec
 import numpy as np
 
+from stopgo.mission.document.decoding import decoded
 from stopgo.mission.geometry import FloatArray, IntArray
 
 Placement = tuple[float, ...]
@@ -187,7 +188,7 @@ def unpacked(data: bytes) -> Model:
     """
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            said = msgspec.json.decode(arrays["said"].tobytes(), type=Described)
+            said = decoded(arrays["said"].tobytes(), Described)
             return Model(said, arrays["vertices"], arrays["faces"])
     except (OSError, EOFError, KeyError, zipfile.BadZipFile, msgspec.MsgspecError) as error:
         raise ValueError(f"no packed model: {error}") from None
