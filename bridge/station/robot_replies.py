@@ -9,6 +9,7 @@ import msgspec
 from stopgo.bridge.link.protocol import LogPage, Malformed, Rejected, Reply, decode
 from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import AnyEvent
+from stopgo.mission.run.run_commands import Answer, RunCommand
 
 M = TypeVar("M")
 
@@ -28,7 +29,7 @@ def read_reply(reply: bytes, kind: type[M], *, robot: str, what: str) -> M:
     NegativeResult
         If the robot rejected the request, or could not read it.
     OutcomeUnknown
-        If the answer cannot be decoded.
+        If the answer cannot be decoded, or is one to another request.
     """
     try:
         message: Reply = decode(reply, Reply)  # type: ignore[arg-type]
@@ -37,10 +38,25 @@ def read_reply(reply: bytes, kind: type[M], *, robot: str, what: str) -> M:
     if isinstance(message, Rejected):
         why = f"{message.reason}: {'; '.join(message.messages)}"
         raise NegativeResult(f"{robot} rejected {what}: {why}", reason=message.reason)
+    if isinstance(message, Malformed):
+        raise NegativeResult(f"{robot}: request not understood ({what}): {message.message}")
     if not isinstance(message, kind):
-        answer = message.message if isinstance(message, Malformed) else type(message).__name__
-        raise NegativeResult(f"{robot}: request not understood ({what}): {answer}")
+        raise OutcomeUnknown(
+            f"{robot}: {type(message).__name__} is no answer to {what}, its outcome is unknown;"
+            " see stopgo status"
+        )
     return message
+
+
+def read_answer(reply: bytes, order: RunCommand, *, robot: str) -> Answer:
+    """Decode the answer to a command; raises the errors of `read_reply`, also for that to another command."""
+    answer = read_reply(reply, Answer, robot=robot, what=order.verb)
+    if (answer.cmd_id, answer.verb) != (order.cmd_id, order.verb):
+        raise OutcomeUnknown(
+            f"{robot}: the answer is to another command ({answer.verb} {answer.cmd_id[:12]}), the outcome of"
+            f" {order.verb} is unknown; see stopgo status"
+        )
+    return answer
 
 
 def read_events(reply: bytes, *, since: int, robot: str) -> PastEvents:

@@ -42,7 +42,7 @@ from stopgo.bridge.link.protocol import (
 )
 from stopgo.bridge.link.tls_probe import why_no_link
 from stopgo.bridge.station import follow
-from stopgo.bridge.station.robot_replies import read_reply
+from stopgo.bridge.station.robot_replies import read_answer, read_reply
 from stopgo.bridge.station.shown_stop import ShownStop
 from stopgo.bridge.station.window import Window, windowed
 from stopgo.mission.document import Mission, with_digest
@@ -416,7 +416,9 @@ class Station:
                 f"{self.keys.robot}: no answer to {order.verb} in time, its outcome is unknown;"
                 f" see stopgo status. It has expired, and has no effect later{self._distrusted()}"
             )
-        answer = self._decoded(reply, Answer, order.verb)
+        if reply is None:
+            raise self._unanswered(order.verb)
+        answer = read_answer(reply, order, robot=self.keys.robot)
         if answer.outcome == "refused":
             why = f"{answer.reason}: {answer.message}"
             raise NegativeResult(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
@@ -544,10 +546,12 @@ class Station:
 
     def _decoded(self, reply: bytes | None, kind: type[Any], what: str) -> Any:
         """Decode an answer of type `kind`; raise an error for every other, and for a missing one."""
-        robot = self.keys.robot
         if reply is None:
-            raise OutcomeUnknown(
-                f"{robot}: no answer to {what} in time, its outcome is unknown;"
-                f" see stopgo status{self._distrusted()}"
-            )
-        return read_reply(reply, kind, robot=robot, what=what)
+            raise self._unanswered(what)
+        return read_reply(reply, kind, robot=self.keys.robot, what=what)
+
+    def _unanswered(self, what: str) -> OutcomeUnknown:
+        return OutcomeUnknown(
+            f"{self.keys.robot}: no answer to {what} in time, its outcome is unknown;"
+            f" see stopgo status{self._distrusted()}"
+        )

@@ -173,12 +173,32 @@ def test_states_and_reasons_of_a_newer_robot_are_passed_on(
             "message": "m", "run_id": None, "state": state}  # fmt: skip
     board.link().serve(keys.command("*"), lambda request: encode(told))
     station = Station(board.link(), keys, commander="test", timeout_s=5.0)
+    pause = msgspec.structs.replace(station.stop_order("pause"), cmd_id="c1")
     if outcome == "ok":
-        assert station.give(station.stop_order("pause")).state == "DOCKED"
+        assert station.give(pause).state == "DOCKED"
     else:
         with pytest.raises(NegativeResult, match="refused pause: too_dark: m") as refused:
-            station.give(station.stop_order("pause"))
+            station.give(pause)
         assert refused.value.reason == "too_dark"
+
+
+@pytest.mark.parametrize(
+    ("told", "match"),
+    [
+        ({"cmd_id": "another"}, "the answer is to another command"),
+        ({"verb": "resume"}, "the answer is to another command"),
+        ({"outcome": "refused", "cmd_id": "another"}, "the answer is to another command"),
+        ({"is": "ChunkHeld", "index": 0, "sha256": "0"}, "ChunkHeld is no answer to pause"),
+    ],
+)
+def test_an_answer_to_another_question_leaves_a_command_unknown(told: dict[str, Any], match: str) -> None:
+    board, keys = Switchboard(), KeyExpressions("r1")
+    answer = {"is": "Answer", "cmd_id": "c1", "verb": "pause", "outcome": "ok", "reason": "too_dark",
+              "message": "", "run_id": None, "state": "PAUSED"}  # fmt: skip
+    board.link().serve(keys.command("*"), lambda request: encode(answer | told))
+    station = Station(board.link(), keys, commander="test", timeout_s=5.0)
+    with pytest.raises(OutcomeUnknown, match=match):
+        station.give(msgspec.structs.replace(station.stop_order("pause"), cmd_id="c1"))
 
 
 def test_a_mission_that_a_newer_robot_rejects_is_rejected() -> None:
