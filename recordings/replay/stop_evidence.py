@@ -70,7 +70,7 @@ def stop_evidence(replay: Replay) -> tuple[StopEvidence, ...]:
         evidence = _with_shifted_part(replay, k, evidence, errors)
         common_m = float(errors.unsure_m[k] + fit_m[k])
         evidence = _with_error_of_fit(evidence, common_m, headings=replay.placed.turns)
-        evidence = _with_other_clock(replay, evidence)
+        evidence = _with_other_clock(replay, k, evidence)
         one = _with_heading(replay, k, evidence, drifts=errors.drifts)
         placed = one.is_placed and item.deviation_m is not None
         unsure_m = None if not placed else common_m + max(jump_m, hidden_m) + float(errors.spread_m[k])
@@ -139,20 +139,32 @@ def _with_error_of_fit(evidence: StopEvidence, unsure_m: float, *, headings: boo
     return StopEvidence(item, "unknown", FIT if headings else NO_HEADINGS)
 
 
-def _with_other_clock(replay: Replay, evidence: StopEvidence) -> StopEvidence:
-    """Return the answer as undecided that standstills of other lengths than the log's could turn.
-
-    That a reported scan was made elsewhere does not depend on them.
-    """
-    rate, reported = replay.placed.source.rate, not replay.inferred and evidence.item.outcome in DONE
+def _with_other_clock(replay: Replay, number: int, evidence: StopEvidence) -> StopEvidence:
+    """Return the answer as undecided that standstills of other lengths than the log's could turn."""
+    rate = replay.placed.source.rate
     turns = evidence.answer == ("no" if rate > 1 else "yes")
-    if abs(rate - 1) <= SAME_RATE or not turns or (reported and is_off(evidence.item)):
+    if abs(rate - 1) <= SAME_RATE or not turns or _is_missed_by_any_clock(replay, number, evidence.item):
         return evidence
     why = (
         f"{rate:.3g} s passed for the vehicle in each second of the log, as in a simulation, so that its "
         "standstills are of other lengths; give the autopilot's own log"
     )
     return changed(evidence, answer="unknown", why=why)
+
+
+def _is_missed_by_any_clock(replay: Replay, number: int, item: StopComparison) -> bool:
+    """True if reports show a stop as missed whatever the lengths of standstills are.
+
+    A scan was reported elsewhere, or the stop as skipped. The robot may have stood at a stop that was jumped
+    over, unless no pose is within its tolerance.
+    """
+    if replay.inferred or item.outcome in DONE:
+        return not replay.inferred and is_off(item)
+    if item.outcome != "skipped" or not (item.reason or "").startswith(JUMPED_OVER):
+        return item.outcome == "skipped"
+    stop, poses = replay.mission.stops[number], replay.run.poses
+    away_m = np.hypot(*(poses.xy - (stop.x, stop.y)).T)
+    return bool(len(poses)) and is_outside(float(away_m.min()), stop.tolerance_m)
 
 
 def is_off(item: StopComparison) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -56,9 +57,11 @@ def test_stops_scanned_outside_their_tolerance_are_reported_and_not_driven_as_pl
     assert drive_verdict(replayed(path, wide)).exit_code == 0
 
 
-def stamped(path: Path, plan: Mission, faster: float, *, only: frozenset[str] | None = None) -> Path:
+def stamped(
+    path: Path, plan: Mission, faster: float, *, only: frozenset[str] | None = None, **conditions: Any
+) -> Path:
     """A log of a vehicle whose clock is so much faster than that of the station."""
-    rows = [row for row in heard(path, plan) if only is None or row[2].get_type() in only]
+    rows = [row for row in heard(path, plan, **conditions) if only is None or row[2].get_type() in only]
     begin = rows[0][0]
     told = [(begin + round((ns - begin) / faster), system, message) for ns, system, message in rows]
     return write_telemetry_log(path / "a.tlog", told)
@@ -86,6 +89,24 @@ def test_standstills_by_another_clock_are_undecided(
 def test_a_scan_that_was_reported_elsewhere_is_no_stop_by_any_clock(tmp_path: Path, faster: float) -> None:
     plan = mission()
     assert drive_verdict(replayed(stamped(tmp_path, plan, faster), plan)).answer == "no"
+
+
+def test_a_stop_that_was_reported_as_skipped_is_no_stop_by_any_clock(tmp_path: Path) -> None:
+    plan = mission(tolerance_m=0.4)
+    laid = replayed(stamped(tmp_path, plan, 5.0, faults=("scanner@2",)), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned", "skipped", "scanned"]
+    assert drive_verdict(laid).answer == "no"
+
+
+@pytest.mark.parametrize(("tolerance_m", "answer"), [(0.4, "no"), (3.0, "unknown")])
+def test_a_stop_that_was_jumped_over_is_none_by_any_clock_if_the_robot_was_not_there(
+    tmp_path: Path, tolerance_m: float, answer: str
+) -> None:
+    plan = mission(tolerance_m=tolerance_m)
+    orders = {0.5: dialect.MAVLink_mission_set_current_message(1, 1, item_of(plan, "S3"))}
+    laid = replayed(stamped(tmp_path, plan, 5.0, orders=orders), plan)
+    assert [item.outcome for item in laid.comparison.stops] == ["skipped", "skipped", "scanned"]
+    assert drive_verdict(laid).answer == answer
 
 
 def test_a_scan_that_failed_is_reported_and_the_drive_goes_on(tmp_path: Path) -> None:
