@@ -29,7 +29,8 @@ from stopgo.mission.errors import InputError
 
 LEASE_MS = 2000
 OPEN_S = 5.0
-LEAST_OPEN_S = 0.5
+OPEN_MARGIN_S = 0.5
+"""Time by which an attempt to connect outlasts the command that waits for it."""
 ALL_LINKED_S = 1.0
 """Wait of a station with several endpoints for all of them."""
 POLL_S = 0.02
@@ -133,13 +134,14 @@ def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
 def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_S) -> Iterator[ZenohLink]:
     """Open a station's link to `endpoint`; it is returned at once, and connects in the background.
 
-    Each attempt takes at most `open_s`; closing waits for the current one. There may be several endpoints,
-    with commas between them. The link waits a moment for all, so that two robots of one name both answer.
+    `open_s` is the time in which it is needed. Closing waits for the current attempt, so that one outlasts
+    this time a little: a second would have to be waited for whole. There may be several endpoints, with
+    commas between them. The link waits a moment for all, so that two robots of one name both answer.
     """
     endpoints = endpoints_in(endpoint)
     for one in endpoints:
         check_endpoint(one, guard, option="--connect")
-    opening = {"transport/unicast/open_timeout": round(max(LEAST_OPEN_S, open_s) * 1e3)}
+    opening = {"transport/unicast/open_timeout": round((open_s + OPEN_MARGIN_S) * 1e3)}
     with _opened({"mode": "peer", **_reaching(*endpoints), **opening}, endpoint, guard) as link:
         if len(endpoints) > 1:
             link.await_others(len(endpoints), ALL_LINKED_S)

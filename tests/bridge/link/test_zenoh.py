@@ -143,6 +143,23 @@ def test_a_slow_station_knows_that_nothing_was_sent(monkeypatch: pytest.MonkeyPa
         assert not station.link.may_be_sent
 
 
+def test_one_attempt_to_connect_outlasts_the_time_in_which_it_is_needed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Closing waits for the attempt that is under way: a second one doubled the time of a command."""
+    opened, configs = zenoh.open, []
+
+    def opening(config: zenoh.Config) -> zenoh.Session:
+        configs.append(config)
+        return opened(config)
+
+    monkeypatch.setattr(zenoh, "open", opening)
+    with connecting("tcp/127.0.0.1:1", open_s=2.0):
+        pass
+    attempt_s = int(configs[0].get_json("transport/unicast/open_timeout")) / 1e3
+    assert 2.0 < attempt_s <= 2.5
+
+
 @pytest.mark.parametrize("lost", [False, True])
 def test_a_question_that_left_may_be_sent(lost: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     endpoint, arrived = f"tcp/127.0.0.1:{free_port()}", threading.Event()
