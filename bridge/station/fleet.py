@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,10 +66,18 @@ def fleet(
                 raise
             return tuple(FleetMember(name, None, str(error)) for name in sorted(names))
         time.sleep(GATHER_S)
-        with ThreadPoolExecutor(max_workers=MOST_QUERIED) as pool:
-            found = pool.map(lambda name: _member(link, KeyExpressions(name, site), timeout_s, held), present)
-            members = (*found, *(FleetMember(name, None, "not found") for name in names - present))
-    return tuple(sorted(members, key=lambda member: member.robot))
+        found = _queried(present, lambda name: _member(link, KeyExpressions(name, site), timeout_s, held))
+    found |= {name: FleetMember(name, None, "not found") for name in names - found.keys()}
+    return tuple(found[name] for name in sorted(found))
+
+
+def _queried(present: set[str], member: Callable[[str], FleetMember]) -> dict[str, FleetMember]:
+    """Query every robot that is present, also those that the link finds meanwhile and adds to the set."""
+    found: dict[str, FleetMember] = {}
+    with ThreadPoolExecutor(max_workers=MOST_QUERIED) as pool:
+        while new := set(present) - found.keys():
+            found |= zip(new, pool.map(member, new), strict=True)
+    return found
 
 
 def _member(link: Link, keys: KeyExpressions, timeout_s: float, held: HeldKeys | None) -> FleetMember:

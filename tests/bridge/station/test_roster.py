@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.link import zenoh_link
+from stopgo.bridge.link.link import Request
 from stopgo.bridge.link.memory_link import MemoryLink
 from stopgo.bridge.station import fleet as fleets
 from stopgo.bridge.station.roster import read_roster
@@ -79,6 +80,26 @@ def test_a_roster_says_who_is_missed(
         [("r1", False), ("r7", True)],
     )
     assert status(capsys)[0] == 0
+
+
+def test_a_robot_that_comes_while_others_are_queried_is_queried_too(
+    field: Field, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """It was left out: neither found in time, nor missing from those that were found in the end."""
+    roster = tmp_path / "robots.toml"
+    roster.write_text('robots = ["r1", "r7"]')
+    answer = field.agent._info
+
+    def come(request: Request) -> bytes:
+        field.board.link().announce("sx/1/r7/alive")
+        return answer(request)
+
+    field.link.serve(field.keys.info, come)
+    code, robots = status(capsys, "--roster", str(roster))
+    assert (code, [(robot["robot"], robot["silent"]) for robot in robots]) == (
+        1, [("r1", False), ("r7", True)],
+    )  # fmt: skip
+    assert robots[1]["trouble"].startswith("found, but r7: no state received")
 
 
 def test_a_robot_that_left_for_good_is_forgotten(field: Field, capsys: pytest.CaptureFixture[str]) -> None:
