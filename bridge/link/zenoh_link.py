@@ -31,6 +31,8 @@ LEASE_MS = 2000
 OPEN_S = 5.0
 OPEN_MARGIN_S = 0.5
 """Time by which an attempt to connect outlasts the command that waits for it."""
+LONGEST_OPEN_S = 15.0
+"""Longest attempt to connect: TCP repeats ever more rarely, so a new attempt finds a robot sooner."""
 ALL_LINKED_S = 1.0
 """Wait of a station with several endpoints for all of them."""
 POLL_S = 0.02
@@ -141,7 +143,7 @@ def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_
     endpoints = endpoints_in(endpoint)
     for one in endpoints:
         check_endpoint(one, guard, option="--connect")
-    opening = {"transport/unicast/open_timeout": round((open_s + OPEN_MARGIN_S) * 1e3)}
+    opening = {"transport/unicast/open_timeout": round((min(open_s, LONGEST_OPEN_S) + OPEN_MARGIN_S) * 1e3)}
     with _opened({"mode": "peer", **_reaching(*endpoints), **opening}, endpoint, guard) as link:
         if len(endpoints) > 1:
             link.await_others(len(endpoints), ALL_LINKED_S)

@@ -67,6 +67,8 @@ COMMITS = 3
 """Largest number of commits of a push; each restart of the robot needs a new one."""
 BEGINNINGS = 5
 """Largest number of transfers of a push; each push of another mission ends the one before."""
+UNTIL_ANSWERED = ". A robot that does not answer may drive on later: --timeout 600 sends it until it does"
+"""Remedy for a pause or an abort without an answer."""
 PATIENCE_S = 20.0
 """Longest time of a push without an answer: on a lossy link, the connection may be opened again."""
 
@@ -417,7 +419,7 @@ class Station:
                 f" see stopgo status. It has expired, and has no effect later{self._distrusted()}"
             )
         if reply is None:
-            raise self._unanswered(order.verb)
+            raise self._unanswered(order.verb, UNTIL_ANSWERED if order.verb in FREE_VERBS else "")
         answer = read_answer(reply, order, robot=self.keys.robot)
         if answer.outcome == "refused":
             why = f"{answer.reason}: {answer.message}"
@@ -550,8 +552,8 @@ class Station:
             raise self._unanswered(what)
         return read_reply(reply, kind, robot=self.keys.robot, what=what)
 
-    def _unanswered(self, what: str) -> OutcomeUnknown:
+    def _unanswered(self, what: str, remedy: str = "") -> OutcomeUnknown:
         return OutcomeUnknown(
             f"{self.keys.robot}: no answer to {what} in time, its outcome is unknown;"
-            f" see stopgo status{self._distrusted()}"
+            f" see stopgo status{remedy}{self._distrusted()}"
         )

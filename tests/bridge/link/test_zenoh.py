@@ -154,10 +154,12 @@ def test_one_attempt_to_connect_outlasts_the_time_in_which_it_is_needed(
         return opened(config)
 
     monkeypatch.setattr(zenoh, "open", opening)
-    with connecting("tcp/127.0.0.1:1", open_s=2.0):
-        pass
-    attempt_s = int(configs[0].get_json("transport/unicast/open_timeout")) / 1e3
-    assert 2.0 < attempt_s <= 2.5
+    for open_s in (2.0, 600.0):
+        with connecting("tcp/127.0.0.1:1", open_s=open_s):
+            pass
+    usual_s, long_s = (int(one.get_json("transport/unicast/open_timeout")) / 1e3 for one in configs)
+    assert 2.0 < usual_s <= 2.5
+    assert long_s < 20.0, "a robot that is back after minutes would be found minutes later"
 
 
 @pytest.mark.parametrize("lost", [False, True])
