@@ -45,6 +45,7 @@ from stopgo.bridge.robot.reported_journal import ReportedJournal
 from stopgo.bridge.robot.runner import Runner, state_report
 from stopgo.bridge.robot.station_contact import StationContact
 from stopgo.mission import __version__
+from stopgo.mission.console.process import wait_for
 from stopgo.mission.document.decoding import converted
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import StateReport
@@ -191,7 +192,7 @@ class Agent:
         A robot whose controller has died must not look alive: its process ends, and the next boot finds
         the run paused.
         """
-        self._failed.wait()
+        wait_for(self._failed)
         if self._error is not None:
             raise self._error
 

@@ -24,6 +24,7 @@ from stopgo.bridge.station.session_socket import (
     has_unix_sockets,
     is_same_user,
 )
+from stopgo.mission.console.process import LOOK_S
 from stopgo.mission.errors import InputError
 
 MOST_COMMANDS = 16
@@ -49,8 +50,12 @@ class SharedSession:
 
     def serve(self, listener: socket.socket) -> None:
         """Serve commands until the process is ended."""
+        listener.settimeout(LOOK_S)
         while True:
-            connected, _ = listener.accept()
+            try:
+                connected, _ = listener.accept()
+            except TimeoutError:  # a signal that another thread got is handled now
+                continue
             if is_same_user(connected) and self._free.acquire(blocking=False):
                 threading.Thread(target=self._served, args=(connected,), daemon=True).start()
             else:

@@ -26,6 +26,8 @@ PIPE_CLOSED = 141
 """Exit code after a closed output pipe: 128 plus the number of SIGPIPE, which not every system has."""
 
 RAISED_AGAIN_S = 0.05
+LOOK_S = 0.5
+"""Interval at which a wait looks for signals."""
 
 
 class Signals:
@@ -68,6 +70,16 @@ class Signals:
         if number == signal.SIGINT:
             raise KeyboardInterrupt
         raise SystemExit(128 + number)
+
+
+def wait_for(event: threading.Event) -> None:
+    """Wait for an event in the main thread, without missing a signal that another thread got.
+
+    Such a signal ends no wait without a timeout, and is handled in the main thread alone. The system gives a
+    signal to any thread of a process that goes on after it was frozen.
+    """
+    while not event.wait(LOOK_S):
+        pass
 
 
 @contextmanager

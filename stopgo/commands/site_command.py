@@ -26,6 +26,7 @@ from stopgo.bridge.station.roster import (
     read_roster_vehicles,
     read_sightings,
 )
+from stopgo.mission.console.process import wait_for
 from stopgo.mission.console.table import printable
 
 PAGES = "Pages"
@@ -110,7 +111,7 @@ def site(
         typer.echo(
             "open it in a browser; it admits one, once. Ctrl-C ends the page, not the robots", err=True
         )
-        threading.Event().wait()
+        wait_for(threading.Event())
 
 
 def _expected(named: dict[str, Any], roster: Path | None) -> tuple[str, ...]:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 import stopgo
 import stopgo.command_line as front
+from stopgo.bridge.commands.spawn import start
 from tests.journeys.readme import ROOT
+from tests.ports import free_port
 
 RUN = """
 import os, signal, sys
@@ -57,6 +62,43 @@ def process(body: str, **options: object) -> subprocess.CompletedProcess[str]:
 def test_a_signal_closes_what_is_open(number: signal.Signals) -> None:
     done = process(f"with left_open():\n    hit({int(number)})\n    signal.pause()")
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "closed\n", "")
+
+
+FROM_ANOTHER_THREAD = """
+import threading, time
+from stopgo.mission.console.process import wait_for
+
+def later():
+    time.sleep(0.5)
+    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
+
+threading.Thread(target=later, daemon=True).start()
+with left_open():
+    wait_for(threading.Event())
+"""
+
+
+def test_a_signal_that_another_thread_got_ends_a_wait() -> None:
+    done = process(FROM_ANOTHER_THREAD)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + signal.SIGTERM, "closed\n", "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="tgkill is of Linux")
+@pytest.mark.parametrize("command", ["robot", "simulate"])
+def test_a_process_that_was_frozen_is_ended_by_one_signal(command: str, tmp_path: Path) -> None:
+    """The system gives a signal to any thread of a process that goes on."""
+    options = {
+        "robot": ("--name", "r1", "--state", str(tmp_path), "--listen", f"tcp/127.0.0.1:{free_port()}"),
+        "simulate": ("vehicle", "--mavlink", f"udpin:127.0.0.1:{free_port()}"),
+    }
+    running = start(command, *options[command], called=command)
+    try:
+        time.sleep(0.5)  # it is ready just before it waits
+        threads = [int(name) for name in os.listdir(f"/proc/{running.pid}/task")]
+        assert ctypes.CDLL(None).tgkill(running.pid, max(threads), signal.SIGTERM) == 0
+        assert running.wait(60) == 0
+    finally:
+        running.kill()
 
 
 def test_a_ctrl_c_before_the_command_line_is_loaded_has_its_line(

@@ -21,6 +21,7 @@ from stopgo.bridge.mavlink.simulated.vehicle_faults import read_vehicle_faults
 from stopgo.bridge.mavlink.vehicle_link.transport import open_transport
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.mavlink.vehicle_link.wire import MessageQueue, Who, Wire, read_link
+from stopgo.mission.console.process import wait_for
 from stopgo.mission.errors import InputError
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.enums import Component
@@ -58,7 +59,7 @@ def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
     url, key = read_link(options.url, options.signing_key, insecure=options.insecure, option=OPTION)
     with vehicle_on(url, setup_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
         ready(url)
-        stopped.wait()
+        wait_for(stopped)
     if stopped.error is not None:
         raise stopped.error
     raise SystemExit(1)  # its thread has printed why

@@ -20,6 +20,7 @@ from stopgo.bridge.link.link import Link, Presence
 from stopgo.bridge.mavlink.vehicle_link.frames import Frames, dialect
 from stopgo.bridge.mavlink.vehicle_link.messages import on_board_beat
 from stopgo.bridge.mavlink.vehicle_link.transport import Transport
+from stopgo.mission.console.process import wait_for
 from stopgo.mission.mavlink.enums import Component
 from stopgo.mission.mavlink.telemetry import Message
 
@@ -141,7 +142,7 @@ class Tunnel:
 
     def wait(self) -> None:
         """Wait until the tunnel ends, which happens only by an error; that is raised here."""
-        self._ended.wait()
+        wait_for(self._ended)
         if self._error is not None:
             raise self._error
 
