@@ -54,11 +54,18 @@ def end_if(trouble: str) -> None:
 class Engagement:
     """Control over one vehicle for a drive; `not_ready` says why it cannot drive at present.
 
-    The methods raise `DriveEnded` when the drive cannot go on.
+    `misplaced` says why its metres are not the mission's any more. The methods raise `DriveEnded` when the
+    drive cannot go on.
     """
 
     def __init__(
-        self, autopilot: OnboardAutopilot, *, clock: Clock, arms: bool, not_ready: Callable[[], str]
+        self,
+        autopilot: OnboardAutopilot,
+        *,
+        clock: Clock,
+        arms: bool,
+        not_ready: Callable[[], str],
+        misplaced: Callable[[], str],
     ) -> None:
         self._autopilot = autopilot
         self._peer = autopilot.peer
@@ -66,7 +73,7 @@ class Engagement:
         self._telemetry = autopilot.telemetry
         self._clock = clock
         self._arms = arms
-        self._not_ready = not_ready
+        self._not_ready, self._misplaced = not_ready, misplaced
         self._boots: int | None = None
         """Number of restarts when the vehicle was last driven."""
         self._last_position: Point | None = None
@@ -105,6 +112,7 @@ class Engagement:
             return True
         self._control.note_armed()
         end_if(self._control.mode_change() or self._control.disarming() or self._control.other_hands())
+        end_if(self._misplaced())
         self._last_position = self._telemetry.position()
         return was_late
 

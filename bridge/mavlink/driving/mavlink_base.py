@@ -34,7 +34,9 @@ class MavlinkBase:
     ) -> None:
         self._autopilot = autopilot
         self._frame = MissionFrame(autopilot.telemetry, autopilot.kind.rule)
-        self._engagement = Engagement(autopilot, clock=clock, arms=arm, not_ready=self.not_ready)
+        self._engagement = Engagement(
+            autopilot, clock=clock, arms=arm, not_ready=self.not_ready, misplaced=self._misplaced
+        )
         self._driver = PathDriver(autopilot, self._frame, self._engagement, patience)
         self._blocked_by = ""
 
@@ -79,13 +81,16 @@ class MavlinkBase:
             return unknown
         if self._autopilot.telemetry.origin() is None:
             return NO_ORIGIN
-        wrong = "" if self._frame.mission is None else self.unfit(self._frame.mission)
         return (
-            wrong
+            self._misplaced()
             or self._autopilot.control.other_control()
             or self._autopilot.telemetry.health().lasting(self._blocked_by)
             or self._engagement.disarmed()
         )
+
+    def _misplaced(self) -> str:
+        """Report that the vehicle cannot drive in the mission's frame, as when somebody moved its origin."""
+        return "" if self._frame.mission is None else self.unfit(self._frame.mission)
 
     def take_hold(self, why: str) -> bool:
         """Take the hold as known, for the run is paused for it; a failsafe then must end before a drive."""

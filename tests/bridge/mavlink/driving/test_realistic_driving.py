@@ -13,14 +13,18 @@ import pytest
 
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaultKind, VehicleFaults
 from stopgo.mission.document.schedule import schedule
+from stopgo.mission.errors import NegativeResult
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.run.events import Arrived, Held, Pose, PoseReport
 from stopgo.mission.run.route_position import foot
 from tests.bridge.mavlink.driving.world import (
+    SITE,
     cornered_mission,
     events_of,
     gateway,
     is_driving,
     is_state,
+    retried,
     rover,
     scanned,
     site_mission,
@@ -180,6 +184,27 @@ def test_a_vehicle_that_was_carried_while_it_restarted_is_not_driven_on(tmp_path
         held = until(reports, lambda report: isinstance(report, Held))
         assert "the autopilot was restarted and reports a position" in held.reason
         assert "check where it is" in held.reason
+
+
+def test_a_vehicle_whose_origin_is_moved_on_a_leg_is_held_until_it_is_back(tmp_path: Path) -> None:
+    """PX4 takes another origin at any time. Its metres then count from there, and so do its stops."""
+    moved = VehicleOrigin(lat=SITE.lat + 5e-6, lon=SITE.lon, alt=SITE.alt)
+    with rover(tmp_path, "px4") as (vehicle, operator), gateway(tmp_path, vehicle.url) as station:
+        station.push(site_mission())
+        station.command("start")
+        reports = station.reports()
+        until(reports, is_driving(0.5))
+        operator.peer.set_origin(moved)
+        held = until(reports, lambda report: isinstance(report, Held))
+        assert "0.56 m from the mission's" in held.reason
+        assert not scanned(station)
+        with pytest.raises(NegativeResult, match=r"0\.56 m from the mission's"):
+            station.command("retry")
+        operator.peer.set_origin(VehicleOrigin(lat=SITE.lat, lon=SITE.lon, alt=SITE.alt))
+        while not retried(station):
+            pass
+        until(reports, is_state("FINISHED"))
+        assert scanned(station) == ["s1", "s2"]
 
 
 def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) -> None:
