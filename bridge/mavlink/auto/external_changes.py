@@ -13,6 +13,7 @@ from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.following.progress_watch import STALLED_S
 from stopgo.mission.mavlink.following.steps import SOMEBODY, Observation
+from stopgo.mission.mavlink.local_frame import apart
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.states import Change, Run
 
@@ -30,6 +31,8 @@ class ExternalChanges:
         self._peer = peer
         self._observer = observer
         self._guard = guard
+        self._was_at_mission = False
+        """True while the vehicle has the mission's origin, or a run goes on that began with it."""
 
     def change(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
         """The change by somebody else, once the vehicle's mode has settled and is explained."""
@@ -42,10 +45,26 @@ class ExternalChanges:
             return self.changed_list(run, listed)
         return (
             self._begun_elsewhere(run, listed, observed)
+            or self._misplaced(run, listed, observed)
             or progress.taken_over(run, listed, observed, by=self._by(observed))
             or self._set_back(run, listed, observed)
             or self._stalled(run, listed, observed)
         )
+
+    def _misplaced(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+        """Hold the run of a vehicle whose origin was the mission's and was moved: positions count from there.
+
+        One that finds its position by satellites may have another origin from the start.
+        """
+        origin = self._observer.poses.origin
+        if origin is None:
+            return None
+        wrong = apart(listed.sent.origin, origin)
+        if not wrong or run.state != "RUNNING":
+            self._was_at_mission = not wrong
+        if not (wrong and self._was_at_mission and run.state == "RUNNING" and observed.drives):
+            return None
+        return runs.held(run, f"somebody has moved the vehicle's origin: {wrong}; then retry")
 
     def _set_back(self, run: Run, listed: ListedMission, observed: Observation) -> Change | None:
         """Hold the run of a vehicle whose item somebody has set back, to a leg that lies behind the run's."""

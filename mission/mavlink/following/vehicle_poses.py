@@ -43,6 +43,11 @@ class VehiclePoses:
         self._frame: tuple[ListedMission, VehicleOrigin, LocalFrame] | None = None
         self.fix: Fix | None = None
 
+    @property
+    def origin(self) -> VehicleOrigin | None:
+        """Origin of its local metres, as last reported."""
+        return None if self._origin is None else origin_of(self._origin)
+
     def pose(self, now_ns: int) -> Pose | None:
         """Return the pose, unless the last one is too old."""
         fix = self.fix

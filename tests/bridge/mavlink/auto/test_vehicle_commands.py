@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from stopgo.bridge.robot.answers import answer_to, remember_answer
 from stopgo.mission.document import Scan, with_digest
 from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Aborted, Pose, Resumed, Started
 from stopgo.mission.run.run_commands import RunCommand
@@ -162,6 +164,24 @@ def test_a_vehicle_with_satellites_may_count_from_anywhere(tmp_path: Path) -> No
         with site.reached(any_origin=True) as station:
             assert station.command("start").outcome == "ok"
             assert station.command("abort").outcome == "ok"
+
+
+def test_a_vehicle_whose_origin_is_moved_in_a_run_is_held_until_it_is_back(tmp_path: Path) -> None:
+    """PX4 takes another at any time: its waypoints are elsewhere then, and it reports them as reached."""
+    site = Site(tmp_path, "px4", speed_up=1.0)
+    assert site.origin is not None
+    there = VehicleOrigin(lat=site.origin.lat, lon=site.origin.lon, alt=site.origin.alt)
+    with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
+        site.order("start")
+        until(site, lambda events, run: run.stop_state == "NAVIGATING")
+        peer.set_origin(replace(there, lat=there.lat + 5e-6))
+        until(site, lambda events, run: run.state == "HELD")
+        assert "somebody has moved the vehicle's origin" in site.run.reason
+        assert "0.56 m from the mission's" in site.run.reason and not site.run.done
+        assert "wrong_origin" in refused(site, "retry")
+        peer.set_origin(there)
+        assert site.order("retry").state == "RUNNING"
+    assert site.run.done == ("S1", "S2", "S3")
 
 
 def test_a_vehicle_that_stands_elsewhere_is_not_started(tmp_path: Path) -> None:
