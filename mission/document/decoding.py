@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from typing import Any, TypeVar
 
@@ -11,6 +12,12 @@ K = TypeVar("K")
 
 _PREPARING = threading.RLock()
 _PREPARED: dict[Any, msgspec.json.Decoder[Any]] = {}
+if hasattr(
+    os, "register_at_fork"
+):  # a fork while another thread prepares a kind would leave it locked for ever
+    os.register_at_fork(
+        before=_PREPARING.acquire, after_in_parent=_PREPARING.release, after_in_child=_PREPARING.release
+    )
 
 
 def decoder_of(kind: Any) -> msgspec.json.Decoder[Any]:
@@ -46,15 +53,18 @@ def unpacked(data: bytes, kind: type[K]) -> K:
 def converted(values: object, kind: type[K], *, from_attributes: bool = False) -> K:
     """Return the object that these values describe; raises `msgspec.ValidationError` if they do not."""
     decoder_of(kind)
-    return msgspec.convert(values, kind, from_attributes=from_attributes)
+    try:
+        return msgspec.convert(values, kind, from_attributes=from_attributes)
+    except UnicodeError as error:
+        raise msgspec.ValidationError(str(error)) from None
 
 
 def _of_one_error(decode: Any, document: Any) -> Any:
-    """Decode; bytes that are no text, brackets nested too deeply (also in ignored parts), and database values
-    that are neither text nor bytes raise other errors by themselves."""
+    """Decode; what is no UTF-8, brackets nested too deeply (also in ignored parts), and database values that
+    are neither text nor bytes raise other errors by themselves."""
     try:
         return decode(document)
-    except (UnicodeDecodeError, TypeError) as error:
+    except (UnicodeError, TypeError) as error:
         raise msgspec.DecodeError(str(error)) from None
     except RecursionError:
         raise msgspec.DecodeError("it is nested too deeply") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from typing import Any
@@ -65,7 +66,7 @@ class Point(msgspec.Struct):
 @pytest.mark.parametrize(
     "document",
     [
-        b"\xff\xfe", b'{"x": 1, "of": "\xff"}', b"", b"{", b'{"x": "one"}', b'{"of": ""}', None, 5,
+        b"\xff\xfe", b'{"x": 1, "of": "\xff"}', b"", "\ud800", b"{", b'{"x": "one"}', b'{"of": ""}', None, 5,
         b'{"x": 1, "more": ' + b"[" * 20_000, b"[" * 20_000,
     ],
 )  # fmt: skip
@@ -74,6 +75,41 @@ def test_every_fault_is_one_kind_of_error(document: Any) -> None:
         decoded(document, Point)
     with pytest.raises(msgspec.DecodeError):
         unpacked(document, Point)
+
+
+@pytest.mark.parametrize("values", ["\ud800", {"x": "\ud800"}])
+def test_values_that_are_no_text_are_no_traceback(values: Any) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        converted(values, dict[str, float])
+
+
+FORKED = """
+import os, signal, sys, threading, time
+from stopgo.mission.document import decoding
+
+held, forking = threading.Event(), threading.Event()
+
+def prepare():
+    with decoding._PREPARING:
+        held.set()
+        forking.wait()
+        time.sleep(0.2)
+
+threading.Thread(target=prepare).start()
+held.wait()
+forking.set()
+if process := os.fork():
+    sys.exit(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+signal.alarm(20)
+decoding.decoded(b"{}", dict[str, int])
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="without fork there is no such process")
+def test_a_process_that_is_forked_while_a_thread_prepares_a_kind_decodes() -> None:
+    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_what_is_whole_is_decoded() -> None:
