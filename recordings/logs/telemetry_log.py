@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import struct
+from array import array
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -46,6 +47,8 @@ SIGNED = 1
 OLDEST_US, NEWEST_US = 10**14, 4 * 10**15
 """Range of valid time stamps, 1973 to 2096: it distinguishes a packet from similar bytes."""
 TICK_EVERY = 50_000
+MOST_LOOKS = 1000
+"""Times that go back, for which a repeated range is searched: each search takes the whole log."""
 STATIONS = 250
 """Least system number of ground stations."""
 DECODED = (
@@ -142,6 +145,8 @@ class _FrameScan:
         self.lost_bytes = self.size = self.tail_bytes = 0
         self.clock_lines: list[str] = []
         """Steps of the station's clock, one line each."""
+        self.repeated = 0
+        """Packets that are in the log again."""
 
     @property
     def lost(self) -> str:
@@ -150,6 +155,8 @@ class _FrameScan:
     @property
     def oddities(self) -> tuple[str, ...]:
         steps = tuple(self.clock_lines)
+        if self.repeated:
+            steps = (*steps, f"{self.repeated} packets are in the log twice, with their times; left out")
         if not self.tail_bytes:
             return steps
         text = f"the last packet is truncated ({self.tail_bytes} bytes), as when a station is switched off"
@@ -180,7 +187,8 @@ class _FrameScan:
 
     def _stamped_packets(self) -> Iterator[Packet]:
         with self._path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
-            self.size, self.lost_bytes = len(data), 0
+            self.size, self.lost_bytes, self.repeated = len(data), 0, 0
+            repeated = _RepeatedRanges(data)
             at = steps = 0
             synchronised = False
             while at + STAMP < len(data):
@@ -195,10 +203,53 @@ class _FrameScan:
                     at, synchronised = at + 1, False
                     self.lost_bytes += 1
                     continue
-                yield packet
+                if repeated.has(at, end, packet.ns):
+                    self.repeated += 1
+                else:
+                    yield packet
                 at, synchronised, steps = end, True, steps + 1
                 if steps % TICK_EVERY == 0:
                     self._tick(at / self.size)
+
+
+class _RepeatedRanges:
+    """Ranges of a log that follow in it again, byte by byte with their times, as in overlapping parts.
+
+    A restart would be seen there, and the vehicle's progress since then be lost.
+    """
+
+    def __init__(self, data: mmap) -> None:
+        self._data = data
+        self._stamps, self._begins, self._ends = array("q"), array("q"), array("q")
+        """Times of the packets that are no repetition, and where they are."""
+        self._next: int | None = None
+        """Packet that the next one of a repeated range equals."""
+        self._looks = MOST_LOOKS
+
+    def has(self, begin: int, end: int, ns: int) -> bool:
+        """Return True if a packet, stamp included, is a repetition; else remember it."""
+        known = self._next
+        if known is None or not self._equals(known, begin, end):
+            known = self._begin_of_range(begin, end, ns)
+        self._next = None if known is None else known + 1
+        if known is not None:
+            return True
+        for column, value in ((self._stamps, ns), (self._begins, begin), (self._ends, end)):
+            column.append(value)
+        return False
+
+    def _begin_of_range(self, begin: int, end: int, ns: int) -> int | None:
+        """Return the packet that one equals whose time lies far back."""
+        if not self._stamps or ns > self._stamps[-1] - STEP_NS or not self._looks:
+            return None
+        self._looks -= 1
+        same = np.flatnonzero(np.array(self._stamps) == ns)
+        return next((known for known in same.tolist() if self._equals(known, begin, end)), None)
+
+    def _equals(self, known: int, begin: int, end: int) -> bool:
+        if known >= len(self._stamps):
+            return False
+        return self._data[self._begins[known] : self._ends[known]] == self._data[begin:end]
 
 
 def _with_next(packets: Iterator[Packet]) -> Iterator[tuple[Packet, Packet | None]]:

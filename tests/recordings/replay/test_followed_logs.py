@@ -109,6 +109,19 @@ def test_a_stop_that_was_jumped_over_is_none_by_any_clock_if_the_robot_was_not_t
     assert drive_verdict(laid).answer == answer
 
 
+@pytest.mark.parametrize("again", [(26.0, 35.0), (0.0, 999.0), (10.0, 30.0)])
+def test_a_range_that_is_in_the_log_twice_counts_once(tmp_path: Path, again: tuple[float, float]) -> None:
+    """As in parts that overlap: it was a restart, after which the stop seemed to be elsewhere."""
+    plan = mission(tolerance_m=0.4)
+    rows = heard(tmp_path, plan)
+    seconds = [(ns - rows[0][0]) / 1e9 for ns, _, _ in rows]
+    first, end = (sum(second < limit for second in seconds) for limit in again)
+    path = write_telemetry_log(tmp_path / "a.tlog", [*rows[:end], *rows[first:end], *rows[end:]])
+    laid = replayed(path, plan)
+    assert told(laid.run.events).count("Paused") == 0 and drive_verdict(laid).answer == "yes"
+    assert any(f"{end - first} packets are in the log twice" in line for line in laid.log.oddities)
+
+
 def test_a_scan_that_failed_is_reported_and_the_drive_goes_on(tmp_path: Path) -> None:
     plan = mission()
     laid = replayed(logged(tmp_path / "auto.tlog", plan, faults=("scanner@2",)), plan)
