@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import IO
@@ -50,10 +50,11 @@ def open_journal(directory: Path, robot: str) -> Iterator[Journal]:
 
 
 @contextmanager
-def shared_journal(directory: Path, robot: str) -> Iterator[Journal]:
+def shared_journal(directory: Path, robot: str | None) -> Iterator[Journal]:
     """Open the journal together with other processes that call this; `open_journal` is excluded meanwhile.
 
-    A write that depends on a read belongs into one `transaction` with it.
+    `robot` is its owner; `None` opens that of any. A write that depends on a read belongs into one
+    `transaction` with it.
     """
     with _open_lock(directory, "lock") as lock, _open_lock(directory, "opening") as opening:
         _lock(lock.fileno(), directory, shared=True)
@@ -63,6 +64,16 @@ def shared_journal(directory: Path, robot: str) -> Iterator[Journal]:
         with _opened(directory, robot) as journal:
             locks.flock(opening.fileno(), locks.LOCK_UN)
             yield journal
+
+
+def owner_of(directory: Path) -> str | None:
+    """Return the robot that a state directory belongs to; `None` if it has no journal that can be read."""
+    if not (directory / "journal.sqlite").is_file():
+        return None
+    with suppress(InputError), shared_journal(directory, None) as journal:
+        owner = journal.fact("owner", Owner)
+        return None if owner is None else owner.robot
+    return None
 
 
 def _note_process(lock: int, directory: Path) -> None:
@@ -83,7 +94,7 @@ def _open_lock(directory: Path, name: str) -> IO[str]:
 
 
 @contextmanager
-def _opened(directory: Path, robot: str) -> Iterator[Journal]:
+def _opened(directory: Path, robot: str | None) -> Iterator[Journal]:
     path = directory / "journal.sqlite"
     reserve = Reserve(directory / "reserve")
     reserve.release_if_needed()
@@ -99,13 +110,18 @@ def _opened(directory: Path, robot: str) -> Iterator[Journal]:
 
 
 def _verified(
-    path: Path, robot: str, connection: sqlite3.Connection, newest: NewestTransaction, reserve: Reserve
+    path: Path,
+    robot: str | None,
+    connection: sqlite3.Connection,
+    newest: NewestTransaction,
+    reserve: Reserve,
 ) -> Journal:
     try:
         rows = JournalRows(connection, newest, reserve)
         rows.verify()
         journal = Journal(rows)
-        _claim(journal, path.parent, robot)
+        if robot is not None:
+            _claim(journal, path.parent, robot)
     except NewerJournal as newer:
         raise InputError(f"{path}: {newer}") from None
     except (DamagedRow, UnicodeDecodeError) as error:

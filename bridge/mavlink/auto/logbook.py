@@ -24,7 +24,7 @@ from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
 from stopgo.bridge.mavlink.auto.vehicle_boots import VehicleBoots
 from stopgo.bridge.mavlink.vehicle_link.url import Url
 from stopgo.bridge.robot.journal import Journal
-from stopgo.bridge.robot.journal_file import shared_journal
+from stopgo.bridge.robot.journal_file import owner_of, shared_journal
 from stopgo.mission.console.state_folder import state_folder
 from stopgo.mission.document import Mission
 from stopgo.mission.document.decoding import decoded, unpacked
@@ -288,9 +288,10 @@ def usual_folder(url: Url, vehicle: int) -> Path:
 
 
 def recorded_vehicles(url: Url, state: Path | None = None) -> tuple[int, ...]:
-    """System ids of the vehicles at `url` that have a usual folder; none for a folder that the user named."""
+    """System ids of the vehicles at `url` with a usual folder, or of the vehicle of a named folder."""
     if state is not None:
-        return ()
+        owner, stem = owner_of(state) or "", name_of(0).removesuffix("0")
+        return (int(end),) if (end := owner.removeprefix(stem)).isdecimal() and end != owner else ()
     folder = usual_folder(url, 0)
     stem = folder.name.removesuffix("0")
     ends = (path.name.removeprefix(stem) for path in folder.parent.glob(f"{stem}*"))

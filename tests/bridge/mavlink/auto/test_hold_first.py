@@ -242,6 +242,17 @@ def test_a_silent_vehicle_leaves_a_stop_unknown(tmp_path: Path) -> None:
     assert "nothing was sent" not in said.stderr
 
 
+def test_a_silent_vehicle_gets_hold_by_the_record_in_its_named_folder(
+    tmp_path: Path, frames: list[Message]
+) -> None:
+    """A link may be blocked in one direction only; nothing was sent without --vehicle."""
+    site = Site(tmp_path, "ardupilot")
+    folder = str(site.folder / "station")
+    said = stopgo("pause", "--mavlink", str(site.url), "--state", folder, "--timeout", "1")
+    assert said.returncode == 3 and "HOLD was sent to vehicle 1" in said.stderr
+    assert is_hold(frames[0])
+
+
 def test_a_stop_where_nothing_was_ever_found_is_not_said_to_be_sent(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
     said = stopgo("pause", "--mavlink", str(site.url), "--state", str(tmp_path / "other"), "--timeout", "1")
