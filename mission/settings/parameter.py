@@ -162,7 +162,7 @@ class Parameter:
         return (tuple(map(self._read, text)) or None) if self.repeatable else self._read(text)
 
     def as_option(self, value: Any) -> Any:
-        """A value with its texts read as on the command line; whatever is none, or no file's, stays as it is."""
+        """A value with its texts read as on the command line; what is no text, or a file, stays as it is."""
         if not self.form or self.form == "FILE":
             return value
         try:
