@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from stopgo.batches.batch_file import read_day
 from stopgo.batches.batch_run import Batch
 from stopgo.batches.day_page import Day, begin_of, write_day
-from stopgo.batches.day_plan import DayJob, DayRobot, plan_day, read_transfers, robots_of, span
+from stopgo.batches.day_plan import DayJob, DayPlan, DayRobot, plan_day, read_transfers, robots_of, span
 from stopgo.batches.record import BatchRecord, EntryRecord
 from stopgo.batches.visits import Visits
+from stopgo.mission.console.table import counted
 from stopgo.mission.errors import InputError
+
+MOST_NAMES = 12
+"""Floors and plans named in a note."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,8 @@ def read_team(file: Path) -> DayTeam:
 
 def write_day_of(
     team: DayTeam, out: Path, date: str, batch: Batch, record: BatchRecord, visits: Visits
-) -> Path:
-    """Allocate the missions of a day to the robots of a batch's file; returns the overview's path.
+) -> tuple[Path, list[str]]:
+    """Allocate the missions of a day to the robots of a batch's file; returns the overview's path and notes.
 
     They are those of the entries with this date, and of those without a date.
 
@@ -76,7 +80,25 @@ def write_day_of(
         acquired=acquired,
         begun={item.name: text for item in due if (text := _begun(item, visits))},
     )
-    return write_day(out / "days" / date, day)
+    return write_day(out / "days" / date, day), [*_unknown_places(team, sites.values()), *_left(plan)]
+
+
+def _unknown_places(team: DayTeam, sites: Iterable[str]) -> Iterator[str]:
+    """Notes on robots that begin at a floor that neither the batch nor the transfers have."""
+    known = {*sites, *(end for pair in team.transfers for end in pair)}
+    for robot in team.robots:
+        if robot.at and robot.at not in known:
+            floors = ", ".join(sorted(known)[:MOST_NAMES])
+            yield f"[day]: {robot.name} is at {robot.at}, which is no floor here; known: {floors}"
+
+
+def _left(plan: DayPlan) -> list[str]:
+    """A note on the plans that fit into no shift."""
+    if not plan.left:
+        return []
+    names = ", ".join(job.name for job in plan.left[:MOST_NAMES])
+    more = f" and {len(plan.left) - MOST_NAMES} more" if len(plan.left) > MOST_NAMES else ""
+    return [f"{counted(len(plan.left), 'plan fits', 'plans fit')} into no shift: {names}{more}"]
 
 
 def _one_variant(sites: list[str], date: str) -> None:

@@ -159,7 +159,9 @@ def _run_command(call: BatchCall) -> int:
     record = _run(batch, call.workers, call.scheduler, call.store_gb)
     note_missions(out, visits, entries, record.entries)
     if call.day is not None and team is not None:
-        notice(f"{call.day}: {write_day_of(team, out, call.day, batch, record, visits)}")
+        overview, notes = write_day_of(team, out, call.day, batch, record, visits)
+        for line in (*notes, overview):
+            notice(f"{call.day}: {line}")
     _print_record(record, out, as_json=call.as_json)
     return max(record.exit_code, faults)
 

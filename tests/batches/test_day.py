@@ -172,6 +172,7 @@ def test_a_day_has_a_page_for_each_robot(tmp_path: Path, monkeypatch: pytest.Mon
     assert done.returncode == 0, done.stderr
     folder = out / "days" / "2026-11-25"
     assert str(folder / "index.html") in done.stderr
+    assert "no shift" not in done.stderr
     robots = json.loads((folder / "day.json").read_text())["robots"]
     assert [len(item["missions"]) for item in robots] == [2, 0]
     assert "stopgo push" in (folder / "r1.html").read_text()
@@ -214,7 +215,12 @@ def test_a_floor_is_acquired_when_all_missions_of_its_plan_are() -> None:
 
 def test_a_fault_of_the_day_is_known_before_anything_is_planned(tmp_path: Path) -> None:
     hall(tmp_path / "a.dxf")
-    for day in ('robots = [{ name = "r1", shift = "-1h" }]', "robots = []", 'begin = "25:00"\nrobots = []'):
+    for day in (
+        'robots = [{ name = "r1", shift = "-1h" }]',
+        "robots = []",
+        'robots = [{ name = "" }]',
+        'begin = "25:00"\nrobots = []',
+    ):
         batch_file(tmp_path, f'[day]\n{day}\n[[floors]]\nfiles = "a.dxf"')
         done = called(
             "batch", str(tmp_path / "plans.toml"), "-o", str(tmp_path / "out"), "--day", "2026-11-25"
@@ -222,6 +228,20 @@ def test_a_fault_of_the_day_is_known_before_anything_is_planned(tmp_path: Path) 
         assert (done.returncode, done.stderr.count("\n")) == (2, 1)
         assert "[day]" in done.stderr
         assert not (tmp_path / "out" / "a").exists()
+
+
+def test_what_a_day_leaves_and_a_place_that_is_none_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They were on the page only, and a robot at a misspelt floor had the usual way to each."""
+    monkeypatch.setattr(engine, "LocalEngine", lambda workers: InlineEngine(workers, work))
+    hall(tmp_path / "a.dxf")
+    day = '[day]\nrobots = [{ name = "r1", shift = "1min", at = "b" }]\n'
+    batch_file(tmp_path, day + '[[floors]]\nfiles = "*.dxf"')
+    done = called("batch", str(tmp_path / "plans.toml"), "-o", str(tmp_path / "out"), "--day", "2026-11-25")
+    assert done.returncode == 0, done.stderr
+    assert "2026-11-25: 1 plan fits into no shift: a\n" in done.stderr
+    assert "[day]: r1 is at b, which is no floor here; known: a\n" in done.stderr
 
 
 def test_a_time_without_quotes_begins_a_day(tmp_path: Path) -> None:
