@@ -62,7 +62,7 @@ class RigidFit:
         if len(self.residuals) == 2:
             return "two points cannot show a mistake: add a third"
         if self.width_m < LEAST_WIDTH * self.spread_m:
-            return "points on one line cannot show that the map is mirrored: add one beside it"
+            return "points on one line cannot show that the map is mirrored: add one off that line"
         return ""
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 FORM = "write X,Y=MAPX,MAPY in metres, such as 2.5,3=12.1,-4.7"
 FARTHEST = 1e7
+REMEDY = "are they in the same order, and each noted where the robot stood? Remove what is wrong"
 
 
 def align(
@@ -48,7 +49,6 @@ def align(
 
     Example: stopgo align --pair 0,0=12.10,-4.70 --pair 8,0=20.06,-3.91 --pair 8,6=19.47,2.06
     """
-    from stopgo.mission.files.mission_text import json_text
     from stopgo.mission.frames.rigid_fit import rigid_fit
 
     if (mission is None) != (out is None):
@@ -58,18 +58,21 @@ def align(
         raise InputError(f"no points given; name a CSV file, or use --pair: {FORM}")
     site, there = _arrays(points)
     fit = rigid_fit(site, there)
-    apart = fit.is_doubtful
-    written = None if apart or mission is None or out is None else _with_transform(mission, out, fit)
-    report = _report(fit, points, written)
-    typer.echo(json_text(report) if as_json else _text(fit, points, written))
-    if apart:
-        raise NegativeResult(
-            f"the points fit within {fit.rms_m:.2f} m only (root mean square); are they in the same order, "
-            "and each noted where the robot stood? Remove what is wrong"
-        )
+    written = (
+        None if out is None or mission is None or fit.is_doubtful else _with_transform(mission, out, fit)
+    )
+    _print_fit(fit, points, written, as_json=as_json)
+    if fit.is_doubtful:
+        raise NegativeResult(f"the points fit within {fit.rms_m:.2f} m only (root mean square); {REMEDY}")
 
 
 PointPair = tuple[float, float, float, float]
+
+
+def _print_fit(fit: RigidFit, points: Sequence[PointPair], written: str | None, *, as_json: bool) -> None:
+    from stopgo.mission.files.mission_text import json_text
+
+    typer.echo(json_text(_report(fit, points, written)) if as_json else _text(fit, points, written))
 
 
 def _pair(text: str) -> PointPair:

@@ -166,8 +166,7 @@ def replay(
     placing = replace(_placing(map_, align, time_offset, poses, robot_name), level_m=_height(floor_height))
     plans = _plans(plan, driven[0])
     replays = files.compare_and_write(_replays(read, driven, placing, plans, one_run=one_run), plans, driven)
-    code = _print_replays(replays, as_json=json_)
-    return 1 if _print_not_driven(driven, replays) else code
+    return _print_replays(replays, driven, as_json=json_)
 
 
 @dataclass(frozen=True)
@@ -368,7 +367,7 @@ def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:
         typer.echo(printable_lines("\n".join(map(listing.as_text, logs))))
 
 
-def _print_replays(replays: list[Replay], *, as_json: bool) -> int:
+def _print_replays(replays: list[Replay], missions: list[Mission], *, as_json: bool) -> int:
     """Print the comparisons; return the exit code of all."""
     from stopgo.recordings.replay import replay_text
 
@@ -376,7 +375,7 @@ def _print_replays(replays: list[Replay], *, as_json: bool) -> int:
         _print_json([replay_text.as_json(item) for item in replays], "replays")
     else:
         typer.echo("\n\n".join(map(replay_text.as_text, replays)))
-    return _exit_code(replays)
+    return 1 if _print_not_driven(missions, replays) else _exit_code(replays)
 
 
 def _print_not_driven(missions: list[Mission], replays: list[Replay]) -> bool:
