@@ -15,6 +15,7 @@ import msgspec
 
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.mission.console.state_folder import state_folder
+from stopgo.mission.console.whole_file import must_end
 from stopgo.mission.document.decoding import converted, decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
@@ -118,6 +119,7 @@ def read_roster_vehicles(path: Path) -> dict[str, RosterVehicle]:
     InputError
         Names the file, the vehicle, and its error.
     """
+    must_end(path)  # the file is read twice
     robots, given = read_roster(path), read_toml(path).get("vehicles", {})
     if not isinstance(given, dict):
         raise InputError(f"{path}: vehicles must be tables, as in [vehicles.rover]")

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, digest_of
 from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import bytes_of
@@ -81,6 +81,7 @@ class CoverageSurface(msgspec.Struct, frozen=True):
 class CoverageOf(msgspec.Struct, frozen=True):
     id: str
     digest: str
+    revision: int = 1
 
 
 class CoverageFloor(msgspec.Struct, frozen=True):
@@ -127,11 +128,18 @@ def _check_mission(of: CoverageOf, mission: Mission, path: Path) -> None:
             f"{path}: is the coverage of mission {of.id}, not of {mission.id}; "
             "give the file that was written with the mission"
         )
-    if of.digest != mission.digest:
+    if of.digest != mission.digest and not _is_placed_since(of, mission):
         raise InputError(
             f"{path}: is the coverage of another revision (digest {of.digest[:12]}…, the mission has "
             f"{mission.digest[:12]}…); give the file that was written with the mission"
         )
+
+
+def _is_placed_since(of: CoverageOf, mission: Mission) -> bool:
+    """True if the mission differs by its place in a robot's map alone, as `stopgo align` sets it."""
+    unplaced = msgspec.structs.replace(mission.frame, to_map=None)
+    before = msgspec.structs.replace(mission, frame=unplaced, revision=of.revision)
+    return mission.frame.to_map is not None and digest_of(before) == of.digest
 
 
 def coverage_json(

@@ -21,24 +21,30 @@ def read_settings(
 ) -> Settings:
     """Settings from plan.toml (if given) and then `overrides`; both are checked.
 
-    A parameter may have the name that missions give it, or the word that people use for it. `notify` gets a
-    line for every key of plan.toml that has a newer name.
+    A parameter may have the name that missions give it, or the word that people use for it. Its value may be
+    a text as on the command line, such as `30min`. `notify` gets a line for every key of plan.toml that has
+    a newer name.
 
     Raises
     ------
     InputError
         Naming the file or option, the key, the value and what would be right.
     """
+    values = {} if path is None else _values_of(path, notify)
+    for key, value in overrides.items():
+        if key not in _NAMES:
+            raise _unknown(key)
+        if value is not None:
+            values[_NAMES[key]] = value
+    return _checked({name: PARAMETERS[name].as_option(value) for name, value in values.items()}, path)
+
+
+def _checked(values: dict[str, Any], path: Path | None = None) -> Settings:
+    """Settings with these values by their names in missions, of the right types and within their limits."""
     import msgspec
 
     from stopgo.mission.document.decoding import converted
 
-    values = {} if path is None else _values_of(path, notify)
-    for key, value in overrides.items():
-        if key not in _NAMES:
-            raise InputError(f"{key}: no such parameter; known: {', '.join(_known())}")
-        if value is not None:
-            values[_NAMES[key]] = value
     try:
         typed = converted(values, Settings)
     except msgspec.ValidationError as error:
@@ -62,7 +68,15 @@ def recorded_settings(parameters: dict[str, Any]) -> Settings:
         As in `read_settings`.
     """
     earlier = {"register": bool(parameters.get("overlap")), "max_incidence": ANY_INCIDENCE}
-    return read_settings(None, {**earlier, **parameters})
+    values = {key: value for key, value in {**earlier, **parameters}.items() if value is not None}
+    for key in values:
+        if key not in _NAMES:
+            raise _unknown(key)
+    return _checked({_NAMES[key]: value for key, value in values.items()})
+
+
+def _unknown(key: str) -> InputError:
+    return InputError(f"{key}: no such parameter; known: {', '.join(_known())}")
 
 
 _NAMES = {**{item.key: name for name, item in PARAMETERS.items()}, **{name: name for name in PARAMETERS}}

@@ -22,6 +22,8 @@ WGS84_A = 6_378_137.0
 WGS84_E2 = 6.69437999014e-3
 REACH_M = 20_000.0
 """Metres from the origin beyond which a plane is no usable map of the earth."""
+LATITUDE_LIMIT = 89.0
+"""Degrees beyond which a site has no east and north: its meridians meet."""
 _CLOSE = 1e-13
 """Degrees (0.01 µm) within which an inverse is exact."""
 

@@ -21,6 +21,10 @@ MIRRORED = 1.01
 """Factor by which points of a mirrored map fit better mirrored; noise of collinear points stays below."""
 LARGEST_SCALE = 0.02
 """Scale off 1 by more than this: other units, or points that do not belong together."""
+LARGEST_RMS_M = 0.5
+"""Residuals up to this, or `LARGEST_SCALE` of the points' spread, are those of maps that drift."""
+LEAST_WIDTH = 0.02
+"""Points nearer to one line than this fraction of their spread cannot show that a map is mirrored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +36,10 @@ class RigidFit:
     """Residual of each pair in metres (n,); all 0 for two pairs of the same distance."""
     scale: float
     """Distance ratio of the second points to the first; reported, not applied."""
+    spread_m: float
+    """Root mean square distance of the first points from their middle."""
+    width_m: float
+    """Root mean square distance of the first points from the line along them."""
 
     @property
     def rms_m(self) -> float:
@@ -42,6 +50,20 @@ class RigidFit:
     def max_m(self) -> float:
         """The largest residual."""
         return float(self.residuals.max())
+
+    @property
+    def is_doubtful(self) -> bool:
+        """True if the residuals are those of points that were exchanged or noted wrongly."""
+        return self.rms_m > max(LARGEST_RMS_M, LARGEST_SCALE * self.spread_m)
+
+    @property
+    def unshown(self) -> str:
+        """Return in words a mistake that these points cannot show; empty if there is none."""
+        if len(self.residuals) == 2:
+            return "two points cannot show a mistake: add a third"
+        if self.width_m < LEAST_WIDTH * self.spread_m:
+            return "points on one line cannot show that the map is mirrored: add one off that line"
+        return ""
 
 
 def rigid_fit(first: FloatArray, second: FloatArray) -> RigidFit:
@@ -71,7 +93,9 @@ def rigid_fit(first: FloatArray, second: FloatArray) -> RigidFit:
     if _is_mirrored(a, b, math.hypot(along, across)):
         raise InputError("the map is mirrored: exchange its x and y, or change the sign of one of them")
     transform = least_squares(first, second)
-    return RigidFit(transform, frozen(np.hypot(*(transform.points(first) - second).T)), scale)
+    residuals = frozen(np.hypot(*(transform.points(first) - second).T))
+    width = float(np.linalg.svd(a, compute_uv=False)[1]) / math.sqrt(len(a))
+    return RigidFit(transform, residuals, scale, spread, width)
 
 
 def least_squares(first: FloatArray, second: FloatArray, weight: FloatArray | None = None) -> Transform:

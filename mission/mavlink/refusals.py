@@ -9,6 +9,7 @@ from stopgo.mission.console.table import counted
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import InputError, NegativeResult
+from stopgo.mission.frames.geodesy import LATITUDE_LIMIT
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.fields import as_sent
@@ -20,8 +21,6 @@ LONGEST_SCRIPT_S = 255
 """NAV_SCRIPT_TIME keeps its timeout in a uint8."""
 LARGEST_SCRIPT_NUMBER = 32_767
 """NAV_SCRIPT_TIME keeps the stop's number in an int16."""
-LATITUDE_LIMIT = 89.0
-"""Degrees beyond which the autopilots' own rules of longitude no longer hold."""
 
 
 def origin_of(mission: Mission) -> SiteOrigin:

@@ -252,7 +252,9 @@ class PlanProof:
     areas: tuple[ProvenArea, ...] = ()
     """By kind, if rays were cast at the model's solids."""
     accuracy_mm: float | None = None
-    """Required accuracy; None if none is required."""
+    """Required accuracy; None if none is required of this mission alone."""
+    accuracy_of_more: bool = False
+    """True if an accuracy is required of these scans together with those of other missions."""
 
     @cached_property
     def unmet(self) -> tuple[str, ...]:

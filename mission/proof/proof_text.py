@@ -184,6 +184,8 @@ def network_words(proof: PlanProof) -> list[str]:
         )
     if network.registered:
         lines += error_words(proof)
+    if proof.accuracy_of_more:
+        lines.append("the required accuracy is of these and other missions' scans together: not compared")
     if not network.closed:
         lines += [f"connected: {', '.join(piece)}" for piece in network.pieces if len(piece) > 1]
         alone = [piece[0] for piece in network.pieces if len(piece) == 1]

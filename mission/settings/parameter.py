@@ -161,6 +161,19 @@ class Parameter:
             return text
         return (tuple(map(self._read, text)) or None) if self.repeatable else self._read(text)
 
+    def as_option(self, value: Any) -> Any:
+        """A value with its texts read as on the command line; what is no text, or a file, stays as it is."""
+        if not self.form or self.form == "FILE":
+            return value
+        try:
+            if isinstance(value, str):
+                return (self.read(value),) if self.repeatable else self.read(value)
+            if self.repeatable and isinstance(value, list | tuple):
+                return [self.read(item) if isinstance(item, str) else item for item in value]
+        except ValueError:  # the types of parameters refuse it, with its form
+            pass
+        return value
+
     def _read(self, text: str) -> Any:
         try:
             return self.read(text)

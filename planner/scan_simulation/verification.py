@@ -34,6 +34,7 @@ from stopgo.mission.stages.coverage_totals import OUTSIDE
 from stopgo.planner.checking.coverage_claims import claimed_units
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap.control import seen_control
+from stopgo.planner.routing.planned_mission import is_follow_up
 from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
 from stopgo.planner.scan_simulation.model_scans import ModelScene, scanned_model, sloped
@@ -226,7 +227,7 @@ def _proof(
     clouds: Sequence[ScanCloud],
 ) -> PlanProof:
     """The result of the simulation: what was promised, what was acquired, and how scans register."""
-    settings = site.space.settings
+    settings, alone = site.space.settings, _is_alone(mission, site.space)
     needed = np.clip(tally.sights, 1, settings.least_views)
     seen = frozen(tally.views + tally.aimed_views >= needed, np.bool_)
     return PlanProof(
@@ -249,8 +250,17 @@ def _proof(
         quality=tally.quality(),
         network=network,
         clouds=tuple(clouds),
-        accuracy_mm=settings.accuracy,
+        accuracy_mm=settings.accuracy if alone else None,
+        accuracy_of_more=settings.accuracy is not None and not alone,
     )
+
+
+def _is_alone(mission: Mission, space: NavigableSpace) -> bool:
+    """True if a mission's scans are all that register with one another.
+
+    Those of a share register with the other missions' scans, those of a follow-up mission with the run's.
+    """
+    return mission.share is UNSET and not is_follow_up(mission, space)
 
 
 def _closed_doors(space: NavigableSpace) -> list[FloatArray]:

@@ -205,12 +205,20 @@ Version = tuple[str, Stamp]
 
 
 def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
-    """Yield every recording below a folder; files of other types are ignored."""
-    for folder_path, _, names in os.walk(folder):
+    """Yield every recording below a folder; files of other types, and what is hidden, are ignored.
+
+    The store of a batch is hidden: it holds each plan of the folder once more.
+    """
+    for folder_path, below, names in os.walk(folder):
+        below[:] = [name for name in below if not name.startswith(".")]
         for name in names:
             path = Path(folder_path, name)
-            if name.endswith(SUFFIX) and path.is_file():
-                yield str(path.relative_to(folder)), stamp_of(path)
+            if name.endswith(SUFFIX) and not name.startswith(".") and path.is_file():
+                try:
+                    stamp = stamp_of(path)
+                except FileNotFoundError:  # removed since it was listed
+                    continue
+                yield str(path.relative_to(folder)), stamp
 
 
 def stamp_of(path: Path) -> Stamp:

@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from stopgo.mission.console.whole_file import whole_file
+from stopgo.mission.console.whole_file import must_end, whole_file
 from stopgo.mission.document.decoding import converted
 from stopgo.mission.errors import InputError
 from stopgo.mission.settings.toml_file import read_toml, with_quotes
@@ -124,6 +124,7 @@ def read_day(path: Path) -> DayTable:
 
 
 def _document(path: Path) -> BatchDocument:
+    must_end(path)  # the file is read twice, and its paths start at its folder
     try:
         return converted(read_toml(path), BatchDocument)
     except msgspec.ValidationError as error:

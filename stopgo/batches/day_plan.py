@@ -78,7 +78,7 @@ def robots_of(table: DayTable) -> tuple[DayRobot, ...]:
     """
     robots = tuple(DayRobot(item.name, span(item.shift, "shift"), item.at) for item in table.robots)
     names = [robot.name for robot in robots]
-    if not robots or len(set(names)) < len(names):
+    if not all(names) or not names or len(set(names)) < len(names):
         raise InputError(f"[day]: robots are {', '.join(names) or 'none'}; give each a name of its own")
     return robots
 

@@ -84,9 +84,11 @@ def entry_record(outcome: PlanOutcome, floor: str, place: str, before: EntryReco
 
 
 def _figures(result: Result) -> dict[str, Any]:
-    reports = [part for report in result.reports for part in report.get("shares", (report,))]
+    """The figures of all parts of a floor; those of a part that is divided are of all its missions."""
+    reports = result.reports
+    missions = [one for part in reports for one in part.get("shared", {"missions": [part]})["missions"]]
     return {
-        "missions": [part["mission"]["id"] for part in reports],
+        "missions": [one["mission"]["id"] for one in missions],
         "stops": sum(part["selection"]["stops"] for part in reports),
         "coverage": min(part["selection"]["coverage"] for part in reports),
         "route_m": round(sum(part["route"]["length_m"] for part in reports), 2),

@@ -26,6 +26,8 @@ class PlannedMission(msgspec.Struct, frozen=True):
     """Floor that it was planned for, such as `tower/EG`."""
     date: str
     """Day of the construction status; empty without one."""
+    together: tuple[str, ...] = ()
+    """Ids of all missions of its plan, which cover the floor together; empty if it is the only one."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Visits:
         dates = [
             mission.date
             for mission_id, mission in self.missions.items()
-            if mission.site == site and mission.date and self.acquired([mission_id])
+            if mission.site == site and mission.date and self.acquired(mission.together or [mission_id])
         ]
         return max(dates, default=None)
 
@@ -83,8 +85,12 @@ def note_missions(
     out: Path, before: Visits, entries: Sequence[Entry], records: Sequence[EntryRecord]
 ) -> None:
     """Add the missions of a batch to those of the folder."""
-    sites = {entry.name: PlannedMission(entry.site, entry.settings.date or "") for entry in entries}
-    new = {mission_id: sites[item.name] for item in records for mission_id in item.missions}
+    sites = {entry.name: (entry.site, entry.settings.date or "") for entry in entries}
+    new = {
+        mission_id: PlannedMission(*sites[item.name], tuple(item.missions) if len(item.missions) > 1 else ())
+        for item in records
+        for mission_id in item.missions
+    }
     write_atomic(out / FILE, msgspec.json.format(msgspec.json.encode({**before.missions, **new}), indent=1))
 
 

@@ -203,5 +203,8 @@ def _planned(task: PlanTask, store: ResultStore, key: str, parts: ContentParts, 
 
 
 def _with_names(report: dict[str, Any]) -> dict[str, Any]:
-    """The report with names of files in place of paths in the store."""
+    """The report of one mission, or of several that divide a floor, with names of files in place of paths."""
+    if "shared" in report:
+        shared = report["shared"]
+        return {**report, "shared": {**shared, "missions": [_with_names(one) for one in shared["missions"]]}}
     return {**report, "files": {key: Path(path).name for key, path in report["files"].items()}}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.mission.console.table import table
-from stopgo.mission.errors import InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.atomic import write_checked
 from stopgo.mission.files.given_file import bytes_of, rows_of
 from stopgo.mission.settings.parameter import numbers
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 FORM = "write X,Y=MAPX,MAPY in metres, such as 2.5,3=12.1,-4.7"
 FARTHEST = 1e7
+REMEDY = "are they in the same order, and each noted where the robot stood? Remove what is wrong"
 
 
 def align(
@@ -44,9 +45,10 @@ def align(
     points are needed; with more, their residuals show which was noted wrongly. The result is the value for
     `robot --map`.
 
+    Exit code 1: the points do not fit one another, by more than maps drift.
+
     Example: stopgo align --pair 0,0=12.10,-4.70 --pair 8,0=20.06,-3.91 --pair 8,6=19.47,2.06
     """
-    from stopgo.mission.files.mission_text import json_text
     from stopgo.mission.frames.rigid_fit import rigid_fit
 
     if (mission is None) != (out is None):
@@ -56,12 +58,21 @@ def align(
         raise InputError(f"no points given; name a CSV file, or use --pair: {FORM}")
     site, there = _arrays(points)
     fit = rigid_fit(site, there)
-    written = None if mission is None or out is None else _with_transform(mission, out, fit)
-    report = _report(fit, points, written)
-    typer.echo(json_text(report) if as_json else _text(fit, points, written))
+    written = (
+        None if out is None or mission is None or fit.is_doubtful else _with_transform(mission, out, fit)
+    )
+    _print_fit(fit, points, written, as_json=as_json)
+    if fit.is_doubtful:
+        raise NegativeResult(f"the points fit within {fit.rms_m:.2f} m only (root mean square); {REMEDY}")
 
 
 PointPair = tuple[float, float, float, float]
+
+
+def _print_fit(fit: RigidFit, points: Sequence[PointPair], written: str | None, *, as_json: bool) -> None:
+    from stopgo.mission.files.mission_text import json_text
+
+    typer.echo(json_text(_report(fit, points, written)) if as_json else _text(fit, points, written))
 
 
 def _pair(text: str) -> PointPair:
@@ -131,7 +142,7 @@ def map_option(fit: RigidFit) -> str:
 
 def _report(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> dict[str, Any]:
     return {
-        "map": map_option(fit),
+        "map": None if fit.is_doubtful else map_option(fit),
         "to_map": fit.transform,
         "rms_m": fit.rms_m,
         "max_m": fit.max_m,
@@ -151,10 +162,11 @@ def _text(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> st
         (*(f"{number:.3f}" for number in pair), f"{1000 * off:.0f}")
         for pair, off in zip(points, fit.residuals, strict=True)
     ]
-    few = "; two points cannot show a mistake: add a third" if len(points) == 2 else ""
+    few = f"; {fit.unshown}" if fit.unshown else ""
+    result = () if fit.is_doubtful else (f"--map {map_option(fit)}",)
     lines = [
         table(header, rows), "",
         f"residuals {1000 * fit.rms_m:.0f} mm (root mean square), {1000 * fit.max_m:.0f} mm at most{few}",
-        f"--map {map_option(fit)}", *([] if written is None else [written]),
+        *result, *([] if written is None else [written]),
     ]  # fmt: skip
     return "\n".join(lines)

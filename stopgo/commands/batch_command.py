@@ -135,13 +135,14 @@ def _is_day(text: str) -> bool:
 
 def _run_command(call: BatchCall) -> int:
     from stopgo.batches.batch_run import Batch, ResultStore, expanded
-    from stopgo.batches.day import write_day_of
+    from stopgo.batches.day import read_team, write_day_of
     from stopgo.batches.visits import note_missions, read_visits, with_since
 
     out = result_folder(call.out)
     store = ResultStore.at(out / ".store" if call.store is None else call.store)
     if call.gc:
         return _collect(store, call.unused_for, call.store_gb)
+    team = None if call.day is None else read_team(call.file)
     found = expanded(call.file, store.folder, workers=call.workers)
     visits = read_visits(out, call.runs)
     entries, visited = with_since(found.entries, call.since, visits)
@@ -157,8 +158,10 @@ def _run_command(call: BatchCall) -> int:
         return faults
     record = _run(batch, call.workers, call.scheduler, call.store_gb)
     note_missions(out, visits, entries, record.entries)
-    if call.day is not None:
-        notice(f"{call.day}: {write_day_of(call.file, out, call.day, batch, record, visits)}")
+    if call.day is not None and team is not None:
+        overview, notes = write_day_of(team, out, call.day, batch, record, visits)
+        for line in (*notes, overview):
+            notice(f"{call.day}: {line}")
     _print_record(record, out, as_json=call.as_json)
     return max(record.exit_code, faults)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.commands.replay_on_floor import on_floor, write_follow_up
+from stopgo.mission.console.notice import notice
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.console.table import printable_lines
 from stopgo.mission.errors import InputError
@@ -152,7 +153,8 @@ def replay(
 
     The log's frame is never guessed: its transform comes from the georeference, --map or --align.
 
-    Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log is unreadable or another's.
+    Exit code 1: a stop was missed, or visited outside its tolerance, or a mission has no log; 2: the log is
+    unreadable or another's.
     """
     read = _read(logs, stamps, frame)
     if list_:
@@ -164,7 +166,7 @@ def replay(
     placing = replace(_placing(map_, align, time_offset, poses, robot_name), level_m=_height(floor_height))
     plans = _plans(plan, driven[0])
     replays = files.compare_and_write(_replays(read, driven, placing, plans, one_run=one_run), plans, driven)
-    return _print_replays(replays, as_json=json_)
+    return _print_replays(replays, driven, as_json=json_)
 
 
 @dataclass(frozen=True)
@@ -365,7 +367,7 @@ def _print_logs(logs: list[FieldLog], *, as_json: bool) -> None:
         typer.echo(printable_lines("\n".join(map(listing.as_text, logs))))
 
 
-def _print_replays(replays: list[Replay], *, as_json: bool) -> int:
+def _print_replays(replays: list[Replay], missions: list[Mission], *, as_json: bool) -> int:
     """Print the comparisons; return the exit code of all."""
     from stopgo.recordings.replay import replay_text
 
@@ -373,7 +375,16 @@ def _print_replays(replays: list[Replay], *, as_json: bool) -> int:
         _print_json([replay_text.as_json(item) for item in replays], "replays")
     else:
         typer.echo("\n\n".join(map(replay_text.as_text, replays)))
-    return _exit_code(replays)
+    return 1 if _print_not_driven(missions, replays) else _exit_code(replays)
+
+
+def _print_not_driven(missions: list[Mission], replays: list[Replay]) -> bool:
+    """Name the missions of which no log was given; return True if there are any."""
+    compared = {item.mission.digest for item in replays}
+    missing = [mission for mission in missions if mission.digest not in compared]
+    for mission in missing:
+        notice(f"{mission.name} ({mission.id[:12]}): no log of it is given; it counts as not driven")
+    return bool(missing)
 
 
 def _print_json(items: list[dict[str, Any]], name: str) -> None:

@@ -18,7 +18,9 @@ def add_commands(app: typer.Typer) -> None:
 
 
 def runs(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder; those below it count too.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A folder; those below it count too, but no hidden ones.")
+    ],
     json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> None:
     """List plans and runs in a folder, the newest run first, with what each acquired.

@@ -207,6 +207,8 @@ def variant_work(task: VariantTask, tell: Tell, kept: KeptPlans | None = None) -
     if task.forbidden:
         more["avoid"] = task.forbidden
     settings = settings_of(task.options, **more)
+    if settings.divided:
+        raise InputError("a variant is one mission; plan those that divide a floor with stopgo plan or batch")
     if task.replaces is not None:
         (task.out / "mission.json").write_bytes(task.replaces.read_bytes())
     progress = PlanProgress(tell, task.out)

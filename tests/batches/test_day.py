@@ -172,12 +172,76 @@ def test_a_day_has_a_page_for_each_robot(tmp_path: Path, monkeypatch: pytest.Mon
     assert done.returncode == 0, done.stderr
     folder = out / "days" / "2026-11-25"
     assert str(folder / "index.html") in done.stderr
+    assert "no shift" not in done.stderr
     robots = json.loads((folder / "day.json").read_text())["robots"]
     assert [len(item["missions"]) for item in robots] == [2, 0]
     assert "stopgo push" in (folder / "r1.html").read_text()
     assert len(list(folder.glob("r_2*.html"))) == 1, "a name that is no path"
     assert called(*batch, "--day", "soon").returncode == 2
     assert called(*batch, "--since", "last").returncode == 2
+
+
+def test_floors_that_several_missions_divide_are_jobs_of_a_day(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their report has a file and an id for each mission; the batch ended in a KeyError."""
+    monkeypatch.setattr(engine, "LocalEngine", lambda workers: InlineEngine(workers, work))
+    hall(tmp_path / "a.dxf", width=12.0)
+    options = "options = { robots = 2, start = [1.0, 1.0, 0.0] }"
+    batch_file(tmp_path, f'[day]\nrobots = [{{ name = "r1" }}]\n[[floors]]\nfiles = "a.dxf"\n{options}')
+    out = tmp_path / "out"
+    done = called("batch", str(tmp_path / "plans.toml"), "-o", str(out), "--day", "2026-11-25", "--json")
+    assert done.returncode == 0, done.stderr
+    (found,) = json.loads(done.stdout)["entries"]
+    files = [out / "a" / name for name in ("mission.json", "mission-2.json")]
+    missions = [json.loads(path.read_text()) for path in files]
+    assert found["missions"] == [mission["id"] for mission in missions]
+    assert found["stops"] == sum(len(mission["stops"]) for mission in missions)
+    day = json.loads((out / "days" / "2026-11-25" / "day.json").read_text())
+    assert day["robots"][0]["missions"][0]["files"] == [str(path) for path in files]
+    noted = json.loads((out / "missions.json").read_text())
+    assert [item["together"] for item in noted.values()] == [found["missions"]] * 2
+
+
+def test_a_floor_is_acquired_when_all_missions_of_its_plan_are() -> None:
+    """One robot's run of two was enough, so that `--since last` left out what the other one had missed."""
+    both = ("one", "two")
+    missions = {name: PlannedMission("tower/EG", "2026-01-01", both) for name in both}
+    half = Visits(missions, {"one": [run("one", "yes")], "two": [run("two", "no")]})
+    assert half.last_date("tower/EG") is None
+    whole = Visits(missions, {name: [run(name, "yes")] for name in both})
+    assert whole.last_date("tower/EG") == "2026-01-01"
+
+
+def test_a_fault_of_the_day_is_known_before_anything_is_planned(tmp_path: Path) -> None:
+    hall(tmp_path / "a.dxf")
+    for day in (
+        'robots = [{ name = "r1", shift = "-1h" }]',
+        "robots = []",
+        'robots = [{ name = "" }]',
+        'begin = "25:00"\nrobots = []',
+    ):
+        batch_file(tmp_path, f'[day]\n{day}\n[[floors]]\nfiles = "a.dxf"')
+        done = called(
+            "batch", str(tmp_path / "plans.toml"), "-o", str(tmp_path / "out"), "--day", "2026-11-25"
+        )
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert "[day]" in done.stderr
+        assert not (tmp_path / "out" / "a").exists()
+
+
+def test_what_a_day_leaves_and_a_place_that_is_none_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They were on the page only, and a robot at a misspelt floor had the usual way to each."""
+    monkeypatch.setattr(engine, "LocalEngine", lambda workers: InlineEngine(workers, work))
+    hall(tmp_path / "a.dxf")
+    day = '[day]\nrobots = [{ name = "r1", shift = "1min", at = "b" }]\n'
+    batch_file(tmp_path, day + '[[floors]]\nfiles = "*.dxf"')
+    done = called("batch", str(tmp_path / "plans.toml"), "-o", str(tmp_path / "out"), "--day", "2026-11-25")
+    assert done.returncode == 0, done.stderr
+    assert "2026-11-25: 1 plan fits into no shift: a\n" in done.stderr
+    assert "[day]: r1 is at b, which is no floor here; known: a\n" in done.stderr
 
 
 def test_a_time_without_quotes_begins_a_day(tmp_path: Path) -> None:

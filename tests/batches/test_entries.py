@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
-from stopgo.batches.batch_file import read_batch
+from stopgo.batches.batch_file import read_batch, read_day
 from stopgo.batches.entries import Entry, Expansion, ModelStorey, expand
 from stopgo.mission.errors import InputError
 from tests.batches.halls import batch_file
@@ -131,6 +132,18 @@ def test_a_table_that_is_no_floor_is_one_line_and_the_others_are_read(tmp_path: 
     groups, problems = read_batch(path)
     assert not groups
     assert [problem.split(": ")[1] for problem in problems] == ["line 1", "line 3"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_no_batch_even_if_somebody_writes_to_it(tmp_path: Path) -> None:
+    """Its paths start at its folder, and the file is read more than once."""
+    os.mkfifo(tmp_path / "plans.toml")
+    end = os.open(tmp_path / "plans.toml", os.O_RDWR)
+    os.write(end, b'[[floors]]\nfiles = "a.ifc"\n')
+    for read in (read_batch, read_day):
+        with pytest.raises(InputError, match="is a pipe, which can be read only once; save it as a file"):
+            read(tmp_path / "plans.toml")
+    os.close(end)
 
 
 def test_files_that_include_each_other_are_refused(tmp_path: Path) -> None:

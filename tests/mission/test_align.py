@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from stopgo.bridge.commands.robot_commands import read_map
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.coverage_json import read_coverage
 from stopgo.mission.files.mission_json import read, write
 from stopgo.mission.frames.rigid_fit import rigid_fit
 from tests.mission.worlds import square_tour
@@ -139,3 +140,57 @@ def test_what_is_no_pair_is_one_line(
     assert told.out == ""
     assert said in told.err
     assert told.err.count("\n") == 1
+
+
+SQUARE = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)])
+
+
+def test_points_that_were_exchanged_fit_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their scale is right and they are not mirrored; residuals of metres came with a result and exit 0."""
+    path = tmp_path / "mission.json"
+    write(square_tour(), path)
+    given = [*options(SQUARE, SQUARE[[0, 1, 3, 2]]), "--mission", str(path), "-o", str(path)]
+    assert main(["align", *given]) == 1
+    told = capsys.readouterr()
+    assert "--map" not in told.out
+    assert "the points fit within 7.07 m only" in told.err
+    assert read(path) == square_tour()
+    assert main(["align", *given, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["map"] is None
+
+
+def test_points_of_a_map_that_drifts_fit_it() -> None:
+    """A fiftieth of the distances is what maps of large buildings are off."""
+    noted = 10 * SQUARE + np.array([(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
+    assert not rigid_fit(10 * SQUARE, noted).is_doubtful
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        (SQUARE[:2], "two points cannot show a mistake"),
+        (np.array([(0.0, 0.0), (5.0, 0.05), (10.0, 0.0)]), "points on one line cannot show"),
+        (SQUARE[[0, 1, 0]], "points on one line cannot show"),
+        (CORNERS, ""),
+    ],
+)
+def test_a_mistake_that_the_points_cannot_show_is_named(points: np.ndarray, said: str) -> None:
+    unshown = rigid_fit(points, points).unshown
+    assert unshown.startswith(said)
+    assert bool(unshown) == bool(said)
+
+
+def test_the_coverage_of_a_plan_is_that_of_the_plan_placed_on_a_map(tmp_path: Path) -> None:
+    """Where the map lies changes nothing that a stop sees; whatever else differs is another revision."""
+    plan, placed, coverage = tmp_path / "mission.json", tmp_path / "placed.json", tmp_path / "coverage.json"
+    write(square_tour(), plan)
+    made = read(plan)
+    counts = {"units": 1, "visible": 1, "seen": 1, "coverage": 1.0}
+    head = {"schema": "stopgo/coverage", "version": 1, "total": counts, "elements": []}
+    of = {"id": made.id, "revision": made.revision, "digest": made.digest}
+    coverage.write_text(json.dumps({**head, "mission": of}))
+    for there in (QUARTER, QUARTER + 1.0):
+        assert main(["align", *options(CORNERS, there), "--mission", str(plan), "-o", str(placed)]) == 0
+        assert read_coverage(coverage, read(placed)).total.seen == 1
+    with pytest.raises(InputError, match="of another revision"):
+        read_coverage(coverage, msgspec.structs.replace(read(placed), name="other", digest=""))

@@ -93,6 +93,13 @@ def test_no_answer_names_the_place_of_the_folder(room: PlanningRoom, place: Path
     assert SiteFiles.at(place).plain(str(error.value)).startswith("empty.dxf: ")
 
 
+def test_a_variant_of_several_missions_is_refused(tmp_path: Path) -> None:
+    """Its report is of all of them; it ended in an unexpected error."""
+    options = {"robots": "2", "start": "1,1,0"}
+    with pytest.raises(InputError, match="a variant is one mission"):
+        variant_work(VariantTask(tmp_path / "house.dxf", options, tmp_path), lambda told: None)
+
+
 def test_a_plan_is_shown_as_it_grows(place: Path, tmp_path: Path) -> None:
     told: list[dict[str, Any]] = []
     answer = variant_work(VariantTask(place / "house.dxf", {"coverage": "0.8"}, tmp_path), told.append)

@@ -22,6 +22,7 @@ from stopgo.mission.files.exports import (
     vda5050,
 )
 from stopgo.mission.files.exports.format import OPTIONS, Format, Supplements
+from stopgo.mission.frames.geodesy import LATITUDE_LIMIT
 
 QUANTUM = 0.008
 """Largest distance in metres of 1e-7 degrees."""
@@ -128,6 +129,11 @@ def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
         raise InputError(
             f"{mission.name}: no georeference, but {form.title} holds latitudes and longitudes; "
             "give --origin LAT,LON,ALT,HEADING, or plan with it"
+        )
+    if form.georeferenced and mission.georeference and abs(mission.georeference.lat) > LATITUDE_LIMIT:
+        raise InputError(
+            f"{mission.name}: georeference.lat is {mission.georeference.lat}; {form.title} ends at "
+            f"±{LATITUDE_LIMIT:g}°, give another position with --origin"
         )
     with found.named_errors():
         data = found.of_kind(form.write(mission, supplements), bytes)

@@ -15,7 +15,7 @@ import stopgo
 from stopgo.command_line import main
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.errors import InputError
-from stopgo.mission.files.plan_toml import read_settings, settings_toml
+from stopgo.mission.files.plan_toml import read_settings, recorded_settings, settings_toml
 from stopgo.mission.settings import PARAMETERS, Settings, recorded_values
 from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.settings.scanners import SCANNERS, ScannerName
@@ -262,3 +262,32 @@ def test_missing_and_extra_quotes_are_named(tmp_path: Path, text: str, remedy: s
     (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=remedy):
         read_settings(tmp_path / "plan.toml", {})
+
+
+TEXTS = [
+    name
+    for name, parameter in PARAMETERS.items()
+    if parameter.form not in ("", "FILE") and name != "further_starts"  # a list of poses
+]
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_value_that_an_option_takes_stands_in_a_file_too(name: str, tmp_path: Path) -> None:
+    """A refused `shift = "6min"` was told to write `30min`."""
+    parameter = PARAMETERS[name]
+    text = re.split(r", | or ", parameter.example)[-1]
+    value = f'["{text}"]' if parameter.repeatable else f'"{text}"'
+    path = tmp_path / "plan.toml"
+    path.write_text(f"[{parameter.section}]\n{parameter.key} = {value}\n")
+    given = parameter.given([text] if parameter.repeatable else text)
+    assert getattr(read_settings(path, {}), name) == given
+    assert getattr(stopgo.settings(**{parameter.key: text}), name) == given
+
+
+def test_a_text_of_another_form_is_refused_with_the_form(tmp_path: Path) -> None:
+    path = tmp_path / "plan.toml"
+    path.write_text('[plan]\nshift = "6 minutes"\n')
+    with pytest.raises(InputError, match='shift = "6 minutes": write DURATION, such as 1800, 30min or 1h30'):
+        read_settings(path, {})
+    with pytest.raises(InputError, match="--shift 30min: write DURATION"):
+        recorded_settings({"shift": "30min"})

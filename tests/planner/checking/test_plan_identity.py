@@ -105,3 +105,29 @@ def test_a_map_whose_picture_or_place_was_changed_is_named(
     write(planned, mission)
     picture.write_bytes(picture.read_bytes()[:-1] + b"\x00")
     assert answer(mission, floor, capsys) == (["$.id"], [])
+
+
+def test_a_plan_that_claims_nothing_was_changed(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without claims its coverage was not compared with what its parameters require: one stop was enough."""
+    mission, floor = read(made), made.with_name("floor.dxf")
+    for keys in (("new_units",), ("units", "new_units")):
+        bare = [change(stop, sees=change(stop.sees, **dict.fromkeys(keys, 0))) for stop in mission.stops]
+        write(change(mission, stops=tuple(bare[:1])), made)
+        assert "$.stops[*].sees.new_units" in answer(made, floor, capsys)[0]
+
+
+def test_what_depends_on_other_missions_is_a_note(
+    tmp_path: Path, made: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The coverage required of a follow-up mission, and of one robot's share, no floor shows."""
+    mission, floor = read(made), made.with_name("floor.dxf")
+    further = change(with_parameter(mission, coverage=0.1), id="0" * 32, name=f"{mission.name}-top-up")
+    write(further, made)
+    problems, notes = answer(made, floor, capsys)
+    assert problems == []
+    assert [note.partition(" is ")[0] for note in notes] == ["$.name"]
+    assert main(["plan", str(floor), "-o", str(tmp_path), "--robots", "2", "--start", "1,1,0"]) == 0
+    capsys.readouterr()
+    problems, notes = answer(tmp_path / "mission-2.json", floor, capsys)
+    assert problems == []
+    assert [note.partition(":")[0] for note in notes] == ["$.share is 2 of 2"]

@@ -147,6 +147,20 @@ def test_of_one_mission_of_several_no_share_is_asked_that_is_asked_of_all() -> N
     assert network_words(one_of_two)[0].startswith("of this mission, one of 2, all scans are connected")
 
 
+def test_an_accuracy_is_of_all_scans_that_register_and_not_of_one_mission_of_them() -> None:
+    """A follow-up mission's scans register with those of the run before, which are not simulated."""
+    made = plan(two_rooms(0.9), Settings(range=6.0))
+    space = replace(made.space, settings=replace(made.space.settings, accuracy=0.001))
+    share = changed(made.mission, share=MissionAllocation(kind="robot", number=1, of=2))
+    further = changed(made.mission, id="0" * 32, name=f"{made.mission.name}-top-up")
+    whole, *others = (verify(item, space, COARSEST, None) for item in (made.mission, share, further))
+    assert any("mm required" in line for line in whole.unmet)
+    for proof in others:
+        assert not any("mm required" in line for line in proof.unmet)
+        assert any("together: not compared" in line for line in network_words(proof))
+    assert not any("not compared" in line for line in network_words(whole))
+
+
 def test_a_mission_without_stops_is_no() -> None:
     made = plan(hall(), Settings())
     with pytest.raises(NegativeResult, match="no stops"):

@@ -102,6 +102,28 @@ def test_texts_of_recordings_do_not_reach_the_terminal_as_they_are(folder: Path)
     assert "\x1b" not in index_text(index_of(folder))
 
 
+def test_what_is_hidden_is_not_listed(sighted: Path, tmp_path: Path) -> None:
+    """The store of a batch holds each of its plans once more; a page of the site may not open it there."""
+    for name in (".store/results/plan.rrd", "floor/plan.rrd", "floor/.plan.rrd"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(sighted, tmp_path / name)
+    assert list(index_of(tmp_path).files) == ["floor/plan.rrd"]
+
+
+def test_a_recording_that_is_removed_while_the_folder_is_listed_is_none(
+    sighted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(sighted, tmp_path / "plan.rrd")
+    stamp_of = run_index.stamp_of
+
+    def removed(path: Path) -> tuple[int, int]:
+        path.unlink()
+        return stamp_of(path)
+
+    monkeypatch.setattr(run_index, "stamp_of", removed)
+    assert not index_of(tmp_path).files
+
+
 def test_a_run_is_compared_again_when_its_plan_comes_and_goes(
     sighted: Path, skipping: Path, tmp_path: Path
 ) -> None:

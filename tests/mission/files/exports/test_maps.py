@@ -14,6 +14,7 @@ import pytest
 import shapely
 
 from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
 from stopgo.mission.files.exports import FORMATS, exported
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.stretches import Stretches
@@ -100,6 +101,16 @@ def test_a_leg_is_as_long_on_earth_as_in_the_drawing() -> None:
         # Metres at the site's 408 m are that much longer than those on the ellipsoid.
         drawn = leg["properties"]["length_m"] / (1 + 408 / 6_378_137)
         assert earth.line_length(lons, lats) == pytest.approx(drawn, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["geojson", "plan", "waypoints"])
+@pytest.mark.parametrize("lat", [89.9999, -90.0])
+def test_a_site_at_a_pole_is_refused_with_its_latitude(name: str, lat: float) -> None:
+    """Its stops read back elsewhere, which was to be reported as an error of the program."""
+    made = laboratory()
+    polar = msgspec.structs.replace(made.georeference, lat=lat)
+    with pytest.raises(InputError, match=f"georeference.lat is {lat}; .* ±89°, give another position"):
+        exported(msgspec.structs.replace(made, georeference=polar), name, Supplements())
 
 
 def test_a_leg_over_the_date_line_is_cut_there() -> None:
