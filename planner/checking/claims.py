@@ -28,7 +28,7 @@ from stopgo.planner.candidates import STRATEGIES, candidates
 from stopgo.planner.checking.coverage_claims import OTHER_FLOOR, coverage_overclaims
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.reach import reach_of
-from stopgo.planner.visibility.exact_sight import sides_of_door, viewpoints_of
+from stopgo.planner.visibility.exact_sight import sides_of_doors, viewpoints_of
 from stopgo.planner.visibility.headings import in_view, with_headings
 from stopgo.planner.visibility.sight.sightlines import SightLines
 from stopgo.planner.visibility.unit_ranges import visibility_of
@@ -105,7 +105,7 @@ def _seen_from(stop: Stop, space: NavigableSpace, lines: SightLines) -> IntArray
     """Units that a stop sees along its heading."""
     xy = np.array([stop.x, stop.y])
     closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
-    eyes = sides_of_door(space, xy) if closed_door else xy[None]
+    eyes = sides_of_doors(space, xy[None])[0] if closed_door else xy[None]
     units = np.unique(np.concatenate([lines.seen_from(eye, scanner=xy) for eye in eyes]))
     if space.settings.fov >= 360:
         return units

@@ -33,7 +33,7 @@ from stopgo.planner.overlap.network_error import (
 )
 from stopgo.planner.overlap.pairs import Overlaps
 from stopgo.planner.routing.planned_mission import is_of_plan
-from stopgo.planner.visibility.exact_sight import sides_of_door
+from stopgo.planner.visibility.exact_sight import sides_of_doors
 from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 ROUNDED = 1e-5
@@ -191,7 +191,7 @@ class _BoundaryVisibility:
         """Pieces that a stop sees in all directions; from both sides of a closed door if it is in one."""
         space, xy = self._space, np.array([stop.x, stop.y])
         closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
-        eyes = sides_of_door(space, xy) if closed_door else xy[None]
+        eyes = sides_of_doors(space, xy[None])[0] if closed_door else xy[None]
         views = [self._seen_from(to_grid(eye - local_origin(space.floor))) for eye in eyes]
         return np.unique(np.concatenate(views))
 
