@@ -35,6 +35,8 @@ from stopgo.planner.visibility.unit_ranges import visibility_of
 
 ROUNDED = 10.0**-DIGITS
 """Tolerance of fractions in coverage.json, which come from rounded lengths."""
+APART = (math.sqrt(5.0) - 1.0) / 2.0
+"""Multiples of it, without their whole part, are spread evenly from the first ones on."""
 NOISE = 1e-12
 """Fractions that differ by less are equal: they are quotients of whole numbers."""
 
@@ -136,7 +138,9 @@ def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
         return frozen(_seen_by_heading(found, lines).visible, np.int64)
     seen_by = _viewer(found, lines)
     views = np.zeros(found.space.targets.total, dtype=np.int64)
-    for k in np.setdiff1d(np.arange(len(found.kept)), found.extra_rows).tolist():
+    rows = np.setdiff1d(np.arange(len(found.kept)), found.extra_rows)
+    from_all_over = rows[np.argsort(rows * APART % 1.0)]  # so most units are seen soon
+    for k in from_all_over.tolist():
         views[seen_by(k, views < found.space.settings.least_views)] += 1
     return frozen(views, np.int64)
 
