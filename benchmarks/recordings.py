@@ -144,7 +144,7 @@ def _reports(mission: Any) -> Iterator[Any]:
             yield _later(waiting, **later)
             waiting = next(leaving, None)
         if number % HERTZ == 0:
-            yield teller.state(float(second) / 20, "RUNNING")
+            yield _later(teller.state(float(second) / 20, "RUNNING"), robot_ns=run._ns(float(second)))
         yield teller.pose(float(second), float(x), float(y), float(heading))
     while waiting is not None:
         yield _later(waiting, robot_ns=run.BEGAN_NS + HOURS * 3600 * 10**9)

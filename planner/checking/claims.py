@@ -28,13 +28,15 @@ from stopgo.planner.candidates import STRATEGIES, candidates
 from stopgo.planner.checking.coverage_claims import OTHER_FLOOR, coverage_overclaims
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.reach import reach_of
-from stopgo.planner.visibility.exact_sight import sides_of_door, viewpoints_of
+from stopgo.planner.visibility.exact_sight import sides_of_doors, viewpoints_of
 from stopgo.planner.visibility.headings import in_view, with_headings
 from stopgo.planner.visibility.sight.sightlines import SightLines
 from stopgo.planner.visibility.unit_ranges import visibility_of
 
 ROUNDED = 10.0**-DIGITS
 """Tolerance of fractions in coverage.json, which come from rounded lengths."""
+APART = (math.sqrt(5.0) - 1.0) / 2.0
+"""Multiples of it, without their whole part, are spread evenly from the first ones on."""
 NOISE = 1e-12
 """Fractions that differ by less are equal: they are quotients of whole numbers."""
 
@@ -105,7 +107,7 @@ def _seen_from(stop: Stop, space: NavigableSpace, lines: SightLines) -> IntArray
     """Units that a stop sees along its heading."""
     xy = np.array([stop.x, stop.y])
     closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
-    eyes = sides_of_door(space, xy) if closed_door else xy[None]
+    eyes = sides_of_doors(space, xy[None])[0] if closed_door else xy[None]
     units = np.unique(np.concatenate([lines.seen_from(eye, scanner=xy) for eye in eyes]))
     if space.settings.fov >= 360:
         return units
@@ -136,7 +138,9 @@ def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
         return frozen(_seen_by_heading(found, lines).visible, np.int64)
     seen_by = _viewer(found, lines)
     views = np.zeros(found.space.targets.total, dtype=np.int64)
-    for k in np.setdiff1d(np.arange(len(found.kept)), found.extra_rows).tolist():
+    rows = np.setdiff1d(np.arange(len(found.kept)), found.extra_rows)
+    from_all_over = rows[np.argsort(rows * APART % 1.0)]  # so most units are seen soon
+    for k in from_all_over.tolist():
         views[seen_by(k, views < found.space.settings.least_views)] += 1
     return frozen(views, np.int64)
 

@@ -6,10 +6,11 @@ Every line of sight to the boundary is tested against every wall, as in `stopgo.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import msgspec
 import numpy as np
-import shapely
 from msgspec.structs import replace
 from scipy.sparse.csgraph import connected_components
 
@@ -20,7 +21,7 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of, noise_factor
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_by_heading
-from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
+from stopgo.planner.geometry.shapes import local_origin, to_grid
 from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
 from stopgo.planner.overlap.control import seen_control
@@ -33,8 +34,8 @@ from stopgo.planner.overlap.network_error import (
 )
 from stopgo.planner.overlap.pairs import Overlaps
 from stopgo.planner.routing.planned_mission import is_of_plan
-from stopgo.planner.visibility.exact_sight import sides_of_door
-from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
+from stopgo.planner.visibility.exact_sight import sides_of_doors
+from stopgo.planner.visibility.sight.sightlines import Midpoints, TestedLines
 
 ROUNDED = 1e-5
 """Tolerance of a pair's figures, which are sums of rounded lengths."""
@@ -46,16 +47,16 @@ REQUIRED = "the plan's parameters require scans that register with one another"
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
     """Every pair that registers less well than claimed or required, and pairs that are missing."""
     required = space.settings.registers
-    known = _with_known_pairs(mission)
-    yield from _understated_errors(known, space)
+    known, scans = _with_known_pairs(mission), _Scans(mission, space)
+    yield from _understated_errors(known, scans)
     if isinstance(mission.network, msgspec.UnsetType):
         if required and len(mission.stops) > 1:
             yield Problem("$.network", f"is missing, but {REQUIRED}")
         return
-    yield from _weak_pairs(mission, space)
+    yield from _weak_pairs(mission, scans)
     if required and mission.share is msgspec.UNSET and is_of_plan(mission, space):
         yield from _separate_scans(known, space)
-        yield from _inaccurate_scans(known, space)
+        yield from _inaccurate_scans(known, scans)
 
 
 def _with_known_pairs(mission: Mission) -> Mission:
@@ -66,13 +67,31 @@ def _with_known_pairs(mission: Mission) -> Mission:
     return replace(mission, network=tuple(pair for pair in mission.network if {pair.a, pair.b} <= stops))
 
 
-def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+@dataclass(frozen=True, eq=False)
+class _Scans:
+    """The stops of a mission on its floor."""
+
+    mission: Mission
+    space: NavigableSpace
+
+    @cached_property
+    def overlaps(self) -> Overlaps:
+        """Overlap of each two stops, counted line by line; rows in the order of the stops."""
+        boundary, origin = boundary_of(self.space), local_origin(self.space.floor)
+        stops = self.mission.stops
+        xy = np.array([(stop.x, stop.y) for stop in stops]).reshape(-1, 2) - origin
+        heading = np.array([stop.heading for stop in stops])
+        visible = _BoundaryVisibility(boundary, self.space)
+        pieces = (visible.seen_by(stop) for stop in stops)
+        return Overlaps(shown_by(boundary, xy, pieces, heading, self.space.settings))
+
+
+def _weak_pairs(mission: Mission, scans: _Scans) -> Iterator[Problem]:
     """Every pair with a weaker registration than claimed or required."""
     if not mission.network:
         return
-    overlaps = _overlaps(mission, space)
+    overlaps, settings = scans.overlaps, scans.space.settings
     row = {stop.id: k for k, stop in enumerate(mission.stops)}
-    settings = space.settings
     least = {
         "common_m": LEAST_COMMON_M,
         "hold_m": least_hold_m(settings),
@@ -93,12 +112,12 @@ def _weak_pairs(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
                 yield Problem(path, f"is {claimed:g}: {counted_text}; a pair that registers has {needed:g}")
 
 
-def _inaccurate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+def _inaccurate_scans(mission: Mission, scans: _Scans) -> Iterator[Problem]:
     """The scan with the greatest predicted error, if this exceeds the accuracy required."""
-    asked, network = space.settings.accuracy, network_of(mission)
+    asked, network = scans.space.settings.accuracy, network_of(mission)
     if asked is None or network is None or not network.overlaps:
         return
-    errors = worst_errors(_covariances(mission, space, ()))
+    errors = worst_errors(_covariances(mission, scans, ()))
     found = CONFIDENCE * 1000 * np.where(np.isfinite(errors), errors, 0.0)
     worst = int(np.argmax(found))
     if found[worst] > asked * (1 + ROUNDED):
@@ -106,14 +125,14 @@ def _inaccurate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Probl
         yield Problem("$.origin.parameters.accuracy", f"{text}, counted line by line")
 
 
-def _understated_errors(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
+def _understated_errors(mission: Mission, scans: _Scans) -> Iterator[Problem]:
     """Every scan with a greater predicted error than claimed, in the frame of the scan without error."""
     claimed = {k: stop.error for k, stop in enumerate(mission.stops) if stop.error is not msgspec.UNSET}
     if not claimed:
         return
     frame = frame_of(mission)
     anchors = [k for k, stop in enumerate(mission.stops) if stop.id == frame]
-    counted = error_ellipses(_covariances(mission, space, anchors))
+    counted = error_ellipses(_covariances(mission, scans, anchors))
     for k, error in claimed.items():
         for axis, key in enumerate(("major_m", "minor_m")):
             claim, found = getattr(error, key), counted[k, axis]
@@ -124,16 +143,15 @@ def _understated_errors(mission: Mission, space: NavigableSpace) -> Iterator[Pro
                 yield Problem(path, f"is {claim:g}, but the network gives {found:.5f}, counted line by line")
 
 
-def _covariances(mission: Mission, space: NavigableSpace, anchors: Sequence[int]) -> FloatArray:
+def _covariances(mission: Mission, scans: _Scans, anchors: Sequence[int]) -> FloatArray:
     """Covariance of each scan's position by the mission's pairs (n, 2, 2).
 
     It is in the frame of the anchors; without any in that of the control points, or of a scan in the middle.
     """
-    network = network_of(mission)
-    overlaps, origin = _overlaps(mission, space), local_origin(space.floor)
+    network, overlaps, space = network_of(mission), scans.overlaps, scans.space
     row = {stop.id: k for k, stop in enumerate(mission.stops)}
     pairs = [(row[pair.a], row[pair.b]) for pair in (network.overlaps if network else ())]
-    xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - origin
+    xy = np.array([(stop.x, stop.y) for stop in mission.stops]) - local_origin(space.floor)
     moments = {pair: overlaps.normal_matrix(*pair) for pair in pairs}
     ends = [pair for pair in pairs if np.linalg.matrix_rank(moments[pair]) == 3]
     noise = noise_factor(space.settings.range_noise)
@@ -162,44 +180,19 @@ def _separate_scans(mission: Mission, space: NavigableSpace) -> Iterator[Problem
                 return
 
 
-def _overlaps(mission: Mission, space: NavigableSpace) -> Overlaps:
-    """Overlap of each two stops; rows in the order of the stops."""
-    boundary, origin = boundary_of(space), local_origin(space.floor)
-    xy = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2) - origin
-    heading = np.array([stop.heading for stop in mission.stops])
-    visible = _BoundaryVisibility(boundary, space)
-    pieces = (visible.seen_by(stop) for stop in mission.stops)
-    return Overlaps(shown_by(boundary, xy, pieces, heading, space.settings))
-
-
 class _BoundaryVisibility:
     """A boundary, prepared for computing line by line the pieces that stops see."""
 
     def __init__(self, boundary: Boundary, space: NavigableSpace) -> None:
         a, b = to_grid(boundary.a), to_grid(boundary.b)
-        self._space, self._edges = space, np.stack([a, b], axis=1)
-        faces = np.ones(len(a), dtype=bool)
-        self._midpoints = Midpoints.of(a, b, boundary.pieces, faces)
-        self._reach = space.settings.farthest_overlap
-        whole = self._midpoints.pieces[:, None]
-        odd = self._midpoints.odd[:, None]
-        middles = ((whole - odd) * self._midpoints.a + odd * self._midpoints.b) / whole * GRID
-        self._points = shapely.STRtree(shapely.points(middles))
-        self._lines = shapely.STRtree(shapely.linestrings(self._edges * GRID))
+        midpoints = Midpoints.of(a, b, boundary.pieces, np.ones(len(a), dtype=bool))
+        reach = space.settings.farthest_overlap
+        self._space, self._lines = space, TestedLines(midpoints, np.stack([a, b], axis=1), reach=reach)
 
     def seen_by(self, stop: Stop) -> IntArray:
         """Pieces that a stop sees in all directions; from both sides of a closed door if it is in one."""
         space, xy = self._space, np.array([stop.x, stop.y])
         closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
-        eyes = sides_of_door(space, xy) if closed_door else xy[None]
-        views = [self._seen_from(to_grid(eye - local_origin(space.floor))) for eye in eyes]
+        eyes = sides_of_doors(space, xy[None])[0] if closed_door else xy[None]
+        views = [self._lines.seen_from(to_grid(eye - local_origin(space.floor))) for eye in eyes]
         return np.unique(np.concatenate(views))
-
-    def _seen_from(self, eye: IntArray) -> IntArray:
-        points, lines = (self._near(tree, eye) for tree in (self._points, self._lines))
-        reach = round(self._reach / GRID)
-        return points[sees(eye, self._midpoints.among(points), self._edges[lines], reach=reach)]
-
-    def _near(self, tree: shapely.STRtree, eye: IntArray) -> IntArray:
-        near = tree.query(shapely.Point(eye * GRID), predicate="dwithin", distance=self._reach + 4 * GRID)
-        return np.sort(near)

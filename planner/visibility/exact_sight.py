@@ -8,6 +8,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray, bounds, frozen, read_only
 from stopgo.mission.stages import Candidates, NavigableSpace, Visibility
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import LINE_WALL, local_origin, to_grid, whole_steps_of
 from stopgo.planner.visibility.sight.mesh import Mesh, mesh_of
 from stopgo.planner.visibility.sight.sight import scene_of, sight
@@ -49,20 +50,30 @@ def viewpoints_of(candidates: Candidates) -> tuple[FloatArray, IntArray]:
     if candidates.settings.doors == "open" or not len(candidates.doorway_rows):
         return xy, row
     twice = np.repeat(row, np.where(np.isin(row, candidates.doorway_rows), 2, 1))
-    places = xy[twice].copy()
-    for doorway in candidates.doorway_rows:
-        first = int(np.searchsorted(twice, doorway))
-        places[first : first + 2] = sides_of_door(candidates.space, xy[doorway])
+    places = xy[twice]
+    first = np.searchsorted(twice, candidates.doorway_rows)
+    sides = sides_of_doors(candidates.space, xy[candidates.doorway_rows])
+    places[first], places[first + 1] = sides[:, 0], sides[:, 1]
     return places, twice
 
 
-def sides_of_door(space: NavigableSpace, point: FloatArray) -> FloatArray:
-    """The two viewpoints (2, 2) of a scanner in a doorway, on both sides of the door's line."""
-    lines = [shapely.LineString(item.opening.line) for item in space.openings]
-    nearest = lines[int(np.argmin(shapely.distance(lines, shapely.Point(point))))]
-    a, b = shapely.get_coordinates(nearest)[[0, -1]]
-    across = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
-    return np.array([point + DOOR_OFFSET * across, point - DOOR_OFFSET * across])
+def sides_of_doors(space: NavigableSpace, points: FloatArray) -> FloatArray:
+    """The two viewpoints (n, 2, 2) of a scanner in each doorway (n, 2), on both sides of the door's line."""
+    ends, tree = _door_lines(space)
+    point, door = tree.query_nearest(shapely.points(points), all_matches=True)
+    nearest = np.full(len(points), len(ends))
+    np.minimum.at(nearest, point, door)
+    a, b = ends[nearest, 0], ends[nearest, 1]
+    across = np.stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]], axis=1) / np.hypot(*(b - a).T)[:, None]
+    return np.stack([points + DOOR_OFFSET * across, points - DOOR_OFFSET * across], axis=1)
+
+
+@instance_cached
+def _door_lines(space: NavigableSpace) -> tuple[FloatArray, shapely.STRtree]:
+    """Ends of each door's line (doors, 2, 2), and a tree of the lines."""
+    lines = [item.opening.line for item in space.openings]
+    ends = np.array([(line[0], line[-1]) for line in lines]).reshape(-1, 2, 2)
+    return ends, shapely.STRtree([shapely.LineString(line) for line in lines])
 
 
 def open_space(candidates: Candidates) -> Mesh:

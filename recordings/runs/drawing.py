@@ -13,7 +13,7 @@ import rerun as rr
 
 from stopgo.mission.comparing.delayed_deviation import DelayedDeviation
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
@@ -124,18 +124,27 @@ class RunDrawing:
         self._cross_track.poses(poses, self._boot_id)
         self._last_xy = poses.xy[-1]
 
-    def state(self, report: StateReport) -> None:
-        """Draw the robot's and the stop's state on their lanes, and the battery on its plot."""
-        if self._cross_track.knows(report.last_event):
-            self.measure(report.robot_ns)
-        self._at(self.names.flat(entities.STATE), rr.StateChange(state=report.state), report.robot_ns)
-        stop_state = "" if report.stop_state is None else report.stop_state
-        self._at(self.names.flat(entities.STOP_STATE), rr.StateChange(state=stop_state), report.robot_ns)
-        self._at(self.names.flat(entities.STOP), rr.StateChange(state=report.stop or ""), report.robot_ns)
-        if report.charge is not None:
-            battery = rr.Scalars(report.charge * 100)
-            self._at(self.names.metric(entities.METRIC_BATTERY), battery, report.robot_ns)
-        self._note_vehicle_health(report)
+    def states(self, reports: Sequence[StateReport]) -> None:
+        """Draw the robot's and the stop's states on their lanes, and the battery on its plot."""
+        if not reports:
+            return
+        if self._cross_track.knows(reports[-1].last_event):
+            self.measure(reports[-1].robot_ns)
+        lanes = {
+            entities.STATE: [report.state for report in reports],
+            entities.STOP_STATE: [report.stop_state or "" for report in reports],
+            entities.STOP: [report.stop or "" for report in reports],
+        }
+        ns = frozen([report.robot_ns for report in reports], np.int64)
+        for lane, states in lanes.items():
+            self._columns(self.names.flat(lane), ns, rr.StateChange.columns(state=states))
+        charges = [(report.robot_ns, report.charge * 100) for report in reports if report.charge is not None]
+        if charges:
+            ns, percent = zip(*charges, strict=True)
+            battery = rr.Scalars.columns(scalars=percent)
+            self._columns(self.names.metric(entities.METRIC_BATTERY), frozen(ns, np.int64), battery)
+        for report in reports:
+            self._note_vehicle_health(report)
 
     def _note_vehicle_health(self, report: StateReport) -> None:
         """Write the vehicle's health at the begin, whenever it changes and at the end; log the changes."""

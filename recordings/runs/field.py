@@ -39,8 +39,14 @@ from stopgo.recordings.runs.stop_results import draw_stop_results
 
 DrawnReport = Report | Health | PosesMissing | ReportsMissing
 """Reports of a run that are drawn."""
-MOST_POSES = 1000
-"""Limit of poses that wait to be drawn together; the state report of each second draws them, too."""
+MOST_COLLECTED = 1000
+"""Most poses and states that are collected, to be drawn together."""
+COLLECTED_NS = 30 * 10**9
+"""Most time of the robot over which they are collected.
+
+Events draw what is collected, and each state where a viewer follows. What a killed writer has not drawn is
+still in the robot's record of its run.
+"""
 
 
 class FieldRecording:
@@ -72,7 +78,8 @@ class FieldRecording:
         self.path = path
         self._say = say
         self._waiting: list[DrawnReport] = []
-        self._poses: list[PoseReport] = []
+        self._collected: list[PoseReport | StateReport] = []
+        """Reports of one run and boot that are drawn next."""
         self._events: dict[str, dict[int, AnyEvent]] = {}
         """Events of each run by their number, until its results are written."""
         self._end_written = False
@@ -116,9 +123,11 @@ class FieldRecording:
             self._accept(report)
 
     def state(self, report: StateReport) -> None:
-        """Draw a snapshot of the robot's state."""
+        """Draw a snapshot of the robot's state, at once where a viewer follows or the run has ended."""
         self._accept(report)
-        self._save()
+        if self._port is not None or self._end_written:
+            self._draw_collected()
+            self._save()
 
     def pose(self, report: PoseReport) -> None:
         """Draw a pose of the robot."""
@@ -160,7 +169,7 @@ class FieldRecording:
         if self._first is not None:
             for report in self._waiting:
                 self._draw(report)
-            self._draw_poses()
+            self._draw_collected()
             if self._canvas is None:
                 self._begin(self._first)
             assert self._canvas is not None
@@ -223,31 +232,48 @@ class FieldRecording:
             self._draw(report)
 
     def _draw(self, report: DrawnReport) -> None:
-        """Draw a report; poses are collected, and drawn before the next report of another kind."""
+        """Draw a report; poses and states are collected, and drawn before the next report of another kind."""
         assert self._newest is not None
         if report.run_id is None:
             return
         run = self._runs.get(report.run_id) or self._start(report.run_id)
-        if isinstance(report, PoseReport):
-            self._poses.append(report)
-            if len(self._poses) >= MOST_POSES:
-                self._draw_poses()
+        is_collected = isinstance(report, PoseReport | StateReport)
+        is_revised = run.mission.revision < min(_revision(report), self._newest.revision)
+        if is_revised or not is_collected:
+            self._draw_collected()
+        if is_revised:
+            run.follow(self._newest, report)
+        if is_collected:
+            self._collect(report)
             return
-        self._draw_poses()
         if isinstance(report, Event):
             self._events.setdefault(report.run_id, {})[report.number] = report
-        if run.mission.revision < min(_revision(report), self._newest.revision):
-            run.follow(self._newest, report)
         _DRAW[type(report)](run, report)
 
-    def _draw_poses(self) -> None:
-        """Draw the collected poses, run by run and boot by boot."""
-        poses, self._poses = self._poses, []
-        for run_id, boot_id in dict.fromkeys((item.run_id, item.boot_id) for item in poses):
-            mine = [item for item in poses if (item.run_id, item.boot_id) == (run_id, boot_id)]
-            run = self._runs[str(run_id)]
-            run.read_start_time(mine[-1])
-            run.poses(track_of(mine), boot_id)
+    def _collect(self, report: PoseReport | StateReport) -> None:
+        """Collect a report; those before it are drawn and saved first if it does not go with them."""
+        if self._collected and not self._goes_with_collected(report):
+            self._draw_collected()
+            self._save()
+        self._collected.append(report)
+
+    def _goes_with_collected(self, report: PoseReport | StateReport) -> bool:
+        """True if a report is of the run and boot that the collected ones are of, and soon after them."""
+        first, is_full = self._collected[0], len(self._collected) >= MOST_COLLECTED
+        is_alike = (report.run_id, report.boot_id) == (first.run_id, first.boot_id)
+        return is_alike and not is_full and abs(report.robot_ns - first.robot_ns) <= COLLECTED_NS
+
+    def _draw_collected(self) -> None:
+        """Draw the collected poses and states."""
+        collected, self._collected = self._collected, []
+        if not collected:
+            return
+        run = self._runs[str(collected[0].run_id)]
+        poses = [item for item in collected if isinstance(item, PoseReport)]
+        if poses:
+            run.read_start_time(poses[-1])
+            run.poses(track_of(poses), poses[0].boot_id)
+        run.states([item for item in collected if isinstance(item, StateReport)])
 
     def _draw_results(self, run_id: str) -> None:
         """Write the results of a run's stops once, when it has ended or the file is closed."""
@@ -271,7 +297,7 @@ def _revision(report: DrawnReport) -> int:
 
 
 class _Draw(dict[type, Callable[[RunDrawing, Any], None]]):
-    """Method for each type of report; types not listed are events. Poses are drawn together."""
+    """Method for each type of report that is drawn alone; types not listed are events."""
 
     def __missing__(self, kind: type) -> Callable[[RunDrawing, Any], None]:
         return RunDrawing.event
@@ -279,7 +305,6 @@ class _Draw(dict[type, Callable[[RunDrawing, Any], None]]):
 
 _DRAW = _Draw(
     {
-        StateReport: RunDrawing.state,
         Health: RunDrawing.health,
         PosesMissing: RunDrawing.missing,
         ReportsMissing: RunDrawing.incomplete,

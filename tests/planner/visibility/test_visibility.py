@@ -19,7 +19,7 @@ from stopgo.planner.candidates import candidates
 from stopgo.planner.geometry.shapes import GRID, face_segments, local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
-from stopgo.planner.visibility.exact_sight import exact
+from stopgo.planner.visibility.exact_sight import DOOR_OFFSET, exact, sides_of_doors
 from tests.faults.sizes import some
 from tests.planner.oracle import visible_pairs
 from tests.planner.worlds import (
@@ -277,3 +277,15 @@ def test_a_scanner_in_a_closed_doorway_sees_both_rooms() -> None:
     beside = next(row for row in range(seen.rows) if row != doorway)
     sides = seen.targets.unit_xy[seen.seen_by(beside), 0] > 4.0
     assert sides.all() or not sides.any()
+
+
+def test_a_scanner_in_a_doorway_looks_from_both_sides_of_the_nearest_door() -> None:
+    rooms = (room("a", box(0, 0, 4, 4)), room("b", box(4.2, 0, 9, 4)))
+    doors = (door("d", (4.1, 1.0), (4.1, 2.0)), door("e", (4.1, 2.6), (4.1, 3.6)))
+    floor = floor_of(box(0, 0, 9, 4), rooms=rooms, elements=(shell(0, 0, 9, 4, id="w"),), openings=doors)
+    space = navigable(floor, Settings(doors="closed"))
+    points = np.array([(4.1, 1.5), (4.1, 3.1), (4.1, 2.3)])  # the last one is as near to both
+    sides = sides_of_doors(space, points)
+    across = np.array([(DOOR_OFFSET, 0.0)])
+    assert np.allclose(np.sort(sides, axis=1), np.stack([points - across, points + across], axis=1))
+    assert np.array_equal(sides, np.concatenate([sides_of_doors(space, point[None]) for point in points]))

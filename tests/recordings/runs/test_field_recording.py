@@ -92,6 +92,48 @@ def test_the_driven_path_grows_piece_by_piece(field: Path) -> None:
     assert np.concatenate(lengths).min() >= 0.05
 
 
+def _shown(recording: Path) -> dict[str, object]:
+    """All rows of values that change in a run, by their entity and component."""
+    changing = {entity: found for entity, (_, found) in components(recording).items() if RUN in entity}
+    return {
+        f"{entity} {name}": on(recording, entity, name, entities.ROBOT_TIME)
+        for entity, names in changing.items() for name in names
+    }  # fmt: skip
+
+
+def test_reports_that_are_drawn_together_are_drawn_as_each_alone(
+    tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Poses and states are collected over half a minute: each drawing costs as much as many poses."""
+    write_field(tmp_path / "together.rrd", mission)
+    monkeypatch.setattr("stopgo.recordings.runs.field.MOST_COLLECTED", 1)
+    write_field(tmp_path / "alone.rrd", mission)
+    together, alone = _shown(tmp_path / "together.rrd"), _shown(tmp_path / "alone.rrd")
+    assert {name for name in together if "driven" not in name} == {
+        name for name in alone if "driven" not in name
+    }
+    assert all(together[name] == alone[name] for name in together if "driven" not in name)
+
+
+def test_few_drawings_are_written_of_many_poses_and_states(
+    tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add, written = segment_file.SegmentFile.add, list[int]()
+
+    def counted(file: segment_file.SegmentFile, recording: bytes) -> None:
+        written.append(len(recording))
+        add(file, recording)
+
+    monkeypatch.setattr(segment_file.SegmentFile, "add", counted)
+    with FieldRecording(tmp_path / "field.rrd", mission) as recording:
+        recording.event(next(item for item in run.reports(mission) if not isinstance(item, StateReport)))
+        begun, teller = len(written), run._Teller(mission, run.RUN)
+        for second in range(300):
+            recording.pose(teller.pose(float(second), 0.01 * second, 0.0, 0.0))
+            recording.state(teller.state(float(second), "RUNNING"))
+        assert len(written) - begun <= 300 / 30
+
+
 def test_no_path_is_drawn_across_a_long_silence(tmp_path: Path, mission: Mission) -> None:
     path = tmp_path / "field.rrd"
     poses = [item for item in run.reports(mission) if isinstance(item, PoseReport)]

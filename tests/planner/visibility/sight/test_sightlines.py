@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
+from stopgo.planner.visibility.sight.sightlines import Midpoints, sees, sees_past
 from tests.planner.oracle import seen_in_fractions
 
 
@@ -33,6 +33,19 @@ def test_lines_are_reported_as_in_fractions(extent: int) -> None:
             for a, b, odd, pieces, face, seen in zip(*columns, strict=True):
                 told = seen_in_fractions(place, a, b, odd, pieces, edges, is_face=face, reach=reach)
                 assert bool(seen) == told, (seed, a, b, odd, pieces)
+
+
+@pytest.mark.parametrize("extent", [10, 2**29])
+def test_edges_that_are_tested_first_change_nothing(extent: int) -> None:
+    for seed in range(30):
+        place, midpoints, edges = lines_of(seed, extent)
+        first = np.random.default_rng(seed).integers(-1, len(edges), len(midpoints.odd))
+        seen, hidden_by = sees_past(place, midpoints, edges, first, reach=extent)
+        assert np.array_equal(seen, sees(place, midpoints, edges, reach=extent))
+        assert not np.any(seen & (hidden_by >= 0))
+        for k in np.flatnonzero(hidden_by >= 0).tolist():
+            one = midpoints.among(np.array([k]))
+            assert not sees(place, one, edges[hidden_by[k], None], reach=None).any()
 
 
 def test_the_range_ends_exactly_at_a_midpoint() -> None:
