@@ -34,6 +34,8 @@ FLOORS = {
 }
 COPIES = (4, 16, 56)
 """Numbers of copies of office-l1 that are one floor."""
+OFFICE_RANGE = 20
+"""A second range in office-l1, m."""
 HALL_RANGES = (5, 20)
 """Ranges in the hall, m."""
 START = ("--start", "26.393253,-31.5609,50")
@@ -42,6 +44,8 @@ OPTIONS = (
     *(("--overlap", "0.1"), ("--min-views", "2"), ("--minimise", "time")),
     *(("--robots", "3"), ("--robots", "3", "--minimise", "time"), ("--shift", "30min")),
 )
+LARGEST_CHECKED = 50_000
+"""Area in m² of the largest floor whose mission is checked: the time of all benchmarks is limited."""
 WITH_OPTIONS = ("office-l1", "office-l1, 4 times")
 STAGES = ("read", "navigable", "candidates", "visibility", "selection", "route", "figures", "files")
 
@@ -98,11 +102,23 @@ open(sys.argv[1], "w").write(json.dumps(figures))
 
 def planned(tree: Path, plan: Plan, out: Path, **environment: str) -> Run:
     """Plan by the version in a tree."""
-    command = ["-m", "stopgo", "plan", str(plan.floor), "-o", str(out), "--json", *plan.options]
+    wall, cpu, megabytes, answer = measured(
+        tree, "plan", str(plan.floor), "-o", str(out), "--json", *plan.options, **environment
+    )
+    return Run(wall, cpu, megabytes, json.loads(answer))
+
+
+def checked(plan: Plan, out: Path) -> float:
+    """CPU seconds of a check of the mission that was planned into a folder."""
+    return measured(ROOT, "check", str(out / "mission.json"), "--floor", str(plan.floor))[1]
+
+
+def measured(tree: Path, *command: str, **environment: str) -> tuple[float, float, float, bytes]:
+    """Wall and CPU seconds, megabytes and output of a command by the version in a tree."""
     with tempfile.NamedTemporaryFile() as figures:
         begin = time.monotonic()
         done = subprocess.run(
-            [sys.executable, "-S", "-c", MEASURED, figures.name, *command],
+            [sys.executable, "-S", "-c", MEASURED, figures.name, "-m", "stopgo", *command],
             cwd=tree,
             env={**os.environ, "PYTHONPATH": str(tree), **environment},
             stdout=subprocess.PIPE,
@@ -112,8 +128,8 @@ def planned(tree: Path, plan: Plan, out: Path, **environment: str) -> Run:
         wall = time.monotonic() - begin
         code, cpu, megabytes = json.load(figures)
     if code:
-        raise SystemExit(f"{plan.name} {' '.join(plan.options)}: {tree} ended with {code}")
-    return Run(wall, cpu, megabytes, json.loads(done.stdout))
+        raise SystemExit(f"{' '.join(command)}: {tree} ended with {code}")
+    return wall, cpu, megabytes, done.stdout
 
 
 def same(former: Path, present: Path) -> str:
@@ -128,6 +144,8 @@ def plans(folder: Path, counts: tuple[int, ...] = COPIES) -> Iterator[Plan]:
     at_hand = {name: path for name, path in FLOORS.items() if path.exists()}
     yield from (Plan(name, path) for name, path in at_hand.items())
     if "office-l1" in at_hand:
+        wide = ("--range", f"{OFFICE_RANGE}")
+        yield Plan(f"office-l1, range {OFFICE_RANGE} m", at_hand["office-l1"], wide)
         floor = read_floor(at_hand["office-l1"], FloorOptions())
         for count in counts:
             path = folder / f"copies-{count}.dxf"
@@ -141,11 +159,14 @@ def plans(folder: Path, counts: tuple[int, ...] = COPIES) -> Iterator[Plan]:
     )
 
 
-def head_and_rows(runs: list[tuple[Plan, Run]]) -> tuple[list[str], list[list[object]]]:
-    """The table of whole plans."""
-    head = ["plan", "m²", "stops / bound", "CPU s", "wall s", "MB"]
+def head_and_rows(
+    runs: list[tuple[Plan, Run]], checks: list[float | str]
+) -> tuple[list[str], list[list[object]]]:
+    """The table of whole plans, with the CPU seconds of the check of each."""
+    head = ["plan", "m²", "stops / bound", "CPU s", "wall s", "MB", "`check --floor` CPU s"]
     return head, [
-        [plan.name, run.area, run.stops, run.cpu_s, run.wall_s, round(run.megabytes)] for plan, run in runs
+        [plan.name, run.area, run.stops, run.cpu_s, run.wall_s, round(run.megabytes), check]
+        for (plan, run), check in zip(runs, checks, strict=True)
     ]
 
 
@@ -200,17 +221,18 @@ def main() -> None:
             put("former", former_table(Path(sys.argv[1]).resolve(), few, folder))
             return
         made = list(plans(folder))
-        runs = []
+        runs, checks = [], list[float | str]()
         for plan in made:
             runs.append((plan, planned(ROOT, plan, folder / "out")))
-            print(plan.name, runs[-1][1].cpu_s, flush=True)
+            checks.append("" if runs[-1][1].area > LARGEST_CHECKED else checked(plan, folder / "out"))
+            print(plan.name, runs[-1][1].cpu_s, checks[-1], flush=True)
         bytecode = str(folder / "bytecode")
         first = planned(ROOT, made[0], folder / "out", PYTHONPYCACHEPREFIX=bytecode)
         options = options_table(runs, folder / "out")
     text = "\n\n".join(
         (
             versions("numpy", "scipy", "shapely", "highspy", "rerun-sdk"),
-            table(*head_and_rows(runs)),
+            table(*head_and_rows(runs, checks)),
             f"The first plan after an installation, while Python compiles all modules that it loads: {first.cpu_s:.1f} s of CPU.",
             stages_table(runs),
             exponents(runs),
