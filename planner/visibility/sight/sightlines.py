@@ -237,7 +237,7 @@ def _crossed(offset: IntArray, pieces: IntArray, edges: IntArray) -> BoolArray:
 
 
 def _surely_crosses(offset: IntArray, pieces: IntArray, edges: IntArray) -> BoolArray:
-    """True where floating point tells for certain that an edge (n, 2, 2) crosses its line (n,)."""
+    """True where an edge (n, 2, 2) crosses its line for certain in floating point (n,)."""
     return _certain(offset, pieces, edges)[0]
 
 
