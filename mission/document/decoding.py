@@ -12,11 +12,11 @@ K = TypeVar("K")
 
 _PREPARING = threading.RLock()
 _PREPARED: dict[Any, msgspec.json.Decoder[Any]] = {}
-if hasattr(
-    os, "register_at_fork"
-):  # a fork while another thread prepares a kind would leave it locked for ever
+if hasattr(os, "register_at_fork"):  # else a fork while another thread prepares a kind leaves it locked
     os.register_at_fork(
-        before=_PREPARING.acquire, after_in_parent=_PREPARING.release, after_in_child=_PREPARING.release
+        before=_PREPARING.acquire,
+        after_in_parent=_PREPARING.release,
+        after_in_child=_PREPARING.release,
     )
 
 
