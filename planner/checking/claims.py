@@ -140,8 +140,11 @@ def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
     views = np.zeros(found.space.targets.total, dtype=np.int64)
     rows = np.setdiff1d(np.arange(len(found.kept)), found.extra_rows)
     from_all_over = rows[np.argsort(rows * APART % 1.0)]  # so most units are seen soon
+    is_left = np.ones(len(views), dtype=bool)
     for k in from_all_over.tolist():
-        views[seen_by(k, views < found.space.settings.least_views)] += 1
+        seen = seen_by(k, is_left)
+        views[seen] += 1
+        is_left[seen] = views[seen] < found.space.settings.least_views
     return frozen(views, np.int64)
 
 
@@ -161,10 +164,12 @@ def _viewer(found: Candidates, lines: SightLines) -> Callable[..., IntArray]:
     """Return the function of the units that a kept candidate sees all round, among some of them if given."""
     eyes, row = viewpoints_of(found)
     scanners = found.xy[found.kept]
+    first = np.searchsorted(row, np.arange(len(scanners) + 1)).tolist()
 
     def seen_by(k: int, among: BoolArray | None = None) -> IntArray:
-        views = [lines.seen_from(eye, among, scanner=scanners[k]) for eye in eyes[row == k]]
-        return np.unique(np.concatenate(views))
+        own = eyes[first[k] : first[k + 1]]
+        views = [lines.seen_from(eye, among, scanner=scanners[k]) for eye in own]
+        return views[0] if len(views) == 1 else np.unique(np.concatenate(views))
 
     return seen_by
 

@@ -80,8 +80,11 @@ class TestedLines:
 
     def seen_from(self, position: IntArray, among: BoolArray | None = None) -> IntArray:
         """Midpoints that a position (2,) in grid steps sees within the range, of `among` if given."""
-        chosen, edges = self._near(self._points, position), self._near(self._lines, position)
+        chosen = self._near(self._points, position)
         chosen = chosen if among is None else chosen[among[chosen]]
+        if not len(chosen):
+            return chosen
+        edges = self._near(self._lines, position)
         first, reach = _places(self._hidden_by[chosen], edges), round(self._reach / GRID)
         seen, by = sees_past(position, self.midpoints.among(chosen), self._edges[edges], first, reach=reach)
         self._hidden_by[chosen[by >= 0]] = edges[by[by >= 0]]
@@ -157,12 +160,12 @@ def sees_past(
     a, b = midpoints.a - position, midpoints.b - position
     offset = (midpoints.pieces - midpoints.odd)[:, None] * a + midpoints.odd[:, None] * b
     seen, by = ~midpoints.face | (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] > 0), np.full(len(a), -1)
-    known = np.flatnonzero(seen & (first >= 0))
-    hidden = known[_surely_crosses(offset[known], midpoints.pieces[known], edges[first[known]] - position)]
-    seen[hidden], by[hidden] = False, first[hidden]
     if reach is not None:
         lines = np.flatnonzero(seen)
         seen[lines] = _within(offset[lines], midpoints.pieces[lines], reach)
+    known = np.flatnonzero(seen & (first >= 0))
+    hidden = known[_surely_crosses(offset[known], midpoints.pieces[known], edges[first[known]] - position)]
+    seen[hidden], by[hidden] = False, first[hidden]
     lines = np.flatnonzero(seen)
     near = _nearest_first(edges - position, offset[lines], midpoints.pieces[lines])
     seen[lines], found = _open(offset[lines], midpoints.pieces[lines], edges[near] - position)
