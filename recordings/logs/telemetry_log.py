@@ -299,24 +299,24 @@ class _Vehicle:
     mode: str = ""
     boots: int = 0
     boot_ms: int = 0
-    clocks: list[tuple[int, int]] = field(default_factory=list)
-    """Time of receipt, and ns since boot, of messages that are WINDOW_NS apart."""
+    compared: tuple[int, int] | None = None
+    """Time of receipt, and ns since boot, of the last message whose clocks were compared."""
     rates: list[float] = field(default_factory=list)
-    """Seconds of the vehicle in a second of receipt, between two of them."""
+    """Seconds of the vehicle in a second of receipt, between two messages that are WINDOW_NS apart."""
 
     def note_clock(self, ns: int, boot_ms: int) -> None:
         """Compare the vehicle's clock with that of the station."""
-        if boot_ms < self.boot_ms:
-            self.clocks.clear()
-        if not self.clocks or ns - self.clocks[-1][0] >= WINDOW_NS:
-            self.clocks.append((ns, boot_ms * 10**6))
-            if len(self.clocks) > 1:
-                (begin, since), (end, until) = self.clocks[-2:]
-                self.rates.append((until - since) / (end - begin))
+        before = None if boot_ms < self.boot_ms else self.compared
+        now = (ns, boot_ms * 10**6)
+        if before is None:
+            self.compared = now
+        elif ns - before[0] >= WINDOW_NS:
+            self.rates.append((now[1] - before[1]) / (ns - before[0]))
+            self.compared = now
 
     @property
     def rate(self) -> float:
-        """The usual one of these; 1 where they are few, or the vehicle reports no time."""
+        """The usual one of the rates; 1 where they are few, or the vehicle reports no time."""
         usual = float(np.median(self.rates)) if len(self.rates) >= FEWEST_WINDOWS else 1.0
         return usual if usual > 0 else 1.0
 

@@ -159,7 +159,7 @@ def _is_missed_by_any_clock(replay: Replay, number: int, item: StopComparison) -
     over, unless no pose is within its tolerance.
     """
     if replay.inferred or item.outcome in DONE:
-        return not replay.inferred and is_off(item)
+        return not replay.inferred and _is_off(item)
     if item.outcome != "skipped" or not (item.reason or "").startswith(JUMPED_OVER):
         return item.outcome == "skipped"
     stop, poses = replay.mission.stops[number], replay.run.poses
@@ -167,7 +167,7 @@ def _is_missed_by_any_clock(replay: Replay, number: int, item: StopComparison) -
     return bool(len(poses)) and is_outside(float(away_m.min()), stop.tolerance_m)
 
 
-def is_off(item: StopComparison) -> bool:
+def _is_off(item: StopComparison) -> bool:
     """True if it was visited outside of its tolerance."""
     return is_outside(item.deviation_m or 0.0, item.tolerance_m or 0.0)
 
