@@ -171,6 +171,7 @@ class SiteFleet:
             station = Station(
                 self.link, keys, commander=self.commander, timeout_s=self.options.timeout_s, held=self.held
             )
+            station.stop_remedy = ""  # the page sends it again itself
             robot = LiveRobot(station, self.feed, self.missions, self.recorder)
             self.robots[name] = robot
         thread = threading.Thread(target=robot.work, args=(self.stopped,), daemon=True)
