@@ -207,13 +207,14 @@ Version = tuple[str, Stamp]
 def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
     """Yield every recording below a folder; files of other types, and what is hidden, are ignored.
 
+    A link to nothing and a pipe that are named as recordings are yielded, too: reading them gives the reason.
     The store of a batch is hidden: it holds each plan of the folder once more.
     """
     for folder_path, below, names in os.walk(folder):
         below[:] = [name for name in below if not name.startswith(".")]
         for name in names:
             path = Path(folder_path, name)
-            if name.endswith(SUFFIX) and not name.startswith(".") and path.is_file():
+            if name.endswith(SUFFIX) and not name.startswith("."):
                 try:
                     stamp = stamp_of(path)
                 except FileNotFoundError:  # removed since it was listed
@@ -222,7 +223,8 @@ def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
 
 
 def stamp_of(path: Path) -> Stamp:
-    state = path.stat()
+    """Return the stamp of a file, or of a link to nothing."""
+    state = path.stat() if path.exists() else path.lstat()
     return state.st_size, state.st_mtime_ns
 
 

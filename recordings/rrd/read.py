@@ -138,7 +138,7 @@ def _check_is_recording(path: Path) -> None:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name the recordings in it, as {path}/*.rrd")
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise InputError(f"{path}: {_why_no_file(path)}")
     try:
         with path.open("rb") as file:
             begin = file.read(len(MARK))
@@ -150,10 +150,17 @@ def _check_is_recording(path: Path) -> None:
         raise InputError(f"{path}: is not a Rerun recording")
 
 
+def _why_no_file(path: Path) -> str:
+    if path.is_symlink() and not path.exists():
+        return "is a link to a file that does not exist"
+    return "is a pipe, a socket or a device, not a file" if path.exists() else "no such file"
+
+
 def _read_problem(path: Path, error: Exception) -> str:
     if "Not an RRD file" in str(error) or "too small" in str(error):
         return "is not a Rerun recording"
-    return f"is truncated; save the rest with: rerun rrd optimize {path.name} -o repaired.rrd"
+    problem = "is truncated" if "exceeds file size" in str(error) else "is damaged"
+    return f"{problem}; save the rest with: rerun rrd optimize {path.name} -o repaired.rrd"
 
 
 def _reason(error: Exception) -> str:
