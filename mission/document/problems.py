@@ -10,7 +10,8 @@ import msgspec
 from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Point, PositionError, Start, Stop
-from stopgo.mission.frames.geodesy import HIGHEST_M, out_of_reach
+from stopgo.mission.frames.geodesy import out_of_reach
+from stopgo.mission.settings.parameter import HIGHEST_M
 
 JOIN = 1e-3
 """Metres within which the ends of two legs are the same point."""

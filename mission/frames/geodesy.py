@@ -24,8 +24,6 @@ REACH_M = 20_000.0
 """Metres from the origin beyond which a plane is no usable map of the earth."""
 LATITUDE_LIMIT = 89.0
 """Degrees beyond which a site has no east and north: its meridians meet."""
-HIGHEST_M = 10_000.0
-"""Metres above or below the sea beyond which no site lies."""
 _CLOSE = 1e-13
 """Degrees (0.01 µm) within which an inverse is exact."""
 

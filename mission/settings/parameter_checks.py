@@ -6,11 +6,11 @@ import datetime
 from typing import NoReturn
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.frames.geodesy import HIGHEST_M
 from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.mission.settings.given_heights import heights_by_kind
 from stopgo.mission.settings.layer_kinds import check_entries
+from stopgo.mission.settings.parameter import HIGHEST_M
 from stopgo.mission.settings.scanners import SCANNERS
 
 

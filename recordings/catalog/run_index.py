@@ -17,6 +17,7 @@ from stopgo.mission.console.table import duration, table
 from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.file_name import legible_name
 from stopgo.mission.stages.figures import percent
 
 if TYPE_CHECKING:
@@ -207,7 +208,8 @@ Version = tuple[str, Stamp]
 def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
     """Yield every recording below a folder; files of other types, and what is hidden, are ignored.
 
-    A link to nothing and a pipe that are named as recordings are yielded, too: reading them gives the reason.
+    A link to nothing and a pipe that are named as recordings are yielded, too, and so is a name that is no
+    text: reading them gives the reason.
     The store of a batch is hidden: it holds each plan of the folder once more.
     """
     for folder_path, below, names in os.walk(folder):
@@ -219,7 +221,7 @@ def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
                     stamp = stamp_of(path)
                 except FileNotFoundError:  # removed since it was listed
                     continue
-                yield str(path.relative_to(folder)), stamp
+                yield legible_name(str(path.relative_to(folder))), stamp
 
 
 def stamp_of(path: Path) -> Stamp:

@@ -12,6 +12,7 @@ from typing import Any
 from rerun.chunk import Chunk, RrdReader, StoreEntry
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.file_name import NOT_TEXT, UNREADABLE, is_text, legible_name
 from stopgo.recordings.drawing import entities
 
 MARK = b"RRF2"
@@ -135,6 +136,8 @@ def looks_like_one(path: Path) -> bool:
 
 
 def _check_is_recording(path: Path) -> None:
+    if not is_text(str(path)):
+        raise InputError(f"{legible_name(str(path))}: {NOT_TEXT}")
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name the recordings in it, as {path}/*.rrd")
     if not path.is_file():
@@ -151,6 +154,8 @@ def _check_is_recording(path: Path) -> None:
 
 
 def _why_no_file(path: Path) -> str:
+    if UNREADABLE in path.name:
+        return NOT_TEXT
     if path.is_symlink() and not path.exists():
         return "is a link to a file that does not exist"
     return "is a pipe, a socket or a device, not a file" if path.exists() else "no such file"

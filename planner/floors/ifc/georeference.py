@@ -10,7 +10,7 @@ import pyproj
 from pyproj.exceptions import CRSError, ProjError
 
 from stopgo.mission.floor import Finding, Georeference
-from stopgo.mission.frames.geodesy import HIGHEST_M
+from stopgo.mission.settings.parameter import HIGHEST_M
 from stopgo.planner.floors.ifc.model import OnEarth, Placement
 from stopgo.planner.floors.legible_text import legible
 

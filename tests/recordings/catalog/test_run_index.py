@@ -143,6 +143,20 @@ def test_what_is_named_as_a_recording_and_is_no_file_is_reported(
     assert len(index_of(tmp_path).faults()) == 1
 
 
+def test_a_name_that_is_no_text_does_not_end_the_list(
+    tmp_path: Path, sighted: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Archives from other systems hold such names; the index could not be written with one."""
+    shutil.copy(sighted, tmp_path / "plan.rrd")
+    shutil.copy(sighted, tmp_path / os.fsdecode(b"B\xfcro.rrd"))
+    main(["runs", str(tmp_path)])
+    shown = capsys.readouterr()
+    assert "plan.rrd" in shown.out
+    assert "B\ufffdro.rrd: is not UTF-8 text; rename the file or folder" in shown.err
+    main(["review", str(tmp_path)])
+    assert "B\ufffdro.rrd: is not UTF-8 text; rename the file or folder" in capsys.readouterr().err
+
+
 def test_a_run_is_compared_again_when_its_plan_comes_and_goes(
     sighted: Path, skipping: Path, tmp_path: Path
 ) -> None:
