@@ -198,10 +198,11 @@ def with_ros_arguments(arguments: list[str]) -> list[str]:
 def _must_be_text(arguments: list[str]) -> None:
     """Refuse a name of bytes that are not UTF-8 before anything is written: no message could show it."""
     from stopgo.mission.console.table import printable
+    from stopgo.mission.files.file_name import NOT_TEXT, is_text
 
     for argument in arguments:
-        if any("\ud800" <= letter <= "\udfff" for letter in argument):
-            raise InputError(f"{printable(argument)}: is not UTF-8 text; rename the file or folder")
+        if not is_text(argument):
+            raise InputError(f"{printable(argument)}: {NOT_TEXT}")
 
 
 def _ended_by(error: BaseException, signals: Signals) -> tuple[str, int]:

@@ -144,6 +144,8 @@ class Station:
         """Stop that the last command was meant for."""
         self.asked_at = time.monotonic()
         """Time of the last query for the robot's state: its answer is no older than that."""
+        self.stop_remedy = UNTIL_ANSWERED
+        """Remedy for a pause or an abort without an answer, as the error names it."""
         self.direct: Callable[..., DirectQuestion] | None = None
         """Asks a question on a connection of its own; `None` if that is not to be tried."""
         self.keys = keys
@@ -419,7 +421,7 @@ class Station:
                 f" see stopgo status. It has expired, and has no effect later{self._distrusted()}"
             )
         if reply is None:
-            raise self._unanswered(order.verb, UNTIL_ANSWERED if order.verb in FREE_VERBS else "")
+            raise self._unanswered(order.verb, self.stop_remedy if order.verb in FREE_VERBS else "")
         answer = read_answer(reply, order, robot=self.keys.robot)
         if answer.outcome == "refused":
             why = f"{answer.reason}: {answer.message}"
@@ -434,11 +436,12 @@ class Station:
         """Make a pause or an abort: a few hundred bytes, without an earlier query of the robot."""
         given = {key: value for key, value in details.items() if value is not None}
         plain: dict[str, Any] = {
+            "cmd_id": uuid.uuid4().hex,
             "commander": self.commander,
             "issued_ns": 0,
             "valid_for_s": LONGEST_VALID_S,
         }
-        return RunCommand(cmd_id=uuid.uuid4().hex, verb=verb, **(plain | given))
+        return RunCommand(verb=verb, **(plain | given))
 
     def order(self, verb: Verb, *, shown: ShownStop | None = None, **details: Any) -> RunCommand:
         """Make a command for the robot's present state: a late command meets another state and is refused.

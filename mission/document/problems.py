@@ -11,6 +11,7 @@ from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Point, PositionError, Start, Stop
 from stopgo.mission.frames.geodesy import out_of_reach
+from stopgo.mission.settings.parameter import HIGHEST_M
 
 JOIN = 1e-3
 """Metres within which the ends of two legs are the same point."""
@@ -56,6 +57,8 @@ def _georeference(mission: Mission) -> Iterator[Problem]:
     site = mission.georeference
     if site is not None and not (abs(site.lat) <= 90 and abs(site.lon) <= 180):
         yield Problem("$.georeference", f"lat {site.lat}, lon {site.lon} is not a position on Earth")
+    if site is not None and abs(site.alt) > HIGHEST_M:
+        yield Problem("$.georeference", f"alt is {site.alt:g}; it must be within ±{HIGHEST_M:g} m")
     far = out_of_reach((mission.start.x, mission.start.y))
     if site is not None and far:
         yield Problem("$.georeference", f"the start {far}")

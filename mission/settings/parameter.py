@@ -18,6 +18,8 @@ GROUPS = ("Floor", "Scanner", "Robot", "Quality", "Route", "Fleet", "Output", "P
 Pair = tuple[float, float]
 
 LARGEST = 1e6
+HIGHEST_M = 10_000.0
+"""Metres above or below the sea beyond which no site lies."""
 FARTHEST = 1e9
 """Coordinates of a site may be this large, in metres."""
 

@@ -10,6 +10,7 @@ from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.mission.settings.given_heights import heights_by_kind
 from stopgo.mission.settings.layer_kinds import check_entries
+from stopgo.mission.settings.parameter import HIGHEST_M
 from stopgo.mission.settings.scanners import SCANNERS
 
 
@@ -162,8 +163,12 @@ def _check_lists(settings: Settings) -> None:
     for x, y, radius in settings.avoid:
         if radius <= 0:
             raise InputError(f"--avoid {x:g},{y:g},{radius:g}: the radius must be greater than 0")
-    if settings.origin is not None and not (abs(settings.origin[0]) <= 90 and abs(settings.origin[1]) <= 180):
-        _refuse(settings, "origin", "latitude must be within ±90, longitude within ±180")
+    if settings.origin is not None:
+        latitude, longitude, altitude_m, _ = settings.origin
+        if not (abs(latitude) <= 90 and abs(longitude) <= 180):
+            _refuse(settings, "origin", "latitude must be within ±90, longitude within ±180")
+        if abs(altitude_m) > HIGHEST_M:
+            _refuse(settings, "origin", f"altitude must be within ±{HIGHEST_M:g} m")
 
 
 def _check_region(settings: Settings) -> None:

@@ -56,6 +56,7 @@ def floor_doubts(space: NavigableSpace, *, reached_m2: float) -> tuple[Finding, 
         *_missing_walls(space),
         *_stray_elements(space.floor),
         *_wall_gaps(space),
+        *_raster_visibility(space),
     )
 
 
@@ -104,6 +105,15 @@ def _little_reached(space: NavigableSpace, reached_m2: float) -> Iterator[Findin
             "little_reached",
             f"the plan reaches {reached_m2:.1f} m² of {whole:.1f} m² of floor; "
             "see `unreached` for the reasons",
+        )
+
+
+def _raster_visibility(space: NavigableSpace) -> Iterator[Finding]:
+    if space.settings.visibility != "exact":
+        yield Finding(
+            "raster_visibility",
+            f"visibility and coverage are counted on a raster, by --visibility {space.settings.visibility};"
+            " check --floor counts line by line and may refute them: plan with --visibility exact",
         )
 
 

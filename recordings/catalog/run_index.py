@@ -17,6 +17,7 @@ from stopgo.mission.console.table import duration, table
 from stopgo.mission.document.decoding import decoded
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.file_name import legible_name
 from stopgo.mission.stages.figures import percent
 
 if TYPE_CHECKING:
@@ -207,22 +208,25 @@ Version = tuple[str, Stamp]
 def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
     """Yield every recording below a folder; files of other types, and what is hidden, are ignored.
 
+    A link to nothing and a pipe that are named as recordings are yielded, too, and so is a name that is no
+    text: reading them gives the reason.
     The store of a batch is hidden: it holds each plan of the folder once more.
     """
     for folder_path, below, names in os.walk(folder):
         below[:] = [name for name in below if not name.startswith(".")]
         for name in names:
             path = Path(folder_path, name)
-            if name.endswith(SUFFIX) and not name.startswith(".") and path.is_file():
+            if name.endswith(SUFFIX) and not name.startswith("."):
                 try:
                     stamp = stamp_of(path)
                 except FileNotFoundError:  # removed since it was listed
                     continue
-                yield str(path.relative_to(folder)), stamp
+                yield legible_name(str(path.relative_to(folder))), stamp
 
 
 def stamp_of(path: Path) -> Stamp:
-    state = path.stat()
+    """Return the stamp of a file, or of a link to nothing."""
+    state = path.stat() if path.exists() else path.lstat()
     return state.st_size, state.st_mtime_ns
 
 

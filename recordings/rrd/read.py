@@ -12,6 +12,7 @@ from typing import Any
 from rerun.chunk import Chunk, RrdReader, StoreEntry
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.file_name import NOT_TEXT, UNREADABLE, is_text, legible_name
 from stopgo.recordings.drawing import entities
 
 MARK = b"RRF2"
@@ -135,10 +136,12 @@ def looks_like_one(path: Path) -> bool:
 
 
 def _check_is_recording(path: Path) -> None:
+    if not is_text(str(path)):
+        raise InputError(f"{legible_name(str(path))}: {NOT_TEXT}")
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name the recordings in it, as {path}/*.rrd")
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise InputError(f"{path}: {_why_no_file(path)}")
     try:
         with path.open("rb") as file:
             begin = file.read(len(MARK))
@@ -150,10 +153,19 @@ def _check_is_recording(path: Path) -> None:
         raise InputError(f"{path}: is not a Rerun recording")
 
 
+def _why_no_file(path: Path) -> str:
+    if UNREADABLE in path.name:
+        return NOT_TEXT
+    if path.is_symlink() and not path.exists():
+        return "is a link to a file that does not exist"
+    return "is a pipe, a socket or a device, not a file" if path.exists() else "no such file"
+
+
 def _read_problem(path: Path, error: Exception) -> str:
     if "Not an RRD file" in str(error) or "too small" in str(error):
         return "is not a Rerun recording"
-    return f"is truncated; save the rest with: rerun rrd optimize {path.name} -o repaired.rrd"
+    problem = "is truncated" if "exceeds file size" in str(error) else "is damaged"
+    return f"{problem}; save the rest with: rerun rrd optimize {path.name} -o repaired.rrd"
 
 
 def _reason(error: Exception) -> str:

@@ -27,6 +27,7 @@ from stopgo.batches.work import PlanOutcome, PlanTask, known_key, present_conten
 from stopgo.mission.console.running_step import running
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.file_name import is_text
 
 MODELS = (".ifc", ".ifczip")
 
@@ -47,7 +48,7 @@ def expanded(file: Path, store: Path, *, workers: int) -> Expansion:
         except InputError:  # `expand` reports it with its place
             continue
     with running(f"reading the models of {file}"):
-        storeys = _surveys([path for path in models if path.is_file()], store, workers)
+        storeys = _surveys([path for path in models if is_text(str(path)) and path.is_file()], store, workers)
     found = expand(groups, storeys)
     problems = (*(EntryFault("", fault) for fault in faults), *found.problems)
     return Expansion(found.entries, problems, found.left_out)

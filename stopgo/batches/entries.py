@@ -11,6 +11,7 @@ from typing import Any
 
 from stopgo.batches.batch_file import FloorGroup
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.file_name import NOT_TEXT, is_text, legible_name
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import Settings
 
@@ -101,6 +102,9 @@ def expand(
             problems.append(EntryFault(group.place, str(error)))
             continue
         for floor in files:
+            if not is_text(str(floor)):
+                problems.append(EntryFault(group.place, f"{legible_name(str(floor))}: {NOT_TEXT}"))
+                continue
             if not floor.is_file():
                 problems.append(EntryFault(group.place, f"{floor}: no such file; check the name"))
                 continue

@@ -1,22 +1,26 @@
 """Orders of pages to robots: sent at once over the open links, and shown until the robot stands.
 
 A stop goes to every robot that it names, whatever state the site believes in. It has threads of its own, so
-nothing else delays it. What became known is shown with its time; what did not is shown as unknown.
+nothing else delays it. What became known is shown with its time; what did not is shown as unknown. A pause
+without an answer is sent again by other threads, until the robot answers.
 """
 
 from __future__ import annotations
 
 import threading
 import time
+import uuid
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
 import msgspec
 
+from stopgo.bridge.mavlink.auto.open_vehicle import OpenVehicle
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, StopgoError
 from stopgo.mission.mavlink.telemetry import STILL_M_S
@@ -28,6 +32,10 @@ MOST_KEPT = 200
 STOP_THREADS, ORDER_THREADS = 64, 16
 WATCHED_S = 30.0
 """Time for which a stop is watched until the robot stands."""
+REPEATED_S = 600.0
+"""Time for which a pause without an answer is sent again."""
+AGAIN_S = 0.5
+"""Pause before it is sent again."""
 DRIVING = ("RUNNING", "HOMING")
 
 OrderOutcome = Literal["sent", "ok", "refused", "unknown", "not_sent"]
@@ -82,6 +90,19 @@ class OrderRecord:
     reason: str = ""
     message: str = ""
     state: str = ""
+    repeated: bool = False
+    """True while a pause without an answer is sent again."""
+
+
+@dataclass(frozen=True)
+class UnansweredPause:
+    """A pause that is sent again until the robot answers; it has one command id, so it takes effect once."""
+
+    robot: LiveRobot
+    record: OrderRecord
+    cmd_id: str
+    until_s: float
+    """Time on the monotonic clock at which it is given up."""
 
 
 class RobotOrders:
@@ -96,10 +117,16 @@ class RobotOrders:
         self._others = ThreadPoolExecutor(ORDER_THREADS, "order")
         self._watched: dict[str, tuple[OrderRecord, float]] = {}
         """Stops whose robot is not known to stand, and when each was sent on the monotonic clock."""
+        self._repeats = ThreadPoolExecutor(STOP_THREADS, "repeat")
+        self._unanswered: dict[str, str] = {}
+        """Id of each robot's newest pause, until it is answered or the robot obeys another order."""
+        self._closed = threading.Event()
 
     def close(self) -> None:
         """Give no more orders; those on their way are waited for by nobody."""
+        self._closed.set()
         self._stops.shutdown(wait=False, cancel_futures=True)
+        self._repeats.shutdown(wait=False, cancel_futures=True)
         self._others.shutdown(wait=False, cancel_futures=True)
 
     def stop(self, request: StopRequest) -> list[Future[OrderRecord]]:
@@ -152,8 +179,12 @@ class RobotOrders:
         sent_s = time.monotonic()
         station = robot.station
         sent = OrderRecord(order_id, robot.name, verb, time.time())
+        # A vehicle in AUTO has no command ids: sent again, HOLD would end what a pilot does meanwhile.
+        cmd_id = uuid.uuid4().hex if verb == "pause" and not isinstance(station, OpenVehicle) else ""
         with self._lock:
             self._watched[robot.name] = (sent, sent_s)
+            if cmd_id:
+                self._unanswered[robot.name] = order_id
         robot.on_change = partial(self.look_if_standing, robot)
         heard_at: list[float] = []
 
@@ -161,17 +192,84 @@ class RobotOrders:
             heard_at.append(time.time())
             self._tell(replace(sent, heard_at=heard_at[0]))
 
+        give = partial(station.command, verb, **({"cmd_id": cmd_id} if cmd_id else {}))
         with station.hearing(heard):
-            done = self._run(order_id, robot, verb, partial(station.command, verb), sent=sent)
+            done = self._run(order_id, robot, verb, give, sent=sent)
         if heard_at:
             done = replace(done, heard_at=heard_at[0])
             self._tell(done)
+        if cmd_id:
+            done = self._repeat_until_answered(robot, done, cmd_id, sent_s)
         with self._lock:
             watched = self._watched.get(robot.name)
             if watched is not None and watched[0].id == order_id:
                 self._watched[robot.name] = (done, sent_s)
         self.look_if_standing(robot)
         return done
+
+    def _repeat_until_answered(
+        self, robot: LiveRobot, done: OrderRecord, cmd_id: str, sent_s: float
+    ) -> OrderRecord:
+        """Begin to send a pause again if it was not answered; return its record, which says so."""
+        with self._lock:
+            if self._unanswered.get(robot.name) != done.id:
+                return done
+            if done.heard_at is not None or self._closed.is_set():
+                del self._unanswered[robot.name]
+                return done
+        done = replace(done, repeated=True)
+        self._tell(done)
+        self._send_later(UnansweredPause(robot, done, cmd_id, sent_s + REPEATED_S))
+        return done
+
+    def _send_later(self, pause: UnansweredPause) -> None:
+        with suppress(RuntimeError):  # the site is closed meanwhile
+            self._repeats.submit(self._send_again, pause)
+
+    def _send_again(self, pause: UnansweredPause) -> None:
+        """Send a pause again; without an answer once more, after those of other robots."""
+        robot, record = pause.robot, pause.record
+        self._closed.wait(AGAIN_S)
+        sent_s = time.monotonic()
+        if self._closed.is_set() or not self._is_wanted(pause, sent_s):
+            return
+        give = partial(robot.station.command, "pause", cmd_id=pause.cmd_id)
+        record = _outcome(record, give)
+        if record.heard_at is None:
+            if record.outcome != pause.record.outcome == "not_sent":  # now it may have been sent
+                self._tell(self._with_standing(record))
+            else:
+                record = pause.record
+            self._send_later(replace(pause, record=record))
+            return
+        record = replace(record, repeated=False)
+        with self._lock:
+            if self._unanswered.get(robot.name) != record.id:
+                return
+            del self._unanswered[robot.name]
+            self._watched[robot.name] = (record, sent_s)
+        self._tell(self._with_standing(record))
+        self.look_if_standing(robot)
+
+    def _is_wanted(self, pause: UnansweredPause, now_s: float) -> bool:
+        """Return False, and show it, if a pause is not to be sent again."""
+        name = pause.robot.name
+        with self._lock:
+            newest = self._unanswered.get(name)
+            if newest == pause.record.id and now_s < pause.until_s:
+                return True
+            if newest == pause.record.id:
+                del self._unanswered[name]
+        if newest in (pause.record.id, None):
+            self._tell(self._with_standing(replace(pause.record, repeated=False)))
+        return False
+
+    def _with_standing(self, record: OrderRecord) -> OrderRecord:
+        """Return a record with the time at which the robot was seen to stand, if the page shows one."""
+        shown = self._feed.value("stop", record.robot)
+        if shown is None or shown["id"] != record.id:
+            return record
+        return replace(record, standing_at=shown["standing_at"])
 
     def _run(
         self,
@@ -185,13 +283,10 @@ class RobotOrders:
         """Give an order, and show it when it is sent and when its outcome is known."""
         record = sent or OrderRecord(order_id, robot.name, verb, time.time())
         self._tell(record)
-        try:
-            answer = give()
-        except StopgoError as error:
-            record = replace(record, **_failure(error))
-        else:
-            state, message = str(getattr(answer, "state", "")), str(getattr(answer, "message", ""))
-            record = replace(record, outcome="ok", heard_at=time.time(), state=state, message=message)
+        record = _outcome(record, give)
+        if verb != "pause" and record.outcome == "ok":  # the robot obeys the newer order
+            with self._lock:
+                self._unanswered.pop(robot.name, None)
         self._tell(record)
         return record
 
@@ -213,6 +308,16 @@ class RobotOrders:
     def _tell(self, record: OrderRecord) -> None:
         kind = "stop" if record.verb in ("pause", "abort") else "order"
         self._feed.tell((kind, record.robot), asdict(record), at_once=True)
+
+
+def _outcome(record: OrderRecord, give: Callable[[], Any]) -> OrderRecord:
+    """Give an order, and return its record with what became known."""
+    try:
+        answer = give()
+    except StopgoError as error:
+        return replace(record, **_failure(error))
+    state, message = str(getattr(answer, "state", "")), str(getattr(answer, "message", ""))
+    return replace(record, outcome="ok", heard_at=time.time(), state=state, message=message)
 
 
 def _details(request: OrderRequest) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import Any
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import InputError
+from stopgo.mission.files.file_name import NOT_TEXT, UNREADABLE, legible_name
 from stopgo.mission.files.mission_json import read
 
 FLOORS = (".dxf", ".ifc", ".ifczip", ".ifcxml")
@@ -44,7 +45,8 @@ class SiteFiles:
         """
         path = self.path(name)
         if not path.is_file():
-            raise InputError(f"{name[:100]!r}: no such file in the site's folder")
+            problem = NOT_TEXT if UNREADABLE in name else "no such file in the site's folder"
+            raise InputError(f"{name[:100]!r}: {problem}")
         return path
 
     def plain(self, text: str) -> str:
@@ -110,7 +112,7 @@ class SiteFiles:
                 return
             for name in names:
                 if not name.startswith(".") and Path(folder, name).is_file():
-                    yield self.name_of(Path(folder, name))
+                    yield legible_name(self.name_of(Path(folder, name)))
 
 
 def _is_floor(name: str) -> bool:

@@ -48,13 +48,12 @@ from stopgo.site.run_routes import run_routes
 from stopgo.site.server_certificate import own_certificate
 from stopgo.site.site_folder import SiteFiles
 from stopgo.site.web_app import SiteParts, web_app
+from stopgo.site.web_connections import MOST_CONNECTIONS, PageConnection
 from stopgo.site.web_viewer import WebViewer
 
 HERE = "127.0.0.1"
 END_S = 5.0
 """Longest wait for a robot's thread when the site ends; the link is closed then."""
-CONNECTIONS = 128
-"""Requests and streams at the same time."""
 
 
 @dataclass(frozen=True)
@@ -171,6 +170,7 @@ class SiteFleet:
             station = Station(
                 self.link, keys, commander=self.commander, timeout_s=self.options.timeout_s, held=self.held
             )
+            station.stop_remedy = ""  # the page sends it again itself
             robot = LiveRobot(station, self.feed, self.missions, self.recorder)
             self.robots[name] = robot
         thread = threading.Thread(target=robot.work, args=(self.stopped,), daemon=True)
@@ -281,7 +281,7 @@ def _listener(options: SiteOptions) -> Iterator[socket.socket]:
             if os.name == "posix":
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.bind((host, port))
-            listener.listen(CONNECTIONS)
+            listener.listen(MOST_CONNECTIONS)
         except (OSError, OverflowError) as error:
             listener.close()
             if last:
@@ -340,8 +340,8 @@ def _running(app: Any, listener: socket.socket, tls: tuple[Path, Path] | None) -
     """Run the server on a thread of its own until the block ends."""
     config = uvicorn.Config(
         app, log_config=None, access_log=False, server_header=False, proxy_headers=False, lifespan="off",
-        ws="none", http="h11", loop="asyncio", limit_concurrency=CONNECTIONS, timeout_keep_alive=30,
-        timeout_graceful_shutdown=2, h11_max_incomplete_event_size=16 * 1024,
+        ws="none", http=PageConnection, loop="asyncio", limit_concurrency=MOST_CONNECTIONS,
+        timeout_keep_alive=30, timeout_graceful_shutdown=2, h11_max_incomplete_event_size=16 * 1024,
         ssl_certfile=None if tls is None else str(tls[0]), ssl_keyfile=None if tls is None else str(tls[1]),
     )  # fmt: skip
     try:

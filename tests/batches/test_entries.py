@@ -163,3 +163,12 @@ def test_dates_without_quotes_are_entries(tmp_path: Path) -> None:
 def test_a_number_where_a_text_belongs_needs_quotes(tmp_path: Path) -> None:
     _, problems = read_batch(batch_file(tmp_path, '[[floors]]\nfiles = "a.ifc"\nstoreys = [1]'))
     assert problems[0].endswith("storeys[0]: Expected `str`, got `int`; write it in quotes")
+
+
+def test_a_floor_whose_name_is_no_text_is_one_line_and_the_others_are_planned(tmp_path: Path) -> None:
+    """The batch was planned, and then its table could not be written."""
+    (tmp_path / os.fsdecode(b"B\xfcro.dxf")).touch()
+    found = expanded(tmp_path, '[[floors]]\nfiles = "*.dxf"')
+    assert names(found) == ["hall"]
+    (problem,) = found.problems
+    assert str(problem).endswith("B\ufffdro.dxf: is not UTF-8 text; rename the file or folder")

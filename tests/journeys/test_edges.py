@@ -155,6 +155,13 @@ def test_a_name_longer_than_any_is_reported_by_its_beginning(capsys: pytest.Capt
     assert len(line) < 300
 
 
+@pytest.mark.parametrize("altitude", ["1e+08", "-10001"])
+def test_a_site_is_not_in_space(altitude: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--origin", f"47,8,{altitude},0", "--print-config"]) == 2
+    line = f"stopgo: --origin 47,8,{altitude},0: altitude must be within ±10000 m\n"
+    assert capsys.readouterr().err == line
+
+
 @pytest.mark.parametrize("radius", ["-2", "0"])
 def test_a_circle_to_avoid_has_a_radius(radius: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "--avoid", f"1,1,{radius}", "--print-config"]) == 2

@@ -60,3 +60,15 @@ def test_a_message_does_not_say_where_the_folder_is(tmp_path: Path) -> None:
     assert files.plain(f"{tmp_path}: not a folder") == "the site's folder: not a folder"
     assert files.plain(f"{tmp_path}{os.sep}a.rrd: damaged") == "a.rrd: damaged"
     assert files.plain(f"{tmp_path}-old: kept") == f"{tmp_path}-old: kept"
+
+
+def test_a_floor_whose_name_is_no_text_is_listed_and_refused_with_the_reason(tmp_path: Path) -> None:
+    """No answer could hold its name: the page showed no list at all."""
+    (tmp_path / os.fsdecode(b"B\xfcro.dxf")).touch()
+    (tmp_path / os.fsdecode(b"mission-\xfc.json")).write_text("{}")
+    (tmp_path / "hall.dxf").touch()
+    files = SiteFiles.at(tmp_path)
+    assert files.floors() == ["B\ufffdro.dxf", "hall.dxf"]
+    assert files.missions() == ([], 0)
+    with pytest.raises(InputError, match="is not UTF-8 text; rename the file or folder"):
+        files.file("B\ufffdro.dxf")

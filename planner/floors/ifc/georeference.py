@@ -10,6 +10,7 @@ import pyproj
 from pyproj.exceptions import CRSError, ProjError
 
 from stopgo.mission.floor import Finding, Georeference
+from stopgo.mission.settings.parameter import HIGHEST_M
 from stopgo.planner.floors.ifc.model import OnEarth, Placement
 from stopgo.planner.floors.legible_text import legible
 
@@ -49,6 +50,9 @@ def georeference_of(place: OnEarth, *, level: float) -> tuple[Georeference | Non
     if chosen is None:
         return None, findings
     raised = Georeference(chosen.lat, chosen.lon, chosen.alt + level, chosen.heading_deg)
+    if abs(raised.alt) > HIGHEST_M:
+        beyond = _refused(f"the floor would lie {raised.alt:g} m above the sea")
+        return None, [*findings, *beyond.findings]
     return raised, findings
 
 

@@ -73,6 +73,7 @@ export function lineOf(record) {
   } else parts.push(t(bad ? `heard_${record.outcome}` : "heard_waiting"));
   if (bad) {
     kind = "bad";
+    if (record.repeated) parts.push(t("sent_again"));
     if (record.message) parts.push(record.message);
   }
   if (record.standing_at) {

@@ -260,6 +260,10 @@ def test_what_counts_as_reached_is_noted_by_parameter(name, within):
             changed(square_tour(), georeference=SiteOrigin(lat=9.5, lon=181.0, alt=0.0, heading_deg=0.0)),
             r"lon 181\.0 is not a position on Earth",
         ),
+        (
+            changed(square_tour(), georeference=SiteOrigin(lat=9.5, lon=8.0, alt=1e6, heading_deg=0.0)),
+            r"georeference: alt is 1e\+06; it must be within ±10000 m",
+        ),
     ],
 )
 def test_what_is_no_number_or_no_place_is_refused_by_name(mission, told):

@@ -167,6 +167,13 @@ def test_a_room_too_tight_is_reported_which_d_sec_would_do() -> None:
     assert figures_of(floor, Settings(d_sec=0.6)).unreached == ()
 
 
+def test_a_plan_on_a_raster_says_that_check_may_refute_it() -> None:
+    figures = figures_of(two_rooms(0.9), Settings(visibility="bresenham"))
+    (finding,) = figures.findings
+    assert (finding.code, finding.rank) == ("raster_visibility", Rank.DOUBT)
+    assert "check --floor" in finding.message
+
+
 def test_findings_next_to_a_leg_come_before_others_of_their_rank() -> None:
     figures = figures_of(
         with_lines(two_rooms(0.9), [(4.0, 0.0), (4.0, 4.0)]), Settings(range=3, coverage=1.0)

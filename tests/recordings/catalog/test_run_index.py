@@ -124,6 +124,39 @@ def test_a_recording_that_is_removed_while_the_folder_is_listed_is_none(
     assert not index_of(tmp_path).files
 
 
+def test_what_is_named_as_a_recording_and_is_no_file_is_reported(
+    tmp_path: Path, sighted: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A link whose target was moved away was passed over, as if there had been no run."""
+    (tmp_path / "moved.rrd").symlink_to(tmp_path / "away" / "field.rrd")
+    os.mkfifo(tmp_path / "pipe.rrd")
+    (tmp_path / "folder.rrd").mkdir()
+    assert len(index_of(tmp_path).faults()) == 2
+    main(["runs", str(tmp_path)])
+    errors = capsys.readouterr().err
+    assert "moved.rrd: is a link to a file that does not exist" in errors
+    assert "pipe.rrd: is a pipe, a socket or a device, not a file" in errors
+    assert "folder.rrd" not in errors
+    (tmp_path / "away").mkdir()
+    shutil.copy(sighted, tmp_path / "away" / "field.rrd")
+    assert set(index_of(tmp_path).files) == {"away/field.rrd", "moved.rrd", "pipe.rrd"}
+    assert len(index_of(tmp_path).faults()) == 1
+
+
+def test_a_name_that_is_no_text_does_not_end_the_list(
+    tmp_path: Path, sighted: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Archives from other systems hold such names; the index could not be written with one."""
+    shutil.copy(sighted, tmp_path / "plan.rrd")
+    shutil.copy(sighted, tmp_path / os.fsdecode(b"B\xfcro.rrd"))
+    main(["runs", str(tmp_path)])
+    shown = capsys.readouterr()
+    assert "plan.rrd" in shown.out
+    assert "B\ufffdro.rrd: is not UTF-8 text; rename the file or folder" in shown.err
+    main(["review", str(tmp_path)])
+    assert "B\ufffdro.rrd: is not UTF-8 text; rename the file or folder" in capsys.readouterr().err
+
+
 def test_a_run_is_compared_again_when_its_plan_comes_and_goes(
     sighted: Path, skipping: Path, tmp_path: Path
 ) -> None:

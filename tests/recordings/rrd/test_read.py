@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -92,6 +93,28 @@ def test_a_file_that_ends_its_reader_hides_no_other(
     assert sorted(refused) == ["fatal-1.rrd", "fatal-2.rrd", "junk.rrd"]
     assert refused["fatal-2.rrd"].endswith("fatal-2.rrd: damaged (reading it ended with signal 6)")
     assert len(started) == 4
+
+
+def test_a_damaged_table_of_contents_is_not_a_missing_end(plan: Path, tmp_path: Path) -> None:
+    """Only the end of a file that was cut is missing; the other may have been copied badly."""
+    whole, damaged = plan.read_bytes(), tmp_path / "damaged.rrd"
+    for k in (400, 600):  # from the end: in the table of contents
+        damaged.write_bytes(whole[:-k] + bytes([whole[-k] ^ 8]) + whole[len(whole) - k + 1 :])
+        with pytest.raises(InputError, match=r": is damaged; save the rest with: rerun rrd optimize"):
+            check(damaged)
+    damaged.write_bytes(whole[:-400])
+    with pytest.raises(InputError, match=r": is truncated; save the rest with"):
+        check(damaged)
+
+
+def test_a_link_to_nothing_and_a_pipe_are_called_so(tmp_path: Path) -> None:
+    link, pipe = tmp_path / "link.rrd", tmp_path / "pipe.rrd"
+    link.symlink_to(tmp_path / "nowhere.rrd")
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match=r"link\.rrd: is a link to a file that does not exist"):
+        check(link)
+    with pytest.raises(InputError, match=r"pipe\.rrd: is a pipe, a socket or a device, not a file"):
+        check(pipe)
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

@@ -84,6 +84,12 @@ def test_a_default_or_impossible_site_is_no_position(lat: float, lon: float) -> 
     assert codes(place) == {"georeference_odd"}
 
 
+def test_a_floor_above_every_site_has_no_position() -> None:
+    """Its mission would be refused; elevations in another unit than they say do this."""
+    assert georeference_of(SCHOOL, level=1e6)[0] is None
+    assert "georeference_odd" in {item.code for item in georeference_of(SCHOOL, level=1e6)[1]}
+
+
 @pytest.mark.parametrize(
     "said",
     [
