@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import log
 from pathlib import Path
+from statistics import median
 
 from benchmarks.floors import copies, hall
 from benchmarks.table import put, table, versions
@@ -187,14 +188,18 @@ def exponents(runs: list[tuple[Plan, Run]]) -> str:
 
 
 def options_table(runs: list[tuple[Plan, Run]], folder: Path) -> str:
-    """What options cost: CPU of the plan with each, over that of the plain plan."""
+    """What options cost: CPU of the plan with each, over that of the plain plans right before and after it."""
     rows = []
-    for plain, alone in runs:
+    for plain, first in runs:
         if plain.name in WITH_OPTIONS:
-            each = [
-                planned(ROOT, Plan(plain.name, plain.floor, (*START, *option)), folder) for option in OPTIONS
-            ]
-            rows.append([plain.name, alone.cpu_s, *(run.cpu_s / alone.cpu_s for run in each)])
+            before, ratios, alone = planned(ROOT, plain, folder), list[float](), [first.cpu_s]
+            for option in OPTIONS:
+                with_it = planned(ROOT, Plan(plain.name, plain.floor, (*START, *option)), folder)
+                after = planned(ROOT, plain, folder)
+                ratios.append(2.0 * with_it.cpu_s / (before.cpu_s + after.cpu_s))
+                before = after
+                alone.append(after.cpu_s)
+            rows.append([plain.name, median(alone), *ratios])
     return table(["plan", "plain CPU s", *(f"`{' '.join(option)}`" for option in OPTIONS)], rows)
 
 
