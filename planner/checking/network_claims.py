@@ -21,7 +21,7 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.mission.stages.network import CONFIDENCE, frame_of, network_of, noise_factor
 from stopgo.planner.candidates.added_scans import with_scans
 from stopgo.planner.checking.claims import candidates_by_heading
-from stopgo.planner.geometry.shapes import local_origin, to_grid
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
 from stopgo.planner.overlap import LEAST_COMMON_M, least_hold_m, links_of
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
 from stopgo.planner.overlap.control import seen_control
@@ -35,7 +35,7 @@ from stopgo.planner.overlap.network_error import (
 from stopgo.planner.overlap.pairs import Overlaps
 from stopgo.planner.routing.planned_mission import is_of_plan
 from stopgo.planner.visibility.exact_sight import sides_of_doors
-from stopgo.planner.visibility.sight.sightlines import Midpoints, TestedLines
+from stopgo.planner.visibility.sight.sightlines import LineByLine, Midpoints
 
 ROUNDED = 1e-5
 """Tolerance of a pair's figures, which are sums of rounded lengths."""
@@ -186,8 +186,8 @@ class _BoundaryVisibility:
     def __init__(self, boundary: Boundary, space: NavigableSpace) -> None:
         a, b = to_grid(boundary.a), to_grid(boundary.b)
         midpoints = Midpoints.of(a, b, boundary.pieces, np.ones(len(a), dtype=bool))
-        reach = space.settings.farthest_overlap
-        self._space, self._lines = space, TestedLines(midpoints, np.stack([a, b], axis=1), reach=reach)
+        reach = round(space.settings.farthest_overlap / GRID)
+        self._space, self._lines = space, LineByLine(midpoints, np.stack([a, b], axis=1), reach=reach)
 
     def seen_by(self, stop: Stop) -> IntArray:
         """Pieces that a stop sees in all directions; from both sides of a closed door if it is in one."""

@@ -6,14 +6,17 @@ from fractions import Fraction
 
 import numpy as np
 
-from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
+from stopgo.planner.visibility.sight.sightlines import LineByLine, Midpoints
 
 
 def visible_pairs(viewpoints, edges, a, b, units, is_face, *, reach):
     """Matrix (viewpoints, units) of what is seen; all in whole grid steps, edges (e, 2, 2)."""
     midpoints = Midpoints.of(a, b, units, is_face)
-    seen = [sees(place, midpoints, edges, reach=reach) for place in viewpoints]
-    return np.array(seen).reshape(len(viewpoints), len(midpoints.odd))
+    lines = LineByLine(midpoints, edges, reach=reach)
+    matrix = np.zeros((len(viewpoints), len(midpoints.odd)), dtype=bool)
+    for row, place in zip(matrix, viewpoints, strict=True):
+        row[lines.seen_from(place)] = True
+    return matrix
 
 
 def seen_in_fractions(place, a, b, odd, pieces, edges, *, is_face, reach) -> bool:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
 import numpy as np
 import pytest
 
-from stopgo.planner.visibility.sight.sightlines import Midpoints, sees, sees_past
+from stopgo.planner.visibility.sight.line_kernel import within
+from stopgo.planner.visibility.sight.sightlines import LineByLine, Midpoints
+from tests.planner.kernels import interpret, machine_code
 from tests.planner.oracle import seen_in_fractions
 
 
@@ -23,6 +28,22 @@ def lines_of(seed: int, extent: int) -> tuple[np.ndarray, Midpoints, np.ndarray]
     return place, Midpoints.of(a, b, units, face).among(some), edges
 
 
+def sees(place: np.ndarray, midpoints: Midpoints, edges: np.ndarray, *, reach: int | None) -> np.ndarray:
+    """True for each midpoint (n,) that a place sees past the edges."""
+    found = np.zeros(len(midpoints.odd), dtype=bool)
+    found[LineByLine(midpoints, edges, reach=reach).seen_from(place)] = True
+    return found
+
+
+@pytest.fixture(params=["compiled", "interpreted"])
+def speed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Speed of the kernel."""
+    if request.param == "interpreted":
+        interpret(monkeypatch)
+    return str(request.param)
+
+
+@pytest.mark.usefixtures("speed")
 @pytest.mark.parametrize("extent", [3, 10, 10**8, 2**29])
 def test_lines_are_reported_as_in_fractions(extent: int) -> None:
     for seed in range(6):
@@ -35,19 +56,34 @@ def test_lines_are_reported_as_in_fractions(extent: int) -> None:
                 assert bool(seen) == told, (seed, a, b, odd, pieces)
 
 
+@pytest.mark.usefixtures("speed")
 @pytest.mark.parametrize("extent", [10, 2**29])
-def test_edges_that_are_tested_first_change_nothing(extent: int) -> None:
+def test_what_hid_midpoints_from_earlier_positions_changes_nothing(extent: int) -> None:
+    hidden = 0
     for seed in range(30):
         place, midpoints, edges = lines_of(seed, extent)
-        first = np.random.default_rng(seed).integers(-1, len(edges), len(midpoints.odd))
-        seen, hidden_by = sees_past(place, midpoints, edges, first, reach=extent)
-        assert np.array_equal(seen, sees(place, midpoints, edges, reach=extent))
-        assert not np.any(seen & (hidden_by >= 0))
-        for k in np.flatnonzero(hidden_by >= 0).tolist():
-            one = midpoints.among(np.array([k]))
-            assert not sees(place, one, edges[hidden_by[k], None], reach=None).any()
+        lines = LineByLine(midpoints, edges, reach=extent)
+        places = [place, -place, place // 2, place]
+        for other in places:
+            found = np.zeros(len(midpoints.odd), dtype=bool)
+            found[lines.seen_from(other)] = True
+            assert np.array_equal(found, sees(other, midpoints, edges, reach=extent)), seed
+        hidden += int((np.array(lines._hidden_by) >= 0).sum())
+    assert hidden > 30
 
 
+@pytest.mark.usefixtures("speed")
+def test_only_midpoints_among_the_chosen_are_found() -> None:
+    place, midpoints, edges = lines_of(1, 10)
+    lines = LineByLine(midpoints, edges[:0], reach=None)
+    among = np.arange(len(midpoints.odd)) % 2 == 0
+    assert np.array_equal(
+        lines.seen_from(place, among), np.intersect1d(lines.seen_from(place), among.nonzero())
+    )
+    assert not len(lines.seen_from(place, np.zeros(len(among), dtype=bool)))
+
+
+@pytest.mark.usefixtures("speed")
 def test_the_range_ends_exactly_at_a_midpoint() -> None:
     # From (0, 0) to (300, 400) m: 500 m.
     one = Midpoints.of(
@@ -59,3 +95,13 @@ def test_the_range_ends_exactly_at_a_midpoint() -> None:
     nothing = np.empty((0, 2, 2), dtype=np.int64)
     assert sees(np.zeros(2, np.int64), one, nothing, reach=50_000_000).all()
     assert not sees(np.zeros(2, np.int64), one, nothing, reach=49_999_999).any()
+
+
+def test_the_greatest_numbers_are_compared_as_in_python() -> None:
+    """Lines of 2**55 and a range of 2**31 steps times 2**25 pieces are the longest that can come."""
+    fast = machine_code(within)
+    for x, y in itertools.product((-(2**55), 1 - 2**27, -1, 0, 1, 2**27, 2**55 - 1), repeat=2):
+        about = math.isqrt(x * x + y * y)
+        for limit in (0, 1, about - 1, about, about + 1, 2**56):
+            truth = x * x + y * y <= limit * limit if limit >= 0 else False
+            assert limit < 0 or bool(fast(x, y, limit)) == bool(within(x, y, limit)) == truth
