@@ -26,6 +26,8 @@ NAVIGATE = "nav2_msgs/action/NavigateToPose"
 ODOMETRY, TF = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 ZERO_S, ZERO_HZ = 2.0, 20.0
 """Time and rate of zero velocity after a stop: a controller's last commands may come later than the first."""
+UNIT_TOLERANCE = 0.01
+"""Greatest difference of a rotation's quaternion from length 1; tf2 ignores others."""
 TURN_S = 30
 """Time that a turn may take."""
 
@@ -94,7 +96,7 @@ class Nav2Port:
 
     def _take_covariance(self, message: Any) -> None:
         covariance = message.pose.covariance
-        self.telemetry.sigma_m = math.sqrt(max(0.0, float(covariance[0]), float(covariance[7])))
+        self.telemetry.take_variances(float(covariance[0]), float(covariance[7]))
 
     def _take_emergency_stop(self, message: Any) -> None:
         self.telemetry.emergency_stop = bool(message.data)
@@ -269,9 +271,12 @@ def path_fields(path: Sequence[Pose], frame: str, now_ns: int) -> dict[str, Any]
 
 
 def take_transforms(telemetry: RosTelemetry, message: Any, *, static: bool) -> None:
-    """Give the transforms of a tf2_msgs/msg/TFMessage to the telemetry."""
+    """Give the transforms of a tf2_msgs/msg/TFMessage to the telemetry, but not those without a rotation."""
     for one in message.transforms:
         at, turn = one.transform.translation, one.transform.rotation
+        norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
+        if not abs(norm - 1.0) <= UNIT_TOLERANCE:
+            continue
         transform = Transform(x=at.x, y=at.y, heading=yaw_of(turn.x, turn.y, turn.z, turn.w))
         stamp_ns, parent, child = ns_of(one.header.stamp), one.header.frame_id, one.child_frame_id
         telemetry.take_transform(parent, child, transform, stamp_ns=stamp_ns, static=static)

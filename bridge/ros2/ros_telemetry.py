@@ -101,7 +101,9 @@ class RosTelemetry:
     def take_transform(
         self, parent: str, child: str, transform: Transform, *, stamp_ns: int, static: bool = False
     ) -> None:
-        """Take a transform of tf; one with an older stamp or the same one says nothing."""
+        """Take a transform of tf; one with an older stamp, the same one or no number says nothing."""
+        if not math.isfinite(transform.x + transform.y + transform.heading):
+            return  # as tf2 does
         parent, child, now_ns = parent.lstrip("/"), child.lstrip("/"), self._clock.now_ns()
         with self._lock:
             old = self._links.get(child)
@@ -116,12 +118,22 @@ class RosTelemetry:
                 self._note_jump(f"{parent} -> {child}", before, after, (now_ns - old.arrived_ns) / 1e9)
 
     def take_odometry(self, velocity: float, turn_rate: float, *, stamp_ns: int, behind_s: float) -> None:
-        """Take the velocities of an odometry message; `behind_s` is the age of its stamp on arrival."""
+        """Take the velocities of an odometry message; `behind_s` is the age of its stamp on arrival.
+
+        Velocities that are no numbers say nothing, as if no message had come.
+        """
+        if not math.isfinite(velocity + turn_rate):
+            return
         with self._lock:
             self.clock_offset_s = behind_s
             if stamp_ns != self._odometry_stamp_ns:
                 self._odometry_ns, self._odometry_stamp_ns = self._clock.now_ns(), stamp_ns
                 self._velocity = (abs(velocity), abs(turn_rate))
+
+    def take_variances(self, x: float, y: float) -> None:
+        """Take the variances of the localisation; one that is no number makes its position unknown."""
+        known = math.isfinite(x + y)
+        self.sigma_m = math.sqrt(max(0.0, x, y)) if known else math.inf
 
     def take_command(self, velocity: float, turn_rate: float) -> None:
         """Take a velocity command, whoever has sent it."""
