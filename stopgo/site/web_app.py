@@ -203,7 +203,7 @@ class LivePages:
         """Return what a push would change."""
         robot = self._parts.orders.robot(request.path_params["name"])
         mission = read(self._parts.folder.file(request.query_params.get("file", "")))
-        return JSONResponse(mission_difference(robot.mission, mission))
+        return JSONResponse(mission_difference(robot.held.mission, mission) | {"known": robot.held.is_known})
 
     def _must_command(self) -> None:
         if not self._parts.may_command:

@@ -6,7 +6,10 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from msgspec import structs
 
+from stopgo.mission.document import with_digest
+from stopgo.mission.files.mission_json import read, write
 from tests.planner.floors.ifc.house import two_rooms as house_model
 from tests.planner.floors.ifc.test_status import WORK, scheduled
 from tests.ports import free_port
@@ -274,6 +277,40 @@ def test_a_change_by_hand_shows_its_cost_before_it_is_planned(world: BrowserWorl
         tab.press("Plan with these changes")
         tab.until(f"document.querySelectorAll('.variant.done').length === {variants + 1}")
         tab.shows("Seen twice", ".variant")
+
+
+def test_what_another_page_has_saved_meanwhile_is_not_pushed(world: BrowserWorld) -> None:
+    """The page showed one mission, and pushed the one that another page had saved into its file since."""
+    file = world.folder / "plans/house/mission.json"
+    kept = file.read_bytes()
+    with world.tab() as tab:
+        tab.press("Push mission", card("r2", "button"))
+        tab.until("document.querySelector('.question select')")
+        tab.run("{ const list = document.querySelector('.question select'); list.value ="
+                " 'plans/house/mission.json'; list.dispatchEvent(new Event('change')); }")  # fmt: skip
+        tab.until(f"document.querySelector('{card('r2', '.difference')}').innerText")
+        planned = read(file)
+        write(with_digest(structs.replace(planned, revision=planned.revision + 1)), file)
+        try:
+            tab.press("Push to r2", card("r2", "button"))
+            tab.shows("changed after the page showed the difference; look at it again", card("r2"))
+        finally:
+            file.write_bytes(kept)
+
+
+def test_a_name_for_a_plan_stays_while_another_page_plans(world: BrowserWorld) -> None:
+    """Each message of the other plan made the field anew, with the name that it had at first."""
+    field = "document.querySelector('.variant input')"
+    with world.tab("#plan") as tab, world.tab("#plan") as other:
+        tab.until(field)
+        tab.run(f"{field}.focus()")
+        tab.run(f"{field}.value = 'east wing'")
+        before = tab.run("document.querySelectorAll('.variant').length")
+        other.shows("32 m², 2 rooms, 1 openings")
+        other.press("Plan", ".options button")
+        tab.until(f"document.querySelectorAll('.variant.done').length > {before}")
+        assert tab.run(f"{field}.value") == "east wing"
+        assert tab.run(f"document.activeElement === {field}")
 
 
 def pick(tab: Tab, field: str, value: str) -> None:

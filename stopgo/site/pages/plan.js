@@ -19,7 +19,7 @@ export function makePlan(main, me) {
   const view = {
     me, map, layers, form: h("form", { class: "options" }), findings: h("ul", { class: "findings" }),
     note: h("p", { class: "notice", role: "status" }), variants: h("div", { class: "variants" }),
-    hand: h("div", { class: "hand", role: "group", "aria-label": t("by_hand") }), selected: null, mode: null, draft: null, focus: null,
+    hand: h("div", { class: "hand", role: "group", "aria-label": t("by_hand") }), selected: null, mode: null, draft: null, focus: null, cards: new Map(), names: new Map(),
   };
   const may = me.role === "operator";
   fill(main, h("div", { class: "planning" },
@@ -151,16 +151,31 @@ function variantsShown() {
 
 function drawVariants(view) {
   const variants = variantsShown();
-  fill(view.variants, variants.map((one) => card(view, one, variants)));
+  showCards(view, variants.map((one) => keptCard(view, one, variants)));
   const shown = variants.find((one) => one.number === chosen.shown) ?? null;
   if (shown) show(view, shown);
   drawHand(view, shown);
 }
 
-function card(view, one, variants) {
+// A card is made anew only if it shows something else: what is typed or pressed while another page plans is not lost.
+function keptCard(view, one, variants) {
   const base = variants.find((other) => other.number === one.request.base) ?? variants.filter((other) => other.report && other.number < one.number).pop();
+  const shows = JSON.stringify([one, base?.report, one.number === chosen.shown]);
+  const kept = view.cards.get(one.number);
+  if (kept?.shows === shows) return kept.element;
+  const element = card(view, one, base);
+  view.cards.set(one.number, { shows, element });
+  return element;
+}
+
+function showCards({ variants }, cards) {
+  for (const old of [...variants.children]) if (!cards.includes(old)) old.remove();
+  cards.forEach((one, place) => { if (variants.children[place] !== one) variants.insertBefore(one, variants.children[place] ?? null); });
+}
+
+function card(view, one, base) {
   const operator = view.me.role === "operator";
-  const name = h("input", { value: defaultName(one), "aria-label": t("name_of_plan"), autocomplete: "off" });
+  const name = h("input", { value: view.names.get(one.number) ?? defaultName(one), "aria-label": t("name_of_plan"), autocomplete: "off", oninput: () => view.names.set(one.number, name.value) });
   const report = one.report;
   return h("section", { class: `variant ${one.state}${one.number === chosen.shown ? " focus" : ""}`, "aria-label": t("variant", { n: one.number }) },
     h("div", { class: "line" }, h("button", { type: "button", "aria-pressed": String(one.number === chosen.shown), onclick: () => { chosen.shown = one.number; view.selected = null; drawVariants(view); } }, t("variant", { n: one.number })),
