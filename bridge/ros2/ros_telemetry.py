@@ -101,10 +101,14 @@ class RosTelemetry:
     def take_transform(
         self, parent: str, child: str, transform: Transform, *, stamp_ns: int, static: bool = False
     ) -> None:
-        """Take a transform of tf; one with an older stamp, the same one or no number says nothing."""
-        if not math.isfinite(transform.x + transform.y + transform.heading):
-            return  # as tf2 does
+        """Take a transform of tf; one with an older stamp, the same one or no number says nothing.
+
+        Neither does one without two frames, as in tf2.
+        """
         parent, child, now_ns = parent.lstrip("/"), child.lstrip("/"), self._clock.now_ns()
+        is_number = math.isfinite(transform.x + transform.y + transform.heading)
+        if not is_number or not parent or not child or parent == child:
+            return
         with self._lock:
             old = self._links.get(child)
             if old is not None and old.parent == parent and 0 <= old.stamp_ns - stamp_ns < SET_BACK_NS:

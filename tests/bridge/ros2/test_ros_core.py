@@ -199,6 +199,16 @@ def test_a_localisation_whose_variance_is_no_number_is_unknown() -> None:
     assert telemetry.health().localisation == 0.0
 
 
+@pytest.mark.parametrize(("parent", "child"), [("odom", "odom"), ("", "odom"), ("map", "")])
+def test_a_transform_without_two_frames_says_nothing(parent: str, child: str) -> None:
+    """One such message took the place of a transform that is published once."""
+    telemetry = RosField().world.telemetry
+    assert telemetry is not None
+    telemetry.take_transform(parent, child, Transform(x=1.0, y=2.0, heading=0.0), stamp_ns=2 * 10**18)
+    assert telemetry.silence() == ""
+    assert (telemetry.pose().x, telemetry.pose().y) == (0.0, 0.0)
+
+
 def test_a_frame_that_tf_lacks_is_named_with_those_that_it_has() -> None:
     field = RosField(settings=RosSettings(frames=FrameNames(map="site_map")))
     refused = field.order("start")
