@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +26,7 @@ from stopgo.site import planning
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.kept_variants import kept_variants
 from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest, WorkLane
-from stopgo.site.planning_routes import options_json
+from stopgo.site.planning_routes import options_json, planning_routes
 from stopgo.site.planning_work import (
     DRAWING,
     CommandTask,
@@ -38,6 +39,7 @@ from stopgo.site.planning_work import (
 from stopgo.site.run_pages import RunRoom
 from stopgo.site.site_folder import SiteFiles
 from tests.planner.floors.ifc.house import two_rooms as house_model
+from tests.site.pages import Page, parts_of
 from tests.site.two_rooms import two_rooms
 
 
@@ -355,3 +357,17 @@ def test_of_two_variants_that_are_saved_at_once_in_one_place_the_second_is_refus
     second.join()
     assert len(refused) == 1
     assert read(saved).id == read(room.variant(first["number"]).folder / "mission.json").id
+
+
+def test_a_disk_that_refuses_is_one_line(room: PlanningRoom, place: Path, tmp_path: Path) -> None:
+    """It was an internal error for the page, and a traceback on the terminal."""
+    made = waited(room, room.plan(VariantRequest(floor="house.dxf")))
+    taken = place / "plans" / "taken"
+    taken.parent.mkdir(exist_ok=True)
+    taken.write_bytes(b"")
+    parts = replace(parts_of(tmp_path), folder=SiteFiles.at(place), more=planning_routes(room))
+    answer = Page(parts).post(f"/api/plans/{made['number']}/save", {"name": "taken"})
+    assert answer.status_code == 400
+    assert answer.json()["error"] == (
+        "plans/taken: File exists; make room, or let the site write there, and try again"
+    )
