@@ -298,6 +298,21 @@ def test_what_another_page_has_saved_meanwhile_is_not_pushed(world: BrowserWorld
             file.write_bytes(kept)
 
 
+LOST_ANSWER = """{ const real = window.fetch; window.fetch = (to, ...rest) => String(to).endsWith("/orders")
+  ? real(to, ...rest).then(() => { throw new TypeError("Failed to fetch"); }) : real(to, ...rest); }"""
+"""The server gets an order, and the page loses its link before the answer."""
+
+
+def test_an_order_whose_answer_is_lost_is_not_called_unsent(world: BrowserWorld) -> None:
+    """The robot had obeyed it, and the page said that it was not sent."""
+    with world.tab() as tab:
+        tab.shows("r2", card("r2"))
+        tab.run(LOST_ANSWER)
+        tab.press("Pause", card("r2", "button"))
+        tab.shows("UNKNOWN whether it was carried out", card("r2", ".question"))
+        assert "Not sent" not in tab.run("document.body.innerText")
+
+
 def test_a_name_for_a_plan_stays_while_another_page_plans(world: BrowserWorld) -> None:
     """Each message of the other plan made the field anew, with the name that it had at first."""
     field = "document.querySelector('.variant input')"

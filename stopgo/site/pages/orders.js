@@ -1,5 +1,5 @@
 // Orders to one robot: none is ever disabled, for the page may be wrong; those that fit the state stand out.
-import { orderId, read, send } from "./api.js";
+import { failureText, orderId, read, send } from "./api.js";
 import { fill, h, say } from "./dom.js";
 import { get } from "./store.js";
 import { lineOf } from "./stop.js";
@@ -92,7 +92,7 @@ async function sent(name, question, work, more = {}) {
 }
 
 function fault(question, error) {
-  fill(question, h("p", { class: "bad", role: "alert" }, t("not_sent", { reason: error.message })));
+  fill(question, h("p", { class: "bad", role: "alert" }, failureText(error)));
 }
 
 async function offerMissions(name, question) {

@@ -1,5 +1,5 @@
 // Planning: a floor of the folder, twelve options, variants beside each other, and stops moved by hand.
-import { read, send } from "./api.js";
+import { failureText, read, send } from "./api.js";
 import { fill, h, say, svg } from "./dom.js";
 import { emptyMap, floorLayers, legend, markSize, place, setFrame, stopMark, targetPaths } from "./map.js";
 import { all, onChange } from "./store.js";
@@ -141,7 +141,7 @@ async function begin(view, request) {
     view.follow = made;
     drawVariants(view);
   } catch (error) {
-    say(view.note, t("not_sent", { reason: error.message }));
+    say(view.note, failureText(error));
   }
 }
 
@@ -225,7 +225,7 @@ async function save(view, one, name) {
   try {
     await send(`/api/plans/${one.number}/save`, { name });
   } catch (error) {
-    say(view.note, t("not_sent", { reason: error.message }));
+    say(view.note, failureText(error));
   }
 }
 
