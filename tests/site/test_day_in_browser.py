@@ -313,6 +313,26 @@ def test_an_order_whose_answer_is_lost_is_not_called_unsent(world: BrowserWorld)
         assert "Not sent" not in tab.run("document.body.innerText")
 
 
+FAILS_ONCE = """{ const real = window.fetch; let failed = false; window.fetch = (to, ...rest) =>
+  String(to).endsWith("/drawing") && !failed
+    ? Promise.reject(new TypeError(failed = "offline")) : real(to, ...rest);
+  window.hasFailed = () => failed; }"""
+"""The link of the page is lost for one drawing."""
+
+
+def test_a_plan_whose_drawing_was_lost_once_is_drawn_the_next_time(world: BrowserWorld) -> None:
+    """It was not drawn again, and its stops could not be changed, until the page was loaded anew."""
+    with world.tab("#plan") as tab:
+        tab.shows("32 m², 2 rooms, 1 openings")
+        tab.run(FAILS_ONCE)
+        tab.until("document.querySelector('.variant.done')")
+        tab.run("document.querySelector('.variant.done button').click()")
+        tab.until("window.hasFailed()")
+        assert not tab.run("document.querySelector('.map .stop')")
+        tab.run("document.querySelector('.variant.done button').click()")
+        tab.until("document.querySelector('.map .stop')")
+
+
 def test_a_name_for_a_plan_stays_while_another_page_plans(world: BrowserWorld) -> None:
     """Each message of the other plan made the field anew, with the name that it had at first."""
     field = "document.querySelector('.variant input')"

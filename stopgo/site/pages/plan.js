@@ -11,6 +11,7 @@ const FINGER_PX = 22;
 const FLOOR_CHOICES = ["storey", "level", "drawing", "date"];
 const chosen = { floor: null, options: {}, shown: null, base: null };
 const drawings = new Map();
+onChange((kinds) => { if (kinds.has("*")) drawings.clear(); }); // another server may count its variants from 1 again
 
 export function makePlan(main, me) {
   const map = emptyMap(t("map_of_floor"), "group");
@@ -231,8 +232,8 @@ async function save(view, one, name) {
 
 async function show(view, one) {
   if (one.state === "done") {
-    if (!drawings.has(one.number)) drawings.set(one.number, await read(`/api/plans/${one.number}/drawing`).catch(() => null));
-    const drawing = drawings.get(one.number);
+    const drawing = drawings.get(one.number) ?? await read(`/api/plans/${one.number}/drawing`).catch(() => null);
+    if (drawing) drawings.set(one.number, drawing);
     if (!drawing || chosen.shown !== one.number) return;
     showFloor(view, { ...drawing, findings: one.report.findings });
     view.size = markSize(drawing);
