@@ -48,6 +48,8 @@ class Nav2Port:
         self._finds_way = False
         self._sent: SentGoal | None = None
         self._active: dict[str, tuple[bytes, ...]] = {}
+        self._told_by: dict[str, frozenset[str]] = {}
+        """Publishers of each action's status when it came."""
         self._zero_until_ns = 0
         names = settings.drive
         self._follow = node.action_client(FOLLOW_PATH, names.follow_path)
@@ -105,6 +107,7 @@ class Nav2Port:
 
     def _take_status(self, name: str, message: Any) -> None:
         goals = {bytes(one.goal_info.goal_id.uuid): int(one.status) for one in message.status_list}
+        self._told_by[name] = self.node.publishers(f"{name}/_action/status")
         self._active[name] = tuple(goal for goal, status in goals.items() if status in ACTIVE)
         if self._finds_way and self.drives and not self._is_navigator(name):
             self._of_nav2.update(self._active[name])
@@ -182,8 +185,13 @@ class Nav2Port:
             f"goal {goal.hex()[:8]} of {name}"
             for name, goals in list(self._active.items())
             for goal in goals
-            if goal not in known and self.node.is_published(f"{name}/_action/status")
+            if goal not in known and self._is_still_published(name)
         )
+
+    def _is_still_published(self, action: str) -> bool:
+        """Return False if the server whose status is known has gone, though another may have come."""
+        now, before = self.node.publishers(f"{action}/_action/status"), self._told_by[action]
+        return bool(now & before) if before else bool(now)
 
     def stand(self) -> None:
         self._zero_until_ns = self.clock.now_ns() + round(ZERO_S * 1e9)

@@ -356,6 +356,9 @@ class ZenohNode:
     def is_published(self, topic: str) -> bool:
         return bool(self.graph.of("publisher", self.resolved(topic)))
 
+    def publishers(self, topic: str) -> frozenset[str]:
+        return frozenset(one.source for one in self.graph.of("publisher", self.resolved(topic)))
+
     def service_kinds(self, kind: str) -> tuple[MessageKind, MessageKind]:
         (found,) = service_types(kind, self._definitions)
         return found.request, found.response

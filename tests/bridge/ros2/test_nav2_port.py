@@ -27,6 +27,7 @@ class FakeNode:
     def __init__(self) -> None:
         self.heard: dict[str, Callable[[Any], None]] = {}
         self.sent: list[tuple[str, bytes, Any]] = []
+        self.servers = frozenset({"first"})
 
     def subscribe(self, kind: str, topic: str, take: Callable[[Any], None], *quality: object) -> None:
         self.heard[topic] = take
@@ -48,6 +49,9 @@ class FakeNode:
 
     def is_published(self, topic: str) -> bool:
         return True
+
+    def publishers(self, topic: str) -> frozenset[str]:
+        return self.servers
 
     def now_ns(self) -> int:
         return 0
@@ -102,6 +106,21 @@ def test_on_the_legs_every_goal_that_is_not_ours_is_another_clients(node: FakeNo
     port.follow((END, END))
     node.status("follow_path", other=EXECUTING)
     assert port.foreign_goals() == ("goal 6f746865 of follow_path",)
+
+
+def test_a_goal_of_a_server_that_was_restarted_is_nobodys(node: FakeNode, port: Nav2Port) -> None:
+    """The robot was refused every start and retry, because a goal of the former server was active."""
+    node.status("follow_path", other=EXECUTING)
+    assert port.foreign_goals() == ("goal 6f746865 of follow_path",)
+    node.servers = frozenset({"first", "second"})
+    assert port.foreign_goals() == ("goal 6f746865 of follow_path",)
+    node.servers = frozenset({"second"})
+    assert port.foreign_goals() == ()
+    node.servers = frozenset()
+    node.status("follow_path", other=EXECUTING)
+    assert port.foreign_goals() == ()
+    node.servers = frozenset({"late"})
+    assert port.foreign_goals() == ("goal 6f746865 of follow_path",), "its server was not known yet"
 
 
 def covariance(*, x: float, y: float) -> SimpleNamespace:
