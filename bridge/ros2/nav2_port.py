@@ -26,6 +26,8 @@ NAVIGATE = "nav2_msgs/action/NavigateToPose"
 ODOMETRY, TF = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 ZERO_S, ZERO_HZ = 2.0, 20.0
 """Time and rate of zero velocity after a stop: a controller's last commands may come later than the first."""
+UNIT_TOLERANCE = 0.01
+"""Greatest difference of a rotation's quaternion from length 1; tf2 ignores others."""
 TURN_S = 30
 """Time that a turn may take."""
 
@@ -46,6 +48,8 @@ class Nav2Port:
         self._finds_way = False
         self._sent: SentGoal | None = None
         self._active: dict[str, tuple[bytes, ...]] = {}
+        self._told_by: dict[str, frozenset[str]] = {}
+        """Publishers of each action's status when it came."""
         self._zero_until_ns = 0
         names = settings.drive
         self._follow = node.action_client(FOLLOW_PATH, names.follow_path)
@@ -94,7 +98,7 @@ class Nav2Port:
 
     def _take_covariance(self, message: Any) -> None:
         covariance = message.pose.covariance
-        self.telemetry.sigma_m = math.sqrt(max(0.0, float(covariance[0]), float(covariance[7])))
+        self.telemetry.take_variances(float(covariance[0]), float(covariance[7]))
 
     def _take_emergency_stop(self, message: Any) -> None:
         self.telemetry.emergency_stop = bool(message.data)
@@ -103,6 +107,7 @@ class Nav2Port:
 
     def _take_status(self, name: str, message: Any) -> None:
         goals = {bytes(one.goal_info.goal_id.uuid): int(one.status) for one in message.status_list}
+        self._told_by[name] = self.node.publishers(f"{name}/_action/status")
         self._active[name] = tuple(goal for goal, status in goals.items() if status in ACTIVE)
         if self._finds_way and self.drives and not self._is_navigator(name):
             self._of_nav2.update(self._active[name])
@@ -180,8 +185,13 @@ class Nav2Port:
             f"goal {goal.hex()[:8]} of {name}"
             for name, goals in list(self._active.items())
             for goal in goals
-            if goal not in known and self.node.is_published(f"{name}/_action/status")
+            if goal not in known and self._is_still_published(name)
         )
+
+    def _is_still_published(self, action: str) -> bool:
+        """Return False if the server whose status is known has gone, though another may have come."""
+        now, before = self.node.publishers(f"{action}/_action/status"), self._told_by[action]
+        return bool(now & before) if before else bool(now)
 
     def stand(self) -> None:
         self._zero_until_ns = self.clock.now_ns() + round(ZERO_S * 1e9)
@@ -269,9 +279,12 @@ def path_fields(path: Sequence[Pose], frame: str, now_ns: int) -> dict[str, Any]
 
 
 def take_transforms(telemetry: RosTelemetry, message: Any, *, static: bool) -> None:
-    """Give the transforms of a tf2_msgs/msg/TFMessage to the telemetry."""
+    """Give the transforms of a tf2_msgs/msg/TFMessage to the telemetry, but not those without a rotation."""
     for one in message.transforms:
         at, turn = one.transform.translation, one.transform.rotation
+        norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
+        if not abs(norm - 1.0) <= UNIT_TOLERANCE:
+            continue
         transform = Transform(x=at.x, y=at.y, heading=yaw_of(turn.x, turn.y, turn.z, turn.w))
         stamp_ns, parent, child = ns_of(one.header.stamp), one.header.frame_id, one.child_frame_id
         telemetry.take_transform(parent, child, transform, stamp_ns=stamp_ns, static=static)

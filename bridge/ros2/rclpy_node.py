@@ -185,6 +185,10 @@ class RclpyNode:
     def is_published(self, topic: str) -> bool:
         return bool(self._node.count_publishers(topic))
 
+    def publishers(self, topic: str) -> frozenset[str]:
+        found = self._node.get_publishers_info_by_topic(self.resolved(topic))
+        return frozenset(bytes(one.endpoint_gid).hex() for one in found)
+
     def service_kinds(self, kind: str) -> tuple[ClassKind, ClassKind]:
         cls = _configured_type(kind)
         return ClassKind(cls.Request), ClassKind(cls.Response)

@@ -147,6 +147,9 @@ class RosNode(Protocol):
 
     def is_published(self, topic: str) -> bool: ...
 
+    def publishers(self, topic: str) -> frozenset[str]:
+        """Return the names of a topic's publishers; one that was restarted has another."""
+
     def service_kinds(self, kind: str) -> tuple[MessageKind, MessageKind]:
         """Return request and response of a service's type; raises `InputError` if it is not known here."""
 

@@ -101,8 +101,14 @@ class RosTelemetry:
     def take_transform(
         self, parent: str, child: str, transform: Transform, *, stamp_ns: int, static: bool = False
     ) -> None:
-        """Take a transform of tf; one with an older stamp or the same one says nothing."""
+        """Take a transform of tf; one with an older stamp, the same one or no number says nothing.
+
+        Neither does one without two frames, as in tf2.
+        """
         parent, child, now_ns = parent.lstrip("/"), child.lstrip("/"), self._clock.now_ns()
+        is_number = math.isfinite(transform.x + transform.y + transform.heading)
+        if not is_number or not parent or not child or parent == child:
+            return
         with self._lock:
             old = self._links.get(child)
             if old is not None and old.parent == parent and 0 <= old.stamp_ns - stamp_ns < SET_BACK_NS:
@@ -116,12 +122,22 @@ class RosTelemetry:
                 self._note_jump(f"{parent} -> {child}", before, after, (now_ns - old.arrived_ns) / 1e9)
 
     def take_odometry(self, velocity: float, turn_rate: float, *, stamp_ns: int, behind_s: float) -> None:
-        """Take the velocities of an odometry message; `behind_s` is the age of its stamp on arrival."""
+        """Take the velocities of an odometry message; `behind_s` is the age of its stamp on arrival.
+
+        Velocities that are no numbers say nothing, as if no message had come.
+        """
+        if not math.isfinite(velocity + turn_rate):
+            return
         with self._lock:
             self.clock_offset_s = behind_s
             if stamp_ns != self._odometry_stamp_ns:
                 self._odometry_ns, self._odometry_stamp_ns = self._clock.now_ns(), stamp_ns
                 self._velocity = (abs(velocity), abs(turn_rate))
+
+    def take_variances(self, x: float, y: float) -> None:
+        """Take the variances of the localisation; one that is no number makes its position unknown."""
+        known = math.isfinite(x + y)
+        self.sigma_m = math.sqrt(max(0.0, x, y)) if known else math.inf
 
     def take_command(self, velocity: float, turn_rate: float) -> None:
         """Take a velocity command, whoever has sent it."""

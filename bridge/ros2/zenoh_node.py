@@ -343,9 +343,9 @@ class ZenohNode:
 
         def reply(query: Any) -> None:
             with query:
-                if query.attachment is not None:
-                    attachment = answering(bytes(query.attachment))
-                    query.reply(key, found.response.encode(answer()), attachment=attachment)
+                attachment = b"" if query.attachment is None else bytes(query.attachment)
+                if len(attachment) >= ATTACHMENT.size:
+                    query.reply(key, found.response.encode(answer()), attachment=answering(attachment))
 
         queryable = self.session.declare_queryable(
             key, lambda query: self.thread.soon(lambda: reply(query)), complete=True
@@ -355,6 +355,9 @@ class ZenohNode:
 
     def is_published(self, topic: str) -> bool:
         return bool(self.graph.of("publisher", self.resolved(topic)))
+
+    def publishers(self, topic: str) -> frozenset[str]:
+        return frozenset(one.source for one in self.graph.of("publisher", self.resolved(topic)))
 
     def service_kinds(self, kind: str) -> tuple[MessageKind, MessageKind]:
         (found,) = service_types(kind, self._definitions)

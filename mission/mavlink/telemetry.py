@@ -21,6 +21,7 @@ BACK_MS = 1_000
 """A clock that goes back by more was restarted; by less, two messages arrived out of order."""
 LOST_S = 3.0
 """Three heartbeats: a bad link loses one or two."""
+POSE_NUMBERS = {"LOCAL_POSITION_NED": ("x", "y", "vx", "vy"), "ATTITUDE": ("yaw",)}
 MISSION_ID_AT = 6
 """Place of `mission_id` in the payload of MISSION_CURRENT, behind seq, total, state and mode."""
 VERSION_2, HEADER_BYTES = b"\xfd", 10
@@ -66,6 +67,12 @@ def mission_id_of(message: Any) -> int:
 def place_of(message: Any) -> Geodetic | None:
     """Return the `lat` and `lon` of a message; None for 0, 0, which is no position."""
     return None if (message.lat, message.lon) == (0, 0) else from_steps(message.lat, message.lon)
+
+
+def has_numbers(message: Message) -> bool:
+    """Return False for a local position or an attitude that is no number: it says nothing of the vehicle."""
+    names = POSE_NUMBERS.get(message.get_type(), ())
+    return all(math.isfinite(getattr(message, name)) for name in names)
 
 
 def local_speed(message: Any) -> float:

@@ -24,7 +24,7 @@ def compact(source: Path, target: Path) -> None:
         When `source` is not readable to its end, as after a full disk; it is not moved.
     """
     written = check(source)
-    merged = target.with_name(f"{target.name}.tmp")
+    merged = source.with_name(f"{source.name}.tmp")  # other writers of this target have sources of their own
     try:
         if _merge(source, merged) and _is_complete(merged, written):
             os.replace(merged, target)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import struct
@@ -34,11 +35,14 @@ class SegmentFile:
     """File to which recordings are added one after another; together they form one recording without an end.
 
     Segments that find no room on the disk wait in memory in their order, up to MOST_WAITING bytes. The file
-    contains whole segments only. If it is deleted or moved meanwhile, it is written again.
+    contains whole segments only. If it is deleted or moved meanwhile, it is written again. Its name is no
+    other file's: other writers may begin at the same time, and earlier ones may have been killed.
     """
 
-    def __init__(self, path: Path, say: Callable[[str], None]) -> None:
-        self.path = path
+    def __init__(self, stem: Path, say: Callable[[str], None]) -> None:
+        """`stem` is the path without a suffix; what is taken gets a number."""
+        self._stem = stem
+        self.path = stem.with_name(f"{stem.name}.rrd")
         self.fault: str | None = None
         """Reason why the file is not complete; None if it is."""
         self._say = say
@@ -65,12 +69,12 @@ class SegmentFile:
         self.add(b"")
         if self._file is not None:
             self._file.close()
-        if not self._written:
-            self.path.unlink(missing_ok=True)
+            if not self._written:
+                self.path.unlink(missing_ok=True)
 
     def _write(self) -> None:
         if self._file is None:
-            self._file = self.path.open("x+b", buffering=0)
+            self._file = self._made()
         elif not self._is_at_its_path(self._file):
             self._file = self._copied_back(self._file)
         try:
@@ -84,6 +88,15 @@ class SegmentFile:
         finally:
             self._file.truncate(self._written)  # remove an incomplete segment
 
+    def _made(self) -> FileIO:
+        """Make the file with the first name that is free, and return it."""
+        for number in itertools.count(2):
+            try:
+                return self.path.open("x+b", buffering=0)
+            except FileExistsError:
+                self.path = self._stem.with_name(f"{self._stem.name}-{number}.rrd")
+        raise AssertionError  # there is always a free name
+
     def _is_at_its_path(self, file: FileIO) -> bool:
         """False if somebody has deleted or moved the file; its open descriptor still has what was written."""
         try:
@@ -93,7 +106,7 @@ class SegmentFile:
 
     def _copied_back(self, lost: FileIO) -> FileIO:
         """Copy what was written to a new file at the path, and return it; raises OSError on failure."""
-        copy = self.path.open("x+b", buffering=0)
+        copy = self._made()
         try:
             lost.seek(0)
             with open(copy.fileno(), "wb", closefd=False) as out:

@@ -93,9 +93,12 @@ class FieldRecording:
         self._initial_mission = mission
         self._plan = plan
         self._open = ExitStack()
+        self._replaces = False
+        """True if a file was at the path at the begin."""
 
     def __enter__(self) -> FieldRecording:
         must_be_writable(self.path)
+        self._replaces = self.path.exists()
         if self._initial_mission is not None:
             self.mission(self._initial_mission)
         return self
@@ -198,7 +201,9 @@ class FieldRecording:
             return f"{self.path}: could not be written completely ({segments.fault}); {saved}"
         try:
             compact(segments.path, self.path)
-        except InputError as error:
+        except (InputError, FileNotFoundError) as error:
+            if self.path.exists() and not self._replaces and not segments.path.exists():
+                return None  # another recorder of this run has saved it, and removed what was left
             return str(error)
         return None
 
@@ -209,7 +214,7 @@ class FieldRecording:
 
     def _begin(self, mission: Mission, run_id: str = "") -> None:
         """Open the file; it has the id of its first run, so that a catalog holds the runs side by side."""
-        self._segments = SegmentFile(_free_name(self.path), self._say)
+        self._segments = SegmentFile(self.path.with_name(f"{self.path.stem}.partial"), self._say)
         sheet = Sheet(
             recording_id=entities.recording_id(mission.id, run_id),
             name=mission.name,
@@ -310,13 +315,3 @@ _DRAW = _Draw(
         ReportsMissing: RunDrawing.incomplete,
     }
 )
-
-
-def _free_name(path: Path) -> Path:
-    """Return a free name next to `path`: the partial file of an earlier run is not overwritten."""
-    partial = path.with_name(f"{path.stem}.partial.rrd")
-    number = 2
-    while partial.exists():
-        partial = path.with_name(f"{path.stem}.partial-{number}.rrd")
-        number += 1
-    return partial

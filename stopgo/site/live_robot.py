@@ -17,6 +17,7 @@ import time
 import uuid
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -58,6 +59,19 @@ from stopgo.site.shown_run import ShownRun
 
 NO_RUN = ("IDLE", "READY")
 """States of a robot that has begun no run of its mission."""
+
+
+@dataclass(frozen=True)
+class HeldMission:
+    """The mission that a robot holds by its newest state."""
+
+    is_known: bool
+    mission: Mission | None = None
+
+    @property
+    def digest(self) -> str:
+        """Digest of the mission; empty if the robot holds none, or it is not known."""
+        return "" if self.mission is None else self.mission.digest
 
 
 class LiveRobot:
@@ -237,6 +251,17 @@ class LiveRobot:
         self.mission = self.station.mission(state.mission_id, state.revision)
         self._plan_reader = threading.Thread(target=self._read_plan, daemon=True)
         self._plan_reader.start()
+
+    @property
+    def held(self) -> HeldMission:
+        """Mission that the robot holds; unknown before its first state, and until a new mission was read."""
+        state, mission = self.state, self.mission
+        if state is None:
+            return HeldMission(is_known=False)
+        if state.mission_id is None:
+            return HeldMission(is_known=True)
+        is_read = mission is not None and (mission.id, mission.revision) == (state.mission_id, state.revision)
+        return HeldMission(is_known=is_read, mission=mission if is_read else None)
 
     def _read_plan(self) -> None:
         try:

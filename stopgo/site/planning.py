@@ -169,6 +169,8 @@ class PlanningRoom:
         self._saved = saved
         self._plans, self.files = WorkLane(), WorkLane()
         self._lock = threading.Lock()
+        self._saving = threading.Lock()
+        """Held while a variant is saved: of two that two pages save in one place, the second is refused."""
         self._variants: dict[int, PlanVariant] = {}
         for one in kept.finished():
             self._show_again(one)
@@ -264,21 +266,28 @@ class PlanningRoom:
         variant = self.variant(number)
         if variant.shown["state"] != "done":
             raise InputError(f"variant {number}: has no plan to save")
-        place = self._folder.path(f"plans/{file_name(name)}")
-        mission = read(variant.folder / "mission.json")
-        if next_revision(place / "mission.json", mission) != mission.revision:
-            raise NegativeResult(f"plans/{name}: holds another revision of this mission; plan again from it")
-        place.mkdir(parents=True, exist_ok=True)
-        there = [one for one in FILES if (variant.folder / one).exists()]
-        with replacing(*(place / one for one in there)) as paths:
-            for one, path in zip(there, paths, strict=True):
-                shutil.copyfile(variant.folder / one, path)
-        saved = self._folder.name_of(place / "mission.json")
+        with self._saving:
+            saved = self._copied(variant, name)
         variant.shown = {**variant.shown, "saved": saved}
         self._kept.keep(number, variant.shown)
         self._tell(variant)
         self._saved()
         return saved
+
+    def _copied(self, variant: PlanVariant, name: str) -> str:
+        """Copy a variant's files; return the name of its mission file in the folder."""
+        place = self._folder.path(f"plans/{file_name(name)}")
+        mission, there = read(variant.folder / "mission.json"), place / "mission.json"
+        if next_revision(there, mission) != mission.revision:
+            raise NegativeResult(f"plans/{name}: holds another revision of this mission; plan again from it")
+        if there.is_file() and read(there).id != mission.id:
+            raise NegativeResult(f"plans/{name}: holds another mission; save this one under another name")
+        place.mkdir(parents=True, exist_ok=True)
+        made = [one for one in FILES if (variant.folder / one).exists()]
+        with replacing(*(place / one for one in made)) as paths:
+            for one, path in zip(made, paths, strict=True):
+                shutil.copyfile(variant.folder / one, path)
+        return self._folder.name_of(there)
 
     def _progress(self, variant: PlanVariant, message: WorkAnswer) -> None:
         variant.shown = {**variant.shown, "state": "running", **message}

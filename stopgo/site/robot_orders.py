@@ -67,10 +67,18 @@ class OrderRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class PushRequest(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A mission file of the folder for one robot."""
+    """A mission file of the folder for one robot.
+
+    It is not sent if the page showed another mission in the file or at the robot: another page may have saved
+    or pushed one meanwhile.
+    """
 
     id: str
     file: str
+    digest: str | None = None
+    """Digest of the mission that the page showed in the file."""
+    held: str | None = None
+    """Digest of the mission that the page showed at the robot; empty if it showed none."""
     take_over: bool = False
 
 
@@ -152,7 +160,7 @@ class RobotOrders:
     def push(self, name: str, request: PushRequest, mission: Mission) -> Future[OrderRecord]:
         """Send a mission to one robot, and verify that it is stored."""
         robot = self.robot(name)
-        give = partial(robot.station.push, mission, take_over=request.take_over)
+        give = partial(_push_as_shown, robot, request, mission)
         return self._once(request.id, name, partial(self._run, request.id, robot, "push", give), self._others)
 
     def robot(self, name: str) -> LiveRobot:
@@ -308,6 +316,18 @@ class RobotOrders:
     def _tell(self, record: OrderRecord) -> None:
         kind = "stop" if record.verb in ("pause", "abort") else "order"
         self._feed.tell((kind, record.robot), asdict(record), at_once=True)
+
+
+def _push_as_shown(robot: LiveRobot, request: PushRequest, mission: Mission) -> Any:
+    """Push a mission; raises `InputError` if that would change anything else than the page showed."""
+    if request.digest not in (None, mission.digest):
+        raise InputError(f"{request.file}: changed after the page showed the difference; look at it again")
+    held = robot.held
+    if held.is_known and request.held not in (None, held.digest):
+        raise InputError(
+            f"{robot.name} got another mission after the page showed the difference; look at it again"
+        )
+    return robot.station.push(mission, take_over=request.take_over)
 
 
 def _outcome(record: OrderRecord, give: Callable[[], Any]) -> OrderRecord:

@@ -132,7 +132,10 @@ def _mission_json(name: str, mission: Mission) -> dict[str, Any]:
 
 def mission_difference(held: Mission | None, new: Mission) -> dict[str, Any]:
     """Return what a push would change for a robot that holds a mission, or none."""
-    about = {"id": new.id, "revision": new.revision, "name": new.name, "stops": len(new.stops)}
+    about = {
+        "id": new.id, "revision": new.revision, "name": new.name, "stops": len(new.stops),
+        "digest": new.digest,
+    }  # fmt: skip
     if held is None:
         return {"new": about, "held": None, "same": False}
     before = {(one.x, one.y): one for one in held.stops}
@@ -141,7 +144,7 @@ def mission_difference(held: Mission | None, new: Mission) -> dict[str, Any]:
         "new": about | {"total_s": schedule(new).total_s},
         "held": {
             "id": held.id, "revision": held.revision, "name": held.name, "stops": len(held.stops),
-            "total_s": schedule(held).total_s,
+            "total_s": schedule(held).total_s, "digest": held.digest,
         },
         "same": held.digest == new.digest,
         "same_mission": held.id == new.id,

@@ -100,7 +100,14 @@ def web_app(parts: SiteParts) -> RequestChecks:
         status = 409 if isinstance(error, NegativeResult) else 400
         return JSONResponse({"error": parts.folder.plain(str(error))}, status_code=status)
 
-    app = Starlette(routes=routes, exception_handlers={StopgoError: refused})
+    def failed(request: Request, error: Exception) -> Response:
+        """Answer a request that the disk has refused, such as a full or a read-only one."""
+        assert isinstance(error, OSError)
+        where, why = error.filename or "the site's disk", error.strerror or error
+        text = f"{where}: {why}; make room, or let the site write there, and try again"
+        return JSONResponse({"error": parts.folder.plain(text)}, status_code=400)
+
+    app = Starlette(routes=routes, exception_handlers={StopgoError: refused, OSError: failed})
     return RequestChecks(app, address=parts.address, access=parts.access, viewer=parts.viewer)
 
 
@@ -203,7 +210,7 @@ class LivePages:
         """Return what a push would change."""
         robot = self._parts.orders.robot(request.path_params["name"])
         mission = read(self._parts.folder.file(request.query_params.get("file", "")))
-        return JSONResponse(mission_difference(robot.mission, mission))
+        return JSONResponse(mission_difference(robot.held.mission, mission) | {"known": robot.held.is_known})
 
     def _must_command(self) -> None:
         if not self._parts.may_command:

@@ -223,7 +223,7 @@ def _recording(path: Path, known: KnownMission | None) -> Iterator[RunCollector]
     with FieldRecording(path, plan=None if known is None else known.recording) as record:
         yield RunCollector(record)
     if path.exists():  # what a killed site left of this run is in it, too
-        for left in path.parent.glob(f"{path.stem}.partial*.rrd"):
+        for left in path.parent.glob(f"{path.stem}.partial*"):
             left.unlink(missing_ok=True)
 
 

@@ -6,7 +6,10 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from msgspec import structs
 
+from stopgo.mission.document import with_digest
+from stopgo.mission.files.mission_json import read, write
 from tests.planner.floors.ifc.house import two_rooms as house_model
 from tests.planner.floors.ifc.test_status import WORK, scheduled
 from tests.ports import free_port
@@ -274,6 +277,75 @@ def test_a_change_by_hand_shows_its_cost_before_it_is_planned(world: BrowserWorl
         tab.press("Plan with these changes")
         tab.until(f"document.querySelectorAll('.variant.done').length === {variants + 1}")
         tab.shows("Seen twice", ".variant")
+
+
+def test_what_another_page_has_saved_meanwhile_is_not_pushed(world: BrowserWorld) -> None:
+    """The page showed one mission, and pushed the one that another page had saved into its file since."""
+    file = world.folder / "plans/house/mission.json"
+    kept = file.read_bytes()
+    with world.tab() as tab:
+        tab.press("Push mission", card("r2", "button"))
+        tab.until("document.querySelector('.question select')")
+        tab.run("{ const list = document.querySelector('.question select'); list.value ="
+                " 'plans/house/mission.json'; list.dispatchEvent(new Event('change')); }")  # fmt: skip
+        tab.until(f"document.querySelector('{card('r2', '.difference')}').innerText")
+        planned = read(file)
+        write(with_digest(structs.replace(planned, revision=planned.revision + 1)), file)
+        try:
+            tab.press("Push to r2", card("r2", "button"))
+            tab.shows("changed after the page showed the difference; look at it again", card("r2"))
+        finally:
+            file.write_bytes(kept)
+
+
+LOST_ANSWER = """{ const real = window.fetch; window.fetch = (to, ...rest) => String(to).endsWith("/orders")
+  ? real(to, ...rest).then(() => { throw new TypeError("Failed to fetch"); }) : real(to, ...rest); }"""
+"""The server gets an order, and the page loses its link before the answer."""
+
+
+def test_an_order_whose_answer_is_lost_is_not_called_unsent(world: BrowserWorld) -> None:
+    """The robot had obeyed it, and the page said that it was not sent."""
+    with world.tab() as tab:
+        tab.shows("r2", card("r2"))
+        tab.run(LOST_ANSWER)
+        tab.press("Pause", card("r2", "button"))
+        tab.shows("UNKNOWN whether it was carried out", card("r2", ".question"))
+        assert "Not sent" not in tab.run("document.body.innerText")
+
+
+FAILS_ONCE = """{ const real = window.fetch; let failed = false; window.fetch = (to, ...rest) =>
+  String(to).endsWith("/drawing") && !failed
+    ? Promise.reject(new TypeError(failed = "offline")) : real(to, ...rest);
+  window.hasFailed = () => failed; }"""
+"""The link of the page is lost for one drawing."""
+
+
+def test_a_plan_whose_drawing_was_lost_once_is_drawn_the_next_time(world: BrowserWorld) -> None:
+    """It was not drawn again, and its stops could not be changed, until the page was loaded anew."""
+    with world.tab("#plan") as tab:
+        tab.shows("32 m², 2 rooms, 1 openings")
+        tab.run(FAILS_ONCE)
+        tab.until("document.querySelector('.variant.done')")
+        tab.run("document.querySelector('.variant.done button').click()")
+        tab.until("window.hasFailed()")
+        assert not tab.run("document.querySelector('.map .stop')")
+        tab.run("document.querySelector('.variant.done button').click()")
+        tab.until("document.querySelector('.map .stop')")
+
+
+def test_a_name_for_a_plan_stays_while_another_page_plans(world: BrowserWorld) -> None:
+    """Each message of the other plan made the field anew, with the name that it had at first."""
+    field = "document.querySelector('.variant input')"
+    with world.tab("#plan") as tab, world.tab("#plan") as other:
+        tab.until(field)
+        tab.run(f"{field}.focus()")
+        tab.run(f"{field}.value = 'east wing'")
+        before = tab.run("document.querySelectorAll('.variant').length")
+        other.shows("32 m², 2 rooms, 1 openings")
+        other.press("Plan", ".options button")
+        tab.until(f"document.querySelectorAll('.variant.done').length > {before}")
+        assert tab.run(f"{field}.value") == "east wing"
+        assert tab.run(f"document.activeElement === {field}")
 
 
 def pick(tab: Tab, field: str, value: str) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,10 +22,11 @@ from stopgo.planner.floors.ifc import loading
 from stopgo.planner.floors.ifc.extract import main as extract
 from stopgo.recordings.catalog import run_index
 from stopgo.recordings.page import reviewed
+from stopgo.site import planning
 from stopgo.site.event_feed import EventFeed
 from stopgo.site.kept_variants import kept_variants
 from stopgo.site.planning import EditRequest, PlanningRoom, VariantRequest, WorkLane
-from stopgo.site.planning_routes import options_json
+from stopgo.site.planning_routes import options_json, planning_routes
 from stopgo.site.planning_work import (
     DRAWING,
     CommandTask,
@@ -36,6 +39,7 @@ from stopgo.site.planning_work import (
 from stopgo.site.run_pages import RunRoom
 from stopgo.site.site_folder import SiteFiles
 from tests.planner.floors.ifc.house import two_rooms as house_model
+from tests.site.pages import Page, parts_of
 from tests.site.two_rooms import two_rooms
 
 
@@ -309,3 +313,61 @@ def test_a_follow_up_mission_is_planned_for_an_undecided_run_too(
             assert back.follow_up(mission["key"])["stops"] == mission["stops"]
     finally:
         out.unlink(missing_ok=True)
+
+
+def test_a_variant_does_not_replace_a_mission_that_it_was_not_planned_from(
+    room: PlanningRoom, place: Path
+) -> None:
+    """Two variants of a floor have one name on the page; the second took the place of the first."""
+    first = waited(room, room.plan(VariantRequest(floor="house.dxf")))
+    other = waited(room, room.plan(VariantRequest(floor="house.dxf", options={"coverage": "0.6"})))
+    saved = place / room.save(first["number"], "two")
+    before = saved.read_bytes()
+    with pytest.raises(NegativeResult, match="plans/two: holds another mission; save this one under another"):
+        room.save(other["number"], "two")
+    assert saved.read_bytes() == before
+    assert room.save(first["number"], "two") == "plans/two/mission.json", "saved again, it is the same"
+    assert room.save(other["number"], "two-again") == "plans/two-again/mission.json"
+
+
+def test_of_two_variants_that_are_saved_at_once_in_one_place_the_second_is_refused(
+    room: PlanningRoom, place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = waited(room, room.plan(VariantRequest(floor="house.dxf")))
+    other = waited(room, room.plan(VariantRequest(floor="house.dxf", options={"coverage": "0.6"})))
+    refused: list[str] = []
+
+    def save_other() -> None:
+        try:
+            room.save(other["number"], "at-once")
+        except NegativeResult as error:
+            refused.append(str(error))
+
+    second = threading.Thread(target=save_other)
+    copy = planning.shutil.copyfile
+
+    def copied(source: Path, target: Path) -> object:
+        if second.ident is None:
+            second.start()
+            second.join(1.0)  # it waits for the first one
+        return copy(source, target)
+
+    monkeypatch.setattr(planning.shutil, "copyfile", copied)
+    saved = place / room.save(first["number"], "at-once")
+    second.join()
+    assert len(refused) == 1
+    assert read(saved).id == read(room.variant(first["number"]).folder / "mission.json").id
+
+
+def test_a_disk_that_refuses_is_one_line(room: PlanningRoom, place: Path, tmp_path: Path) -> None:
+    """It was an internal error for the page, and a traceback on the terminal."""
+    made = waited(room, room.plan(VariantRequest(floor="house.dxf")))
+    taken = place / "plans" / "taken"
+    taken.parent.mkdir(exist_ok=True)
+    taken.write_bytes(b"")
+    parts = replace(parts_of(tmp_path), folder=SiteFiles.at(place), more=planning_routes(room))
+    answer = Page(parts).post(f"/api/plans/{made['number']}/save", {"name": "taken"})
+    assert answer.status_code == 400
+    assert answer.json()["error"] == (
+        "plans/taken: File exists; make room, or let the site write there, and try again"
+    )

@@ -160,3 +160,42 @@ def test_an_order_for_what_another_page_has_changed_is_refused(
     assert order(page, "skip", **skip)[0] == "ok"
     assert order(page, "skip", **skip)[0] == "refused"
     assert station.status().skipped == ("S1",)
+
+
+def test_what_is_pushed_is_what_the_page_showed(
+    served_robot: tuple[Browser, Station], tmp_path: Path
+) -> None:
+    """Another page saved into the file, or pushed another mission, while this one showed the difference."""
+    page, station = served_robot
+    first = world.nouns_at()[-1]
+    assert isinstance(first, Mission)
+    second = with_digest(structs.replace(first, revision=first.revision + 1, name="renamed"))
+    file = tmp_path / "site" / "mission.json"
+    write(first, file)
+    wait_until(lambda: difference(page)["known"])
+    shown = difference(page)
+    assert (shown["new"]["digest"], shown["held"]) == (first.digest, None)
+    write(second, file)
+    assert order(page, "push", file="mission.json", digest=first.digest, held="") == ("not_sent", "")
+    assert station.status().mission_id is None
+    assert order(page, "push", file="mission.json", digest=second.digest, held="")[0] == "ok"
+    wait_until(lambda: difference(page)["held"])
+    assert order(page, "push", file="mission.json", digest=second.digest, held=first.digest)[0] == "not_sent"
+    assert order(page, "push", file="mission.json", digest=second.digest, held="")[0] == "not_sent"
+    assert order(page, "push", file="mission.json", digest=second.digest, held=second.digest)[0] == "ok"
+
+
+def difference(page: Browser) -> Any:
+    """Return what the page shows before a push."""
+    return page.send("GET", "/api/robots/r1/difference?file=mission.json")[1]
+
+
+def test_what_a_silent_robot_holds_is_not_known(tmp_path: Path) -> None:
+    """It was said to hold no mission."""
+    mission, port = world.nouns_at()[-1], free_port()
+    assert isinstance(mission, Mission)
+    write(mission, tmp_path / "site" / "mission.json")
+    options = SiteOptions(tmp_path / "site", "", robots=("r1",), port=port)
+    with serving_site(options, say=quiet, link=Switchboard().link()) as address:
+        page = Browser(http.client.HTTPConnection("127.0.0.1", port), address)
+        assert difference(page)["known"] is False

@@ -16,6 +16,7 @@ from stopgo.mission.mavlink.following.vehicle_health import HealthReports, Vehic
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.telemetry import (
     Message,
+    has_numbers,
     is_lost,
     local_speed,
     origin_of,
@@ -67,6 +68,9 @@ class NewestMessages(MessageQueue):
         self.health = HealthReports()
 
     def put(self, message: Message) -> None:
+        """Take a message; a position or heading that is no number is late, as one that did not come."""
+        if not has_numbers(message):
+            return
         now_s = time.monotonic()
         self._counts[message.get_type()] += 1
         if message.get_type() == POSE[0]:

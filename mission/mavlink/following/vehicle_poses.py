@@ -13,6 +13,7 @@ from stopgo.mission.mavlink.read_back import point_at
 from stopgo.mission.mavlink.telemetry import (
     Message,
     global_speed,
+    has_numbers,
     is_lost,
     local_speed,
     origin_of,
@@ -56,6 +57,8 @@ class VehiclePoses:
 
     def take(self, name: str, message: Message, listed: ListedMission | None, now_ns: int) -> Fix | None:
         """Take a message; return the pose that it gives."""
+        if not has_numbers(message):
+            return None
         if name == "GPS_GLOBAL_ORIGIN":
             self._origin, self._frame = message, None
         elif name == "ATTITUDE":

@@ -1,4 +1,6 @@
 // Requests to the server. What changes something carries the page's key, which cookies do not hold.
+import { t } from "./words.js";
+
 const KEY = "stopgo-key";
 
 export function isSignedIn() {
@@ -21,17 +23,24 @@ export async function read(path) {
 }
 
 export async function send(path, body, signal) {
-  return parsed(await fetch(path, {
+  const answer = await fetch(path, {
     method: "POST",
     headers: { "Content-Type": "application/json", "X-Stopgo-Key": localStorage.getItem(KEY) ?? "" },
     body: JSON.stringify(body),
     signal,
-  }));
+  }).catch((error) => { throw Object.assign(error, { isUnanswered: true }); });
+  return parsed(answer);
+}
+
+// What became of a request that has failed: one without an answer may have been carried out.
+export function failureText(error) {
+  return t(error.isUnanswered ? "no_answer" : "not_sent", { reason: error.message });
 }
 
 async function parsed(answer) {
-  const body = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw new Error(body.error || `${answer.status}`);
+  const body = await answer.json().catch(() => null);
+  if (!answer.ok) throw new Error(body?.error || `${answer.status}`);
+  if (!body) throw Object.assign(new Error("the answer was cut off"), { isUnanswered: true });
   return body;
 }
 

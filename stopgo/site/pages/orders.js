@@ -1,5 +1,5 @@
 // Orders to one robot: none is ever disabled, for the page may be wrong; those that fit the state stand out.
-import { orderId, read, send } from "./api.js";
+import { failureText, orderId, read, send } from "./api.js";
 import { fill, h, say } from "./dom.js";
 import { get } from "./store.js";
 import { lineOf } from "./stop.js";
@@ -92,7 +92,7 @@ async function sent(name, question, work, more = {}) {
 }
 
 function fault(question, error) {
-  fill(question, h("p", { class: "bad", role: "alert" }, t("not_sent", { reason: error.message })));
+  fill(question, h("p", { class: "bad", role: "alert" }, failureText(error)));
 }
 
 async function offerMissions(name, question) {
@@ -103,18 +103,24 @@ async function offerMissions(name, question) {
   const list = h("select", { "aria-label": t("mission_to_push") }, missions.map((one) =>
     h("option", { value: one.file }, t("mission_choice", { ...one, time: duration(one.total_s) }))));
   const difference = h("p", { class: "difference" });
+  // What is pushed is what was shown: the server refuses it if the file or the robot's mission has changed meanwhile.
   const show = async () => {
-    const found = await read(`/api/robots/${encodeURIComponent(name)}/difference?file=${encodeURIComponent(list.value)}`).catch((error) => ({ error: error.message }));
-    say(difference, found.error ?? differenceText(found));
+    const file = list.value;
+    const found = await read(`/api/robots/${encodeURIComponent(name)}/difference?file=${encodeURIComponent(file)}`).catch((error) => ({ error: error.message }));
+    if (file === list.value) say(difference, found.error ?? differenceText(found));
+    return { file, digest: found.new?.digest, held: found.known ? found.held?.digest ?? "" : undefined };
   };
-  list.addEventListener("change", show);
+  let shown = null;
+  list.addEventListener("change", () => { shown = show(); });
   fill(question, list, left ? h("p", {}, t("missions_left", { n: left, listed: missions.length })) : "", difference,
-    h("button", { type: "button", class: "primary", onclick: () => push(name, list.value, question) }, t("push_to", { robot: name })),
+    h("button", { type: "button", class: "primary", onclick: async () => push(name, await shown, question) }, t("push_to", { robot: name })),
     h("button", { type: "button", onclick: () => fill(question) }, t("cancel")));
-  await show();
+  shown = show();
+  await shown;
 }
 
 export function differenceText(found) {
+  if (!found.known) return t("difference_unknown", { stops: found.new.stops });
   if (!found.held) return t("difference_none", { stops: found.new.stops });
   if (found.same) return t("difference_same");
   const change = t("difference_stops", { added: found.added.length, removed: found.removed.length, kept: found.kept });
@@ -125,10 +131,10 @@ export function differenceText(found) {
   return `${what} ${change} ${time}`;
 }
 
-function push(name, file, question) {
+function push(name, mission, question) {
   const path = `/api/robots/${encodeURIComponent(name)}/push`;
   fill(question);
-  return sent(name, question, (more) => send(path, { id: orderId(), file, ...more }));
+  return sent(name, question, (more) => send(path, { id: orderId(), ...mission, ...more }));
 }
 
 export { lineOf };

@@ -1,5 +1,5 @@
 // Planning: a floor of the folder, twelve options, variants beside each other, and stops moved by hand.
-import { read, send } from "./api.js";
+import { failureText, read, send } from "./api.js";
 import { fill, h, say, svg } from "./dom.js";
 import { emptyMap, floorLayers, legend, markSize, place, setFrame, stopMark, targetPaths } from "./map.js";
 import { all, onChange } from "./store.js";
@@ -11,6 +11,7 @@ const FINGER_PX = 22;
 const FLOOR_CHOICES = ["storey", "level", "drawing", "date"];
 const chosen = { floor: null, options: {}, shown: null, base: null };
 const drawings = new Map();
+onChange((kinds) => { if (kinds.has("*")) drawings.clear(); }); // another server may count its variants from 1 again
 
 export function makePlan(main, me) {
   const map = emptyMap(t("map_of_floor"), "group");
@@ -19,7 +20,7 @@ export function makePlan(main, me) {
   const view = {
     me, map, layers, form: h("form", { class: "options" }), findings: h("ul", { class: "findings" }),
     note: h("p", { class: "notice", role: "status" }), variants: h("div", { class: "variants" }),
-    hand: h("div", { class: "hand", role: "group", "aria-label": t("by_hand") }), selected: null, mode: null, draft: null, focus: null,
+    hand: h("div", { class: "hand", role: "group", "aria-label": t("by_hand") }), selected: null, mode: null, draft: null, focus: null, cards: new Map(), names: new Map(),
   };
   const may = me.role === "operator";
   fill(main, h("div", { class: "planning" },
@@ -141,7 +142,7 @@ async function begin(view, request) {
     view.follow = made;
     drawVariants(view);
   } catch (error) {
-    say(view.note, t("not_sent", { reason: error.message }));
+    say(view.note, failureText(error));
   }
 }
 
@@ -151,16 +152,31 @@ function variantsShown() {
 
 function drawVariants(view) {
   const variants = variantsShown();
-  fill(view.variants, variants.map((one) => card(view, one, variants)));
+  showCards(view, variants.map((one) => keptCard(view, one, variants)));
   const shown = variants.find((one) => one.number === chosen.shown) ?? null;
   if (shown) show(view, shown);
   drawHand(view, shown);
 }
 
-function card(view, one, variants) {
+// A card is made anew only if it shows something else: what is typed or pressed while another page plans is not lost.
+function keptCard(view, one, variants) {
   const base = variants.find((other) => other.number === one.request.base) ?? variants.filter((other) => other.report && other.number < one.number).pop();
+  const shows = JSON.stringify([one, base?.report, one.number === chosen.shown]);
+  const kept = view.cards.get(one.number);
+  if (kept?.shows === shows) return kept.element;
+  const element = card(view, one, base);
+  view.cards.set(one.number, { shows, element });
+  return element;
+}
+
+function showCards({ variants }, cards) {
+  for (const old of [...variants.children]) if (!cards.includes(old)) old.remove();
+  cards.forEach((one, place) => { if (variants.children[place] !== one) variants.insertBefore(one, variants.children[place] ?? null); });
+}
+
+function card(view, one, base) {
   const operator = view.me.role === "operator";
-  const name = h("input", { value: defaultName(one), "aria-label": t("name_of_plan"), autocomplete: "off" });
+  const name = h("input", { value: view.names.get(one.number) ?? defaultName(one), "aria-label": t("name_of_plan"), autocomplete: "off", oninput: () => view.names.set(one.number, name.value) });
   const report = one.report;
   return h("section", { class: `variant ${one.state}${one.number === chosen.shown ? " focus" : ""}`, "aria-label": t("variant", { n: one.number }) },
     h("div", { class: "line" }, h("button", { type: "button", "aria-pressed": String(one.number === chosen.shown), onclick: () => { chosen.shown = one.number; view.selected = null; drawVariants(view); } }, t("variant", { n: one.number })),
@@ -210,14 +226,14 @@ async function save(view, one, name) {
   try {
     await send(`/api/plans/${one.number}/save`, { name });
   } catch (error) {
-    say(view.note, t("not_sent", { reason: error.message }));
+    say(view.note, failureText(error));
   }
 }
 
 async function show(view, one) {
   if (one.state === "done") {
-    if (!drawings.has(one.number)) drawings.set(one.number, await read(`/api/plans/${one.number}/drawing`).catch(() => null));
-    const drawing = drawings.get(one.number);
+    const drawing = drawings.get(one.number) ?? await read(`/api/plans/${one.number}/drawing`).catch(() => null);
+    if (drawing) drawings.set(one.number, drawing);
     if (!drawing || chosen.shown !== one.number) return;
     showFloor(view, { ...drawing, findings: one.report.findings });
     view.size = markSize(drawing);

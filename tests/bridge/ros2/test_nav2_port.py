@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -26,6 +27,7 @@ class FakeNode:
     def __init__(self) -> None:
         self.heard: dict[str, Callable[[Any], None]] = {}
         self.sent: list[tuple[str, bytes, Any]] = []
+        self.servers = frozenset({"first"})
 
     def subscribe(self, kind: str, topic: str, take: Callable[[Any], None], *quality: object) -> None:
         self.heard[topic] = take
@@ -47,6 +49,9 @@ class FakeNode:
 
     def is_published(self, topic: str) -> bool:
         return True
+
+    def publishers(self, topic: str) -> frozenset[str]:
+        return self.servers
 
     def now_ns(self) -> int:
         return 0
@@ -101,3 +106,47 @@ def test_on_the_legs_every_goal_that_is_not_ours_is_another_clients(node: FakeNo
     port.follow((END, END))
     node.status("follow_path", other=EXECUTING)
     assert port.foreign_goals() == ("goal 6f746865 of follow_path",)
+
+
+def test_a_goal_of_a_server_that_was_restarted_is_nobodys(node: FakeNode, port: Nav2Port) -> None:
+    """The robot was refused every start and retry, because a goal of the former server was active."""
+    node.status("follow_path", other=EXECUTING)
+    assert port.foreign_goals() == ("goal 6f746865 of follow_path",)
+    node.servers = frozenset({"first", "second"})
+    assert port.foreign_goals() == ("goal 6f746865 of follow_path",)
+    node.servers = frozenset({"second"})
+    assert port.foreign_goals() == ()
+    node.servers = frozenset()
+    node.status("follow_path", other=EXECUTING)
+    assert port.foreign_goals() == ()
+    node.servers = frozenset({"late"})
+    assert port.foreign_goals() == ("goal 6f746865 of follow_path",), "its server was not known yet"
+
+
+def covariance(*, x: float, y: float) -> SimpleNamespace:
+    told = [0.0] * 36
+    told[0], told[7] = x, y
+    return SimpleNamespace(pose=SimpleNamespace(covariance=told))
+
+
+@pytest.mark.parametrize("which", [{"x": math.nan, "y": 0.01}, {"x": 0.01, "y": math.nan}])
+def test_a_covariance_without_numbers_is_no_certainty(
+    node: FakeNode, port: Nav2Port, which: dict[str, float]
+) -> None:
+    port._take_covariance(covariance(**which))
+    assert port.telemetry.sigma_m == math.inf
+    port._take_covariance(covariance(x=0.04, y=0.01))
+    assert port.telemetry.sigma_m == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("rotation", [(0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 2.0, 1.0), (0.0, 0.0, math.nan, 1.0)])
+def test_a_transform_without_a_rotation_says_nothing(
+    node: FakeNode, port: Nav2Port, rotation: tuple[float, ...]
+) -> None:
+    made = SimpleNamespace
+    turn = made(**dict(zip("xyzw", rotation, strict=True)))
+    header = made(frame_id="map", stamp=made(sec=1, nanosec=0))
+    inner = made(translation=made(x=1.0, y=2.0), rotation=turn)
+    one = made(header=header, child_frame_id="base_link", transform=inner)
+    node.heard["/tf"](made(transforms=[one]))
+    assert "tf has no transform from map to base_link" in port.telemetry.silence()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import msgspec
@@ -157,6 +158,55 @@ def test_a_scan_during_which_the_map_moves_does_not_count() -> None:
     field.work()
     assert scanned(field) == ["s1", "s2", "s3"]
     assert len(field.world.scans) == 4
+
+
+def test_transforms_that_are_no_numbers_count_as_missing() -> None:
+    field = started(RosField())
+    lost = Transform(x=math.nan, y=math.nan, heading=math.nan)
+    field.world.later(2.0, lambda: setattr(field.world, "correction", lost))
+    field.work()
+    run = field.controller.run
+    assert run.state == "HELD"
+    assert "tf has no map -> odom for" in run.reason
+    assert "nan" not in run.reason
+    field.world.correction = SAME
+    field.clock.wait(1.0)
+    assert field.order("retry").outcome == "ok"
+    field.work()
+    assert scanned(field) == ["s1", "s2", "s3"]
+
+
+def test_a_scan_with_an_odometry_without_numbers_does_not_count() -> None:
+    field = started(RosField(world=World(scan_s=10.0)))
+    field.work_until(lambda run: run.stop_state == "SCANNING")
+    telemetry = field.world.telemetry
+    assert telemetry is not None
+    told = telemetry.take_odometry
+    telemetry.take_odometry = lambda *_, **more: told(math.nan, math.nan, **more)  # type: ignore[method-assign]
+    field.work()
+    assert scanned(field) == []
+    assert "no odometry for" in field.controller.run.reason
+
+
+def test_a_localisation_whose_variance_is_no_number_is_unknown() -> None:
+    field = started(RosField())
+    telemetry = field.world.telemetry
+    assert telemetry is not None
+    field.world.later(2.0, lambda: telemetry.take_variances(math.nan, math.nan))
+    field.work()
+    assert field.controller.run.state == "HELD"
+    assert "the localisation is uncertain by inf m" in field.controller.run.reason
+    assert telemetry.health().localisation == 0.0
+
+
+@pytest.mark.parametrize(("parent", "child"), [("odom", "odom"), ("", "odom"), ("map", "")])
+def test_a_transform_without_two_frames_says_nothing(parent: str, child: str) -> None:
+    """One such message took the place of a transform that is published once."""
+    telemetry = RosField().world.telemetry
+    assert telemetry is not None
+    telemetry.take_transform(parent, child, Transform(x=1.0, y=2.0, heading=0.0), stamp_ns=2 * 10**18)
+    assert telemetry.silence() == ""
+    assert (telemetry.pose().x, telemetry.pose().y) == (0.0, 0.0)
 
 
 def test_a_frame_that_tf_lacks_is_named_with_those_that_it_has() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.ros2.drive_lease import LEASE_S, LeaseGuard, lease_key
-from stopgo.bridge.ros2.ros_definitions import message_type
+from stopgo.bridge.ros2.ros_definitions import message_type, service_types
 from stopgo.bridge.ros2.zenoh_node import NodeThread, ZenohNode, key_of
 from tests.bridge.ros2.zenoh_nav2 import session_at
 from tests.ports import free_port
@@ -60,6 +60,21 @@ def test_a_service_is_found_and_answers(make_node: MakeNode) -> None:
     client.call({}, answers.put)
     answer = answers.get(timeout=LAST_RESORT_S)
     assert (answer.success, answer.message) == (True, "PAUSED")
+
+
+def test_a_request_with_a_damaged_attachment_is_not_answered_and_ends_nothing(make_node: MakeNode) -> None:
+    server, asking = make_node("server"), make_node("asking")
+    client = asking.client(TRIGGER, "/r1/server/pause")
+    server.serve(TRIGGER, "~/pause", lambda: {"success": True, "message": "PAUSED"})
+    until(lambda: not client.missing())
+    (found,) = service_types(TRIGGER)
+    key = key_of(3, "/r1/server/pause", TRIGGER, found.hash)
+    assert list(asking.session.get(key, payload=found.request.encode({}), attachment=b"short")) == []
+    answers: Queue[Any] = Queue()
+    client.call({}, answers.put)
+    answer = answers.get(timeout=LAST_RESORT_S)
+    assert answer is not None
+    assert answer.message == "PAUSED"
 
 
 def test_a_request_without_a_server_has_no_answer(make_node: MakeNode) -> None:

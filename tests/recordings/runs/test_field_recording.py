@@ -20,9 +20,12 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import Pose, PoseReport, Scanned, StateReport
 from stopgo.mission.run.run_log import Track
 from stopgo.recordings.drawing import entities
+from stopgo.recordings.rrd import compact as compacting
 from stopgo.recordings.rrd import segment_file
 from stopgo.recordings.rrd.compact import compact
 from stopgo.recordings.rrd.read import check
+from stopgo.recordings.rrd.segment_file import SegmentFile
+from stopgo.recordings.runs import field as field_module
 from stopgo.recordings.runs.field import FieldRecording
 from stopgo.recordings.runs.report import run_report
 from stopgo.recordings.runs.trail import Trail
@@ -392,6 +395,47 @@ def test_a_recording_that_was_cut_is_left_under_its_partial_name(tmp_path: Path,
         compact(partial, path)
     assert partial.exists()
     assert not path.exists()
+
+
+def test_two_recordings_of_one_run_at_once_both_end_with_its_file(
+    tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two sites of one folder took one partial file, and one temporary file; at the end there was none."""
+    path, merge = tmp_path / "field.rrd", compacting._merge
+    first, second = (SegmentFile(tmp_path / "field.partial", lambda line: None) for _ in range(2))
+    whole = write_field(tmp_path / "whole.rrd", mission).read_bytes()
+    for segments in (first, second):
+        segments.add(whole)
+    for segments in (first, second):
+        segments.close()
+    assert first.path != second.path
+
+    def merged_meanwhile(source: Path, merged: Path) -> bool:
+        made = merge(source, merged)
+        if source == first.path:
+            compact(second.path, path)
+        return made
+
+    monkeypatch.setattr(compacting, "_merge", merged_meanwhile)
+    compact(first.path, path)
+    assert check(path).rows == check(tmp_path / "whole.rrd").rows
+    assert sorted(os.listdir(tmp_path)) == ["field.rrd", "whole.rrd"]
+
+
+def test_a_run_that_another_recorder_has_saved_meanwhile_is_saved(
+    tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "field.rrd"
+
+    def saved_by_another(source: Path, target: Path) -> None:
+        source.rename(target)
+        compact(source, target)
+
+    monkeypatch.setattr(field_module, "compact", saved_by_another)
+    with FieldRecording(path, mission) as recording:
+        for report in run.reports(mission):
+            tell(recording, report)
+    assert check(path).rows[f"{RUN}/events"] == 8
 
 
 KILLED = """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -98,6 +99,23 @@ def test_local_metres_are_exact_and_degrees_a_step_off() -> None:
     telling.tell(dialect.MAVLink_local_position_ned_message(2, 4.0, 3.0, 0, 0, 0, 0))
     fix = telling.observer.poses.fix
     assert (fix.pose.x, fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.001)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(("north", "east_m_s"), [(math.nan, 0.0), (math.inf, 0.0), (1.0, math.nan)])
+def test_a_position_that_is_no_number_is_no_pose(north: float, east_m_s: float) -> None:
+    telling = Telling()
+    telling.origin()
+    telling.tell(dialect.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0))
+    telling.tell(dialect.MAVLink_local_position_ned_message(2, 0, 1.0, 0, 0, 0, 0))
+    before = telling.observer.poses.fix
+    telling.tell(dialect.MAVLink_local_position_ned_message(3, north, 1.0, 0, 0, east_m_s, 0))
+    telling.tell(dialect.MAVLink_attitude_message(3, 0, 0, math.nan, 0, 0, 0))
+    assert before is not None
+    assert telling.observer.poses.fix is before
+    telling.tell(dialect.MAVLink_local_position_ned_message(4, 0, 1.0, 0, 0, 0, 0))
+    after = telling.observer.poses.fix
+    assert after is not None
+    assert after.pose == before.pose, "the heading is the last one that was a number"
 
 
 def test_a_pose_is_of_the_item_only_if_it_was_reported_after_it() -> None:
