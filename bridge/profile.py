@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,16 +35,24 @@ Profile = Mapping[str, Preset]
 """Presets by name."""
 
 
-def read_profile(environment: Mapping[str, str] = os.environ, *, folder: Path | None = None) -> Profile:
+def read_profile(
+    environment: Mapping[str, str] = os.environ,
+    *,
+    folder: Path | None = None,
+    unread: Callable[[str], None] | None = None,
+) -> Profile:
     """Read the presets; of each name the value of the source that takes precedence.
+
+    With `unread` it receives the fault of each file that is not valid, and nothing of that file applies.
 
     Raises
     ------
     InputError
-        Names the file, and the unknown key or the wrong value.
+        Without `unread`: names the file, and the unknown key or the wrong value.
     """
     found: dict[str, Preset] = {}
-    sources = (_of_environment(environment), *map(_of_file, profile_files(environment, folder)))
+    files = (_valid_file(path, unread) for path in profile_files(environment, folder))
+    sources = (_of_environment(environment), *files)
     for rank, source in enumerate(sources):
         for name, value, where in source:
             found.setdefault(name, Preset(value, where, rank))
@@ -95,6 +103,17 @@ def _of_environment(environment: Mapping[str, str]) -> Iterator[tuple[str, str, 
         variable = f"STOPGO_{name.upper()}"
         if environment.get(variable):
             yield name, environment[variable], f"environment {variable}"
+
+
+def _valid_file(path: Path, unread: Callable[[str], None] | None) -> list[tuple[str, str, str]]:
+    """Return the presets of a file; none of a file whose fault `unread` has received."""
+    try:
+        return list(_of_file(path))
+    except InputError as error:
+        if unread is None:
+            raise
+        unread(str(error))
+        return []
 
 
 def _of_file(path: Path) -> Iterator[tuple[str, str, str]]:

@@ -151,13 +151,22 @@ def given_options(context: typer.Context) -> GivenOptions:
     )
 
 
-def with_presets(given: GivenOptions, values: dict[str, Any]) -> dict[str, Any]:
-    """Return the options' values; a preset replaces each that was not given."""
-    presets = effective(read_profile(), {option.removeprefix("--") for option in given})
+def with_presets(given: GivenOptions, values: dict[str, Any], *, stopping: bool = False) -> dict[str, Any]:
+    """Return the options' values; a preset replaces each that was not given.
+
+    A command that stops a robot which was given needs no valid stopgo.toml: what is wrong is printed.
+    """
+    is_named = not given.isdisjoint({"--robot", "--mavlink"})
+    profile = read_profile(unread=_say_unread if stopping and is_named else None)
+    presets = effective(profile, {option.removeprefix("--") for option in given})
     preset: dict[str, Any] = {PARAMETERS.get(name, name): one.value for name, one in presets.items()}
     if "keys" in preset:
         preset["keys"] = Path(preset["keys"])
     return {name: preset.get(name, value) for name, value in values.items()}
+
+
+def _say_unread(fault: str) -> None:
+    say(f"{fault}; its presets do not apply to this command")
 
 
 PARAMETERS = {"as": "who"}
@@ -174,12 +183,17 @@ def refuse_options(given: GivenOptions, what: str, *options: str) -> None:
 CommandBody = Callable[..., Any]
 
 
-def with_connection(*, without: tuple[str, ...] = ()) -> Callable[[CommandBody], CommandBody]:
-    """Decorate a command: the options of `connection_of`, except `without`, become its `connection`."""
-    return partial(_with_connection, without)
+def with_connection(
+    *, without: tuple[str, ...] = (), stopping: bool = False
+) -> Callable[[CommandBody], CommandBody]:
+    """Decorate a command: the options of `connection_of`, except `without`, become its `connection`.
+
+    `stopping` is True for a command that stops a robot.
+    """
+    return partial(_with_connection, without, stopping)
 
 
-def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandBody:
+def _with_connection(without: tuple[str, ...], stopping: bool, command: CommandBody) -> CommandBody:
     (_, *options), (_, *own) = (
         [
             one
@@ -191,7 +205,8 @@ def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandB
 
     def called(context: typer.Context, **values: Any) -> Any:
         given = given_options(context)
-        chosen = with_presets(given, {option.name: values.pop(option.name) for option in options})
+        named = {option.name: values.pop(option.name) for option in options}
+        chosen = with_presets(given, named, stopping=stopping)
         if "mavlink" in without and chosen["robot"] is None:
             raise InputError("no robot given; add --robot NAME (or preset it in stopgo.toml or STOPGO_ROBOT)")
         return command(connection_of(given, **chosen), **values)

@@ -150,7 +150,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
             report_answer(answer, station.keys.robot, json_, stop=station.meant_stop)
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
-    return with_connection(without=NO_EFFECT[verb])(command)
+    return with_connection(without=NO_EFFECT[verb], stopping=stops(verb))(command)
 
 
 def skip_stop(station: Station, shown: ShownStopFile, stop: str | None, *, take_over: bool) -> Answer:

@@ -92,6 +92,22 @@ def test_a_bad_file_is_reported_in_one_line(
     assert "WRONG  profile  stopgo.toml: " in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("verb", ["pause", "abort"])
+def test_a_bad_file_stops_no_order_to_stop_a_robot_that_is_given(
+    verb: str, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("stopgo.toml").write_text('colour = "red"')
+    (place / "user" / "stopgo" / "stopgo.toml").write_text('site = "yard"\n')
+    assert main([verb, "--robot", "r7", "--connect", "tcp/127.0.0.1:1", "--timeout", "0.1"]) == 2
+    told = capsys.readouterr().err
+    assert "stopgo.toml: unknown key colour" in told
+    assert "its presets do not apply to this command" in told
+    assert "robot r7 not found" in told
+    assert "key expression yard/" in told  # the file that is valid applies
+    assert main(["start", "--robot", "r7", "--connect", "tcp/127.0.0.1:1", "--timeout", "0.1"]) == 2
+    assert "not found" not in capsys.readouterr().err  # what starts a robot needs all presets
+
+
 def test_a_command_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
     Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
     assert main(["pause", "--timeout", "0.1"]) == 2
