@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import tracemalloc
+from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 import shapely
 
-from stopgo.planner.floors import rings
+from stopgo.mission.errors import InputError
+from stopgo.planner.floors import FloorOptions, dxf, read_floor, rings
 from stopgo.planner.floors.linework.wall_gaps import _facing
 
 
@@ -38,3 +41,14 @@ def test_ends_of_very_many_walls_are_paired_in_little_memory() -> None:
     tracemalloc.stop()
     assert pairs == [(k, k + count) for k in range(count)]
     assert peak < 50e6
+
+
+def test_walls_that_cross_as_a_pattern_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dxf, "MOST_CROSSING", 2000)
+    drawing = ezdxf.new("R2010", units=6)
+    for k in range(50):
+        drawing.modelspace().add_line((0, 0.1 + k), (50, 0.1 + k), dxfattribs={"layer": "A-WALL"})
+        drawing.modelspace().add_line((0.1 + k, 0), (0.1 + k, 50), dxfattribs={"layer": "A-WALL"})
+    drawing.saveas(tmp_path / "net.dxf")
+    with pytest.raises(InputError, match="cross more than 2000 times"):
+        read_floor(tmp_path / "net.dxf", FloorOptions(units="m"))
