@@ -216,6 +216,7 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
 
 def _check_meetings(sheet: DxfSheet, path: Path) -> None:
     """Refuse walls of which very many lines end at one place: to find rooms between them takes minutes."""
+    _check_crossings(sheet, path)
     lines = [stroke.points for stroke in sheet.strokes if stroke.role == "walls" and len(stroke.points)]
     if len(lines) <= MOST_MEETING:
         return
@@ -227,6 +228,25 @@ def _check_meetings(sheet: DxfSheet, path: Path) -> None:
             f"{path}: {many.max()} lines of walls end at ({x:.2f}, {y:.2f}), more than {MOST_MEETING}: that "
             "is a symbol, no walls; put the walls on a layer of their own"
         )
+
+
+def _check_crossings(sheet: DxfSheet, path: Path) -> None:
+    """Refuse walls that cross one another very often: to find the areas between them takes minutes."""
+    lines = [stroke.points for stroke in sheet.strokes if stroke.role == "walls" and len(stroke.points) > 1]
+    if sum(len(line) - 1 for line in lines) ** 2 < 2 * MOST_CROSSING:
+        return
+    pieces = shapely.linestrings(np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines]))
+    tree, met = shapely.STRtree(pieces), 0
+    some = pieces[:: max(1, len(pieces) // 200)]
+    if tree.query(some, predicate="crosses").shape[1] * (len(pieces) / len(some)) < MOST_CROSSING:
+        return
+    for begin in range(0, len(pieces), 100):
+        met += tree.query(pieces[begin : begin + 100], predicate="crosses").shape[1]
+        if met > 2 * MOST_CROSSING:
+            raise InputError(
+                f"{path}: lines of walls cross more than {MOST_CROSSING} times: that is a pattern, no walls; "
+                "put the walls on a layer of their own"
+            )
 
 
 def _encloses_nothing(made: Derived) -> bool:
@@ -249,6 +269,8 @@ def _enclose_nothing(sheet: DxfSheet) -> str:
 
 MOST_MEETING = 300
 """Lines of walls that may end within a millimetre of one another."""
+MOST_CROSSING = 300_000
+"""Crossings of lines of walls, each of two lines counted once."""
 _CORNER_M2 = 5.0
 """Least area in m² of a floor whose walls are open, or lie mostly elsewhere."""
 

@@ -98,6 +98,15 @@ def to_shapely(polygon: Polygon) -> shapely.Polygon:
 
 def distinct(polygons: Sequence[shapely.Polygon]) -> list[int]:
     """For each polygon the index of the first that draws the same within `SNAP`, or its own."""
+    drawn: dict[bytes, int] = {}
+    equal = [drawn.setdefault(shape.wkb, k) for k, shape in enumerate(polygons)]
+    kept = list(drawn.values())
+    first = {k: kept[other] for k, other in zip(kept, _first_alike([polygons[k] for k in kept]), strict=True)}
+    return [first[k] for k in equal]
+
+
+def _first_alike(polygons: Sequence[shapely.Polygon]) -> list[int]:
+    """Return `distinct` of polygons that all differ: of equal ones all pairs would be compared."""
     first = list(range(len(polygons)))
     shapes = np.array(polygons, dtype=object)
     boxes = shapely.bounds(shapes)

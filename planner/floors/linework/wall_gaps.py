@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.floors.linework.groups import groups_of
 from stopgo.planner.floors.linework.swings import Leaf, Swing, paired, swings_of, swings_with_lines
 from stopgo.planner.floors.linework.walls import SolidWalls, caps_of
@@ -16,6 +16,10 @@ from stopgo.planner.floors.rings import Region
 
 PASSAGE = (0.6, 1.6)
 """Ends of walls that face each other this far apart (m) leave a passage."""
+_ASIDE = 0.1
+"""Ends that face each other lie this little, in metres, beside each other's line …"""
+_FARTHEST = PASSAGE[1] + 2 * _ASIDE
+"""… and so no farther apart than this."""
 SYMBOL = (0.5, 6.0)
 """Length in metres of a door's symbol without a swing, such as a sliding door."""
 _BROAD = 0.4
@@ -305,16 +309,25 @@ def _facing(middles: FloatArray, directions: FloatArray) -> Iterator[tuple[int, 
     """Pairs of ends that look at each other across a passage, the nearest first, each end once."""
     if len(middles) < 2:
         return
-    across = middles[None, :, :] - middles[:, None, :]
-    ahead = np.einsum("ijk,ik->ij", across, directions)
-    aside = np.abs(across[..., 0] * directions[:, None, 1] - across[..., 1] * directions[:, None, 0])
-    facing = (
-        (directions @ directions.T < -0.95) & (ahead >= PASSAGE[0]) & (ahead <= PASSAGE[1]) & (aside <= 0.1)
-    )
-    one, other = np.nonzero(np.triu(facing | facing.T, 1) & facing & facing.T)
+    one, other = _near_pairs(middles)
+    across = middles[other] - middles[one]
+    ahead, back = (np.einsum("ij,ij->i", sign * across, directions[k]) for sign, k in ((1, one), (-1, other)))
+    turns = (across[:, 0] * directions[k, 1] - across[:, 1] * directions[k, 0] for k in (one, other))
+    aside = np.maximum(*map(np.abs, turns))
+    facing = (np.einsum("ij,ij->i", directions[one], directions[other]) < -0.95) & (aside <= _ASIDE)
+    for way in (ahead, back):
+        facing &= (way >= PASSAGE[0]) & (way <= PASSAGE[1])
+    one, other, ahead = one[facing], other[facing], ahead[facing]
     used: set[int] = set()
-    for k in np.lexsort((other, one, ahead[one, other])).tolist():
+    for k in np.lexsort((other, one, ahead)).tolist():
         pair = int(one[k]), int(other[k])
         if not used & set(pair):
             used |= set(pair)
             yield pair
+
+
+def _near_pairs(middles: FloatArray) -> tuple[IntArray, IntArray]:
+    """Pairs of ends no farther apart than a passage's, the lower index first: all pairs take memory."""
+    points = shapely.points(middles)
+    one, other = shapely.STRtree(points).query(points, predicate="dwithin", distance=_FARTHEST)
+    return one[one < other], other[one < other]
