@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -185,9 +186,16 @@ def _bulge(start: FloatArray, end: FloatArray, bulge: float, fineness: Fineness)
 def _spline(entity: Spline, fineness: Fineness) -> Iterator[Curve]:
     _check(entity.control_points)
     _check(entity.fit_points)
-    tool = entity.construction_tool()
-    points = _array(list(tool.flattening(fineness.sagitta, segments=8)))
+    points = _flat(entity.construction_tool().flattening(fineness.sagitta, segments=8))
     yield Curve(_short_chords(points, fineness.chord), closed=bool(entity.closed), curved=True)
+
+
+def _flat(points: Iterable[Vec3]) -> FloatArray:
+    """The points of a curve as they are computed, until there are more than any building's curve has."""
+    some = list(islice(points, _MOST_CHORDS + 1))
+    if len(some) > _MOST_CHORDS:
+        raise ValueError("the curve is longer than any building's")
+    return _array(some)
 
 
 def _short_chords(points: FloatArray, chord: float) -> FloatArray:
@@ -209,7 +217,7 @@ def _quadrilateral(entity: Solid, fineness: Fineness) -> Iterator[Curve]:
 def _hatch(entity: Hatch, fineness: Fineness) -> Iterator[Curve]:
     for boundary in path.from_hatch(entity):
         _check(boundary.control_vertices())
-        points = _array(list(boundary.flattening(fineness.sagitta, segments=8)))
+        points = _flat(boundary.flattening(fineness.sagitta, segments=8))
         yield Curve(points, closed=True)
 
 
@@ -217,7 +225,7 @@ def _by_path(entity: DXFEntity, fineness: Fineness) -> Iterator[Curve]:
     outline = path.make_path(entity)
     _check(outline.control_vertices())
     for part in outline.sub_paths():
-        points = _array(list(part.flattening(fineness.sagitta, segments=8)))
+        points = _flat(part.flattening(fineness.sagitta, segments=8))
         yield Curve(_short_chords(points, fineness.chord), closed=part.is_closed)
 
 

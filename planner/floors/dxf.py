@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import shapely
 from ezdxf.document import Drawing
 
@@ -26,6 +25,7 @@ from stopgo.planner.floors.drawn_shapes import ignored_in
 from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
 from stopgo.planner.floors.legible_text import legible
 from stopgo.planner.floors.linework import Derived, as_room_name, completed, derived
+from stopgo.planner.floors.linework.patterns import pattern_in
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.raised_floor import with_heights
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
@@ -147,6 +147,8 @@ def floor_in(drawing: Drawing, *, source: Path, digest: str, d_dis: float) -> Fl
 def _floor_of(sheet: DxfSheet, path: Path, source: FloorSource, tried: WallLayers | None = None) -> FloorPlan:
     if tried is not None and not tried.is_told:
         raise InputError(f"{path}: {_no_walls(sheet, tried)}")
+    if pattern := pattern_in(sheet.strokes):
+        raise InputError(f"{path}: {pattern}")
     made = _derived(sheet, path)
     parts = parts_of(
         made.strokes,
@@ -179,7 +181,6 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
     roles = {stroke.role for stroke in sheet.strokes}
     if not sheet.outlined and "walls" not in roles:
         raise InputError(f"{path}: {_no_walls(sheet)}")
-    _check_meetings(sheet, path)
     size = _size(sheet)
     if sheet.outlined:
         named = [as_room_name(word) for word in sheet.words]
@@ -214,41 +215,6 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
     return made
 
 
-def _check_meetings(sheet: DxfSheet, path: Path) -> None:
-    """Refuse walls of which very many lines end at one place: to find rooms between them takes minutes."""
-    _check_crossings(sheet, path)
-    lines = [stroke.points for stroke in sheet.strokes if stroke.role == "walls" and len(stroke.points)]
-    if len(lines) <= MOST_MEETING:
-        return
-    ends = np.round(np.concatenate([line[[0, -1]] for line in lines]), 3)
-    places, many = np.unique(ends, axis=0, return_counts=True)
-    if many.max() > MOST_MEETING:
-        x, y = places[np.argmax(many)].tolist()
-        raise InputError(
-            f"{path}: {many.max()} lines of walls end at ({x:.2f}, {y:.2f}), more than {MOST_MEETING}: that "
-            "is a symbol, no walls; put the walls on a layer of their own"
-        )
-
-
-def _check_crossings(sheet: DxfSheet, path: Path) -> None:
-    """Refuse walls that cross one another very often: to find the areas between them takes minutes."""
-    lines = [stroke.points for stroke in sheet.strokes if stroke.role == "walls" and len(stroke.points) > 1]
-    if sum(len(line) - 1 for line in lines) ** 2 < 2 * MOST_CROSSING:
-        return
-    pieces = shapely.linestrings(np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines]))
-    tree, met = shapely.STRtree(pieces), 0
-    some = pieces[:: max(1, len(pieces) // 200)]
-    if tree.query(some, predicate="crosses").shape[1] * (len(pieces) / len(some)) < MOST_CROSSING:
-        return
-    for begin in range(0, len(pieces), 100):
-        met += tree.query(pieces[begin : begin + 100], predicate="crosses").shape[1]
-        if met > 2 * MOST_CROSSING:
-            raise InputError(
-                f"{path}: lines of walls cross more than {MOST_CROSSING} times: that is a pattern, no walls; "
-                "put the walls on a layer of their own"
-            )
-
-
 def _encloses_nothing(made: Derived) -> bool:
     """True if walls enclose no floor, or only a corner between a few of them, or no room and no opening."""
     roles = {stroke.role for stroke in made.strokes}
@@ -267,10 +233,6 @@ def _enclose_nothing(sheet: DxfSheet) -> str:
     return f"the walls on {walls} enclose no floor"
 
 
-MOST_MEETING = 300
-"""Lines of walls that may end within a millimetre of one another."""
-MOST_CROSSING = 300_000
-"""Crossings of lines of walls, each of two lines counted once."""
 _CORNER_M2 = 5.0
 """Least area in m² of a floor whose walls are open, or lie mostly elsewhere."""
 

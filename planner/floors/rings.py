@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray, Polygon, frozen, ring_area
-from stopgo.planner.geometry.shapes import QUARTER, boundary_lines, widened
+from stopgo.planner.geometry.shapes import QUARTER, boundary_lines, noded_lines, widened
 
 SNAP = 1e-3
 """Ends closer than this, in metres, meet."""
@@ -199,7 +199,7 @@ def joined(lines: Sequence[FloatArray], *, merge: bool, gap: float = GAP) -> Joi
     bridges, gaps = _bridges(lines, gap=gap)
     drawn = [shapely.LineString(line) for line in (*lines, *bridges)]
     for group in _connected(drawn):
-        noded = shapely.union_all([drawn[index] for index in group], grid_size=_GRID)
+        noded = noded_lines([drawn[index] for index in group], grid_size=_GRID)
         enclosed = polygons_of(shapely.polygonize([noded]))
         whole = polygons_of(shapely.union_all(enclosed)) if merge else enclosed
         faces += [shapely.Polygon(face.exterior) for face in whole]

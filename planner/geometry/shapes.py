@@ -33,6 +33,8 @@ LARGEST = 5000.0
 """Greatest extent of a floor in metres; with the elements around it, it stays within FARTHEST_STEPS."""
 FEW = 5_000
 """Vertices up to which shapes are united all at once; more take half the time where they lie apart."""
+MANY_POINTS = 20_000
+"""Vertices of lines above which they are united in a mixed order."""
 APART = 4.0
 """Grid steps from which on two shapes do not change each other's rounding, with room to spare."""
 SAMPLE, CROWDED = 200, 30
@@ -167,6 +169,20 @@ def union_of_snapped(shapes: NDArray[np.object_]) -> BaseGeometry:
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
     whole = np.array([_united(ordered, within=APART, grid_size=1.0)], dtype=object)
     return shapely.normalize(_in_metres(_settled(whole))[0])
+
+
+def noded_lines(lines: Sequence[BaseGeometry] | NDArray[np.object_], *, grid_size: float) -> BaseGeometry:
+    """The union of lines on a grid: they meet at their ends only.
+
+    Very many segments are taken in a mixed order. GEOS keeps the grid's points in an unbalanced tree,
+    so points in a row, as of a comb, took time as the square of their number.
+    """
+    parts = shapely.get_parts(np.asarray(lines, dtype=object))
+    if shapely.get_num_coordinates(parts).sum() > MANY_POINTS:
+        xy, of = shapely.get_coordinates(parts, return_index=True)
+        pieces = np.stack([xy[:-1], xy[1:]], axis=1)[of[:-1] == of[1:]]
+        parts = shapely.linestrings(np.random.default_rng(0).permutation(pieces))
+    return shapely.union_all(parts, grid_size=grid_size)
 
 
 def _united(shapes: NDArray[np.object_], *, within: float, grid_size: float | None = None) -> BaseGeometry:

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.ifc.model import Surface
 from stopgo.planner.floors.rings import Region
+from stopgo.planner.geometry.shapes import noded_lines
 
 GRID = 1e-4
 """Sections are drawn on a grid of this many metres, so that faces which touch in the model touch."""
@@ -31,7 +32,7 @@ def cut(mesh: Surface, height: float) -> Region:
     segments = _segments(mesh.triangles, height)
     if len(segments) < 3:
         return NOTHING
-    lines = shapely.union_all(shapely.linestrings(segments), grid_size=GRID)
+    lines = noded_lines(shapely.linestrings(segments), grid_size=GRID)
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(lines).tolist()))
     solid = [face for face in faces if _inside(shapely.get_coordinates(face.point_on_surface())[0], segments)]
     return tidy(shapely.union_all(solid, grid_size=GRID)) if solid else NOTHING

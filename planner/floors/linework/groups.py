@@ -9,6 +9,7 @@ import shapely
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.rings import polygons_of
 from stopgo.planner.geometry.near_shapes import labels_of
+from stopgo.planner.geometry.shapes import noded_lines
 
 _FILLED = 0.5
 """If lines enclose less than this fraction of their hull, each line is a separate object."""
@@ -34,7 +35,7 @@ def outlines_of(lines: Sequence[FloatArray], *, within: float) -> list[shapely.P
 
 
 def _outline(group: Sequence[FloatArray]) -> list[shapely.Polygon]:
-    drawn = shapely.union_all([shapely.LineString(line) for line in group if len(line) > 1], grid_size=1e-4)
+    drawn = noded_lines([shapely.LineString(line) for line in group if len(line) > 1], grid_size=1e-4)
     hull = drawn.convex_hull
     faces = shapely.union_all(polygons_of(shapely.polygonize([drawn])))
     enclosed = shapely.union_all([shapely.Polygon(face.exterior) for face in polygons_of(faces)])

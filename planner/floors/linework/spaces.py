@@ -11,6 +11,7 @@ import shapely
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.linework.wall_gaps import WallGap
 from stopgo.planner.floors.rings import Region, polygons_of
+from stopgo.planner.geometry.shapes import noded_lines
 
 _CLOSED_OVER = (0.1, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0)
 """Widths in metres of gaps in the outer walls that are closed, tried in this order."""
@@ -65,12 +66,12 @@ def tiled_floor(lines: Sequence[FloatArray], barriers: Region) -> Region:
 
     `lines` are the polylines (n, 2) of the pattern, without those of walls.
     """
-    own = shapely.union_all([shapely.LineString(line) for line in lines], grid_size=1e-4)
+    own = noded_lines([shapely.LineString(line) for line in lines], grid_size=1e-4)
     tiles = polygons_of(shapely.polygonize([own]))
     if len(tiles) < _PATTERN:
         return shapely.Polygon()
     largest = _CUT_TILE * float(np.median(shapely.area(tiles)))
-    every = polygons_of(shapely.polygonize([shapely.union_all([own, barriers.boundary], grid_size=1e-4)]))
+    every = polygons_of(shapely.polygonize([noded_lines([own, barriers.boundary], grid_size=1e-4)]))
     free = [
         face for face in every if face.area <= largest and not barriers.contains(face.representative_point())
     ]

@@ -10,9 +10,11 @@ import shapely
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.floors.linework.groups import groups_of
+from stopgo.planner.floors.linework.patterns import cross_often
 from stopgo.planner.floors.linework.swings import Leaf, Swing, paired, swings_of, swings_with_lines
 from stopgo.planner.floors.linework.walls import SolidWalls, caps_of
 from stopgo.planner.floors.rings import Region
+from stopgo.planner.geometry.shapes import noded_lines
 
 PASSAGE = (0.6, 1.6)
 """Ends of walls that face each other this far apart (m) leave a passage."""
@@ -131,11 +133,11 @@ def swing_area(swing: Swing) -> Region:
 
 
 def _merged(lines: Iterable[FloatArray]) -> list[FloatArray]:
-    """Chains of single segments as one polyline each: swings that somebody exploded."""
-    short = [shapely.LineString(line) for line in lines if len(line) == 2 and not (line[0] == line[1]).all()]
-    if len(short) < 3:
+    """Chains of single segments as one polyline each: swings that somebody exploded; none in a pattern."""
+    short = [line for line in lines if len(line) == 2 and not (line[0] == line[1]).all()]
+    if len(short) < 3 or cross_often(np.array(short)):
         return []
-    chains = shapely.get_parts(shapely.line_merge(shapely.union_all(short, grid_size=1e-4)))
+    chains = shapely.get_parts(shapely.line_merge(noded_lines(shapely.linestrings(short), grid_size=1e-4)))
     return [xy for xy in map(shapely.get_coordinates, chains) if len(xy) > 3]
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stopgo.mission.geometry import BoolArray, FloatArray
 from stopgo.planner.floors.rings import Region, polygons_of
+from stopgo.planner.geometry.shapes import noded_lines
 
 THICK = 0.6
 """A strip between wall lines that is nowhere wider than this, in metres, is a wall's inside."""
@@ -81,10 +82,10 @@ def walls_of(
     if not len(drawn):
         return SolidWalls(tuple(sound), too_thick=_others(fills, sound))
     bridges = _bridges(drawn)
-    own = shapely.union_all(shapely.linestrings(np.concatenate([drawn, bridges])), grid_size=_GRID)
+    own = noded_lines(shapely.linestrings(np.concatenate([drawn, bridges])), grid_size=_GRID)
     other = _segments([line for line in beside if len(line)])
     other = other[np.hypot(*(other[:, 1] - other[:, 0]).T) <= THICKEST]
-    noded = shapely.union_all([own, *shapely.linestrings(other)], grid_size=_GRID)
+    noded = noded_lines([own, *shapely.linestrings(other)], grid_size=_GRID)
     faces = np.array(shapely.get_parts(shapely.polygonize([noded])), dtype=object)
     inside = _is_inside(faces, own)
     solids = faces[inside].tolist()
