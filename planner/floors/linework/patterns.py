@@ -33,7 +33,7 @@ SOME = 100
 
 
 def pattern_in(strokes: Sequence[Stroke]) -> str:
-    """Return the fault of lines that are a pattern, and the way out; empty if they may be a building's."""
+    """Return the fault of lines that are a pattern, and the remedy; empty if they may be a building's."""
     return next(_faults(strokes), "")
 
 
