@@ -118,6 +118,8 @@ def _why_unread(model: ifcopenshell.file, error: Exception) -> str:
         return "takes more memory than there is; export one building or storey"
     if isinstance(error, OSError):
         return f"cannot be read ({error.strerror or error}); free space for temporary files"
+    if isinstance(error, RecursionError):
+        return "is damaged (what it has refers to itself, as a placement relative to itself); export it again"
     lacking = _lacking(model)
     if lacking:
         return f"is damaged ({'; '.join(lacking[:MOST_COMPLAINTS])}); export it again"

@@ -14,7 +14,7 @@ import pytest
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.planner.floors import FloorOptions, read_floor
-from stopgo.planner.floors.ifc import loading
+from stopgo.planner.floors.ifc import extract, loading
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 
@@ -155,6 +155,15 @@ def test_a_product_that_crashes_the_kernel_is_left_out_and_named(
         f"IfcColumn {guid} 'column' crashed the geometry kernel"
     ]
     assert not [item for item in floor.findings if item.code == "no_geometry"]
+
+
+def test_a_model_that_refers_to_itself_is_damaged(read: Read, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extract, "_shaped_entities", lambda model: [])  # the kernel would crash
+    house = two_rooms()
+    placement = house.model.by_type("IfcBuildingStorey")[0].ObjectPlacement
+    placement.PlacementRelTo = placement
+    with pytest.raises(InputError, match=r"is damaged \(what it has refers to itself"):
+        read(house)
 
 
 def test_a_model_that_needs_too_much_memory_is_refused(read: Read, monkeypatch: pytest.MonkeyPatch) -> None:
