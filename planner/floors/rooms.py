@@ -5,15 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from stopgo.mission.floor import Finding, Room
+from stopgo.mission.geometry import IntArray
 from stopgo.planner.floors.drawn import Anomaly, Closed, Drawn, hole_indices, outline_faces, place, region_key
 from stopgo.planner.floors.lines_and_texts import Word
 from stopgo.planner.floors.rings import Region, canonical_region, parents, polygons_of
 
 _NOISE = 1e-4
 """Area in m² below which an overlap of two rooms is numerical noise."""
+MANY = 50
+"""Rooms that touch another, above which those with an overlap are found first."""
+THIN_M = 1e-8
+"""An overlap less wide than this is noise, along whatever boundary."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +134,8 @@ def _apart(rooms: Sequence[_Room]) -> list[_Room]:
 
 def _without_smaller(index: int, ordered: Sequence[_Room], tree: shapely.STRtree) -> _Room:
     room = ordered[index]
-    touching = [int(item) for item in tree.query(room.region, predicate="intersects") if item < index]
-    for item in sorted(touching):
+    met = np.sort(tree.query(room.region, predicate="intersects"))
+    for item in _overlapping(room.region, met[met < index], tree.geometries).tolist():
         shared = room.region.intersection(ordered[item].region)
         if shared.area > _NOISE:
             text = f"overlaps room '{ordered[item].name}' by {shared.area:.3g} m², which is left to that one"
@@ -136,6 +143,18 @@ def _without_smaller(index: int, ordered: Sequence[_Room], tree: shapely.STRtree
             region = room.region.difference(ordered[item].region)
             room = replace(room, region=region, anomalies=(*room.anomalies, anomaly))
     return room
+
+
+def _overlapping(region: Region, touching: IntArray, regions: NDArray[np.object_]) -> IntArray:
+    """Those of the touching regions that may overlap this one by an area; of few, all.
+
+    A room around very many touches each of them, and an intersection takes time as its number of vertices.
+    """
+    if len(touching) <= MANY:
+        return touching
+    shapely.prepare(region)
+    inner = shapely.buffer(regions[touching], -THIN_M)
+    return touching[shapely.intersects(region, inner)]
 
 
 def _corner(region: Region) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import pytest
 import shapely
 
 from stopgo.mission.errors import InputError
-from stopgo.planner.floors import FloorOptions, read_floor, rings
+from stopgo.planner.floors import FloorOptions, read_floor, rings, rooms
 from stopgo.planner.floors.linework import patterns
 from stopgo.planner.floors.linework.wall_gaps import _facing
 from stopgo.planner.geometry import shapes
@@ -104,6 +104,25 @@ def test_a_curve_without_end_is_left_out_when_it_is_longer_than_any(tmp_path: Pa
     drawing.saveas(tmp_path / "spline.dxf")
     floor = read_floor(tmp_path / "spline.dxf", FloorOptions(units="m"))
     assert any("longer than any building's" in finding.message for finding in floor.findings)
+
+
+def test_a_room_around_very_many_is_compared_with_those_that_overlap_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of 100 rooms in a room, cut out of it, one reaches 10 cm into it."""
+    small = [shapely.box(3 * k, 0, 3 * k + 2, 2) for k in range(100)]
+    around = shapely.box(-1, -1, 301, 3).difference(shapely.union_all(small))
+    small[40] = shapely.box(120, 0, 122, 2.1)
+    regions = [*small, around]
+    found = []
+    for most in (10**9, rooms.MANY):
+        monkeypatch.setattr(rooms, "MANY", most)
+        apart = rooms._apart([rooms._Room(region, "", None, ()) for region in regions])
+        found.append([(shapely.to_wkb(room.region), len(room.anomalies)) for room in apart])
+    assert found[0] == found[1]
+    assert sum(overlaps for _, overlaps in found[1]) == 1
+    touching = np.arange(100)
+    assert rooms._overlapping(around, touching, np.array(regions)).tolist() == [40]
 
 
 def test_walls_that_cross_as_a_pattern_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
