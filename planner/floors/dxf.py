@@ -147,8 +147,6 @@ def floor_in(drawing: Drawing, *, source: Path, digest: str, d_dis: float) -> Fl
 def _floor_of(sheet: DxfSheet, path: Path, source: FloorSource, tried: WallLayers | None = None) -> FloorPlan:
     if tried is not None and not tried.is_told:
         raise InputError(f"{path}: {_no_walls(sheet, tried)}")
-    if pattern := pattern_in(sheet.strokes):
-        raise InputError(f"{path}: {pattern}")
     made = _derived(sheet, path)
     parts = parts_of(
         made.strokes,
@@ -176,8 +174,13 @@ def _tried_findings(tried: WallLayers | None) -> list[Finding]:
 
 def _derived(sheet: DxfSheet, path: Path) -> Derived:
     """Return the strokes and words of a layered drawing; for other drawings they are derived."""
-    if sheet.layered:
-        return Derived(sheet.strokes, sheet.words, [])
+    if pattern := pattern_in(sheet.strokes):
+        raise InputError(f"{path}: {pattern}")
+    return Derived(sheet.strokes, sheet.words, []) if sheet.layered else _from_lines(sheet, path)
+
+
+def _from_lines(sheet: DxfSheet, path: Path) -> Derived:
+    """Return what is derived from the lines of a drawing without layers of its own for all kinds."""
     roles = {stroke.role for stroke in sheet.strokes}
     if not sheet.outlined and "walls" not in roles:
         raise InputError(f"{path}: {_no_walls(sheet)}")

@@ -1,7 +1,7 @@
 """Lines of a drawing -> refusal of those that are a pattern, by counts: to find areas in them takes minutes.
 
 Patterns are hatches of single lines, symbols, meshes and contours on a layer of walls or of areas. All
-limits are far above those of buildings: architects' drawings have at most 3 m of wall lines on a m².
+limits are far above those of buildings: architects' drawings have up to 4 m of wall lines on a m².
 """
 
 from __future__ import annotations

@@ -125,12 +125,16 @@ def test_a_room_around_very_many_is_compared_with_those_that_overlap_it(
     assert rooms._overlapping(around, touching, np.array(regions)).tolist() == [40]
 
 
-def test_walls_that_cross_as_a_pattern_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("layer", ["A-WALL", "0"])
+def test_walls_that_cross_as_a_pattern_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, layer: str
+) -> None:
+    """Also where no layer shows walls, and the lines are only tried as walls."""
     monkeypatch.setattr(patterns, "MOST_CROSSING", 2000)
     drawing = ezdxf.new("R2010", units=6)
     for k in range(50):
-        drawing.modelspace().add_line((0, 0.1 + k), (50, 0.1 + k), dxfattribs={"layer": "A-WALL"})
-        drawing.modelspace().add_line((0.1 + k, 0), (0.1 + k, 50), dxfattribs={"layer": "A-WALL"})
+        drawing.modelspace().add_line((0, 0.1 + k), (50, 0.1 + k), dxfattribs={"layer": layer})
+        drawing.modelspace().add_line((0.1 + k, 0), (0.1 + k, 50), dxfattribs={"layer": layer})
     drawing.saveas(tmp_path / "net.dxf")
     with pytest.raises(InputError, match="cross more than 2000 times"):
         read_floor(tmp_path / "net.dxf", FloorOptions(units="m"))
