@@ -176,13 +176,13 @@ def test_transforms_that_are_no_numbers_count_as_missing() -> None:
     assert scanned(field) == ["s1", "s2", "s3"]
 
 
-def test_a_scan_with_an_odometry_without_numbers_does_not_count() -> None:
+def test_a_scan_with_an_odometry_without_numbers_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     field = started(RosField(world=World(scan_s=10.0)))
     field.work_until(lambda run: run.stop_state == "SCANNING")
     telemetry = field.world.telemetry
     assert telemetry is not None
     told = telemetry.take_odometry
-    telemetry.take_odometry = lambda *_, **more: told(math.nan, math.nan, **more)  # type: ignore[method-assign]
+    monkeypatch.setattr(telemetry, "take_odometry", lambda *_, **more: told(math.nan, math.nan, **more))
     field.work()
     assert scanned(field) == []
     assert "no odometry for" in field.controller.run.reason

@@ -9,6 +9,7 @@ import pytest
 from stopgo.bridge.mavlink.driving.autopilot_telemetry import NewestMessages
 from stopgo.bridge.mavlink.vehicle_link.frames import dialect
 from stopgo.bridge.mavlink.vehicle_link.wire import Who
+from stopgo.mission.mavlink.telemetry import Message
 
 NO_NUMBER = (
     dialect.MAVLink_local_position_ned_message(1, math.nan, 0, 0, 0, 0, 0),
@@ -18,10 +19,10 @@ NO_NUMBER = (
 
 
 @pytest.mark.parametrize("message", NO_NUMBER)
-def test_a_position_or_heading_that_is_no_number_is_late(message: object) -> None:
+def test_a_position_or_heading_that_is_no_number_is_late(message: Message) -> None:
     """The vehicle was driven on without a position, until it had made no progress for long enough."""
     newest = NewestMessages(Who(1, 1))
     newest.put(message)
-    name = message.get_type()  # type: ignore[attr-defined]
+    name = message.get_type()
     assert newest.newest(name) is None
     assert math.isinf(newest.age_s(name))
