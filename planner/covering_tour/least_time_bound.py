@@ -20,7 +20,7 @@ import numpy as np
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.covering_tour.time_graph import BLOCK, FARTHEST_S, TimeGraph
 from stopgo.planner.covering_tour.zones import Zones
-from stopgo.planner.routing.path_trees import path_trees
+from stopgo.planner.routing.path_trees import NONE, trees_to_groups
 from stopgo.planner.routing.tour import NANOMETRES, best_of_all, length_of, nanometres
 from stopgo.planner.routing.tour_bound import growing, highest, one_tree
 from stopgo.planner.selection.cover import Cover
@@ -30,11 +30,13 @@ DETOUR_S = 3.0
 """Cost of each stop at first, when only their number has a price."""
 EARNED = (0.0, 0.3)
 """Fractions of a stop's cost that targets and demands may pay at first; the rest is the number's price."""
-WORK = 270_000_000
+WORK = 180_000_000
 """Pieces of paths evaluated in all steps together."""
 FEWEST_STEPS, MOST_STEPS = 15, 240
 FIRST_STEP, AIM, SMOOTHING, PATIENCE = 1.5, 1.2, 0.2, 8
 """The first step as a multiple of Polyak's for AIM times the best bound; as in the multiplier bound."""
+NEAREST = 24
+"""Zones next to each that paths are found to."""
 FEW_NODES = 2_000_000
 """Nodes times zones up to which all paths are found."""
 FIRST_TREES, FIRST_STEP_OF_WEIGHTS = 1500, 2.0
@@ -143,6 +145,10 @@ class _Relaxation:
         self.zones = zones
         self._outer = [np.array([end]) for end in route.outer]
         self._zones = [*self._outer, *zones]
+        self._group = np.full(graph.nodes + len(self._zones), NONE, dtype=np.int64)
+        """Number of the zone of each node."""
+        for number, zone in enumerate(self._zones):
+            self._group[zone] = number
         self.known_s, self._rows = route.known_s, route.cover.rows
         self._weight: IntArray | None = None
         """Weights of the zones at the former prices."""
@@ -188,7 +194,8 @@ class _Relaxation:
         inside = pairs[(pairs < count).all(axis=1)]
         ends = pairs[(pairs >= count).any(axis=1)].min(axis=1)
         visits = np.bincount(begin[ends], minlength=self._graph.nodes) / 2
-        for first, last in inside.tolist():
+        is_found = nearest[tuple(inside.T)] >= 0
+        for first, last in np.where(is_found[:, None], inside, inside[:, ::-1]).tolist():
             node = int(nearest[first, last])
             while 0 <= node < self._graph.nodes:
                 begins = _before(ways[first], node)
@@ -197,17 +204,20 @@ class _Relaxation:
         return _Bound(max(0.0, value / NANOMETRES - beyond), visits[: self._rows], work)
 
     def _between(self, more: FloatArray) -> tuple[FloatArray, IntArray, list[tuple[IntArray, IntArray]], int]:
-        """Least seconds between zones, the row where each is reached from each, and the pieces evaluated."""
+        """Least seconds between zones, the row where each is reached from each, and the pieces evaluated.
+
+        A zone that is not among the nearest of another is at least as far from it as the last of these.
+        """
         zones, nodes = self._zones, self._graph.nodes
         limit = np.inf if nodes * len(zones) <= FEW_NODES else FARTHEST_S
         times = self._graph.times(more, zones)
-        seconds = np.full((len(zones), len(zones)), limit)
+        seconds = np.empty((len(zones), len(zones)))
         nearest = np.full(seconds.shape, -1, dtype=np.int64)
         ways: list[tuple[IntArray, IntArray]] = []
         for k in range(0, len(zones), BLOCK):
             some = slice(k, min(k + BLOCK, len(zones)))
             sources = np.arange(nodes + some.start, nodes + some.stop)
-            away, before = path_trees(times, sources, limit=limit)
+            away, before, ends = trees_to_groups(times, sources, self._group, NEAREST + 1, limit=limit)
             for row in before:
                 reached = np.flatnonzero(row >= 0)
                 ways.append((reached, row[reached]))
@@ -216,8 +226,8 @@ class _Relaxation:
                 at = np.argmin(near, axis=1)
                 least = near[np.arange(len(near)), at]
                 nearest[some, j] = np.where(np.isfinite(least), zone[at], -1)
-                seconds[some, j] = np.minimum(least, limit)
-        seconds = np.clip(np.minimum(seconds, seconds.T) - NO_TIME, 0.0, LONGEST_S)
+                seconds[some, j] = np.minimum(least, ends)
+        seconds = np.clip(np.maximum(seconds, seconds.T) - NO_TIME, 0.0, LONGEST_S)
         np.fill_diagonal(seconds, 0.0)
         pieces = sum(len(reached) for reached, _ in ways) * times.nnz // max(1, nodes)
         return seconds, nearest, ways, pieces

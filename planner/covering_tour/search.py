@@ -81,6 +81,8 @@ class _TourSearch:
         self._dearest, self._cheapest = min(start * RANGE, most), max(1, min(start // RANGE, most))
         self._board.weight = np.full(len(task.cover.needed), start, dtype=np.int64)
         self._left: list[int] = []
+        self._ranked: tuple[PointLine, list[tuple[int, int]]] = ([], [])
+        """A line, and the two lowest ranks on it with their indices."""
         self._made = 0
 
     def _first_free(self, line: PointLine) -> int:
@@ -258,16 +260,22 @@ class _TourSearch:
         return barred
 
     def _allowed(self, value: IntArray, barred: BoolArray, at: int | None) -> IntArray:
-        value = np.where(barred, NEVER, value)
-        rank = self._task.rank
-        if rank is None:
-            return value
-        stops = [rank[p] for k, p in enumerate(self._line) if p < self._times.positions and k != at]
-        lowest = min(stops, default=None)
-        if lowest is None:
-            return value
+        """The costs, NEVER for barred positions and those whose rank forbids or asks for the first place."""
+        rank, lowest = self._task.rank, self._lowest_rank(at)
+        if rank is None or lowest is None:
+            return np.where(barred, NEVER, value)
         wrong = rank > lowest if at == 1 else rank < lowest
-        return np.where(wrong, NEVER, value)
+        return np.where(barred | wrong, NEVER, value)
+
+    def _lowest_rank(self, at: int | None) -> int | None:
+        """The lowest rank of the line's stops but the one at an index; None without others, or any rank."""
+        rank, line = self._task.rank, self._line
+        if rank is None:
+            return None
+        if self._ranked[0] is not line:
+            stops = [(int(rank[p]), k) for k, p in enumerate(line) if p < self._times.positions]
+            self._ranked = line, sorted(stops)[:2]
+        return next((lowest for lowest, k in self._ranked[1] if k != at), None)
 
     def _missing_now(self) -> int:
         return int(self._board.weight @ self._board.missing) // SCALE

@@ -122,17 +122,24 @@ def find_lengths(
 
 
 def grow(
-    source: int, limit: float, first: Any, to: Any, length: Any, away: Any, before: Any, queue: Any,
-    place: Any,
-) -> None:  # fmt: skip
-    """Find the shortest paths from one node to all nodes, none longer than the limit.
+    source: int, limit: float, wanted: int, group: Any, first: Any, to: Any, length: Any, away: Any,
+    before: Any, queue: Any, place: Any, met: Any,
+) -> float:  # fmt: skip
+    """Find the shortest paths from one node to all nodes, until `wanted` groups are reached.
 
-    `away`, infinite before, receives their lengths, and `before`, -1 before, the node before each: of
-    equally short paths the lowest. `queue` and `place` are as in `find_lengths`.
+    None is longer than the limit. `group` has the group of each node, or -1; `met` has the last source that
+    reached each group. `away`, infinite before, receives the lengths, and `before`, -1 before, the node
+    before each: of equally short paths the lowest. `queue` and `place` are as in `find_lengths`. Return the
+    length up to which all paths are found.
     """
     away[source], queue[0], size = 0.0, source, 1
     while size > 0:
         here = queue[0]
+        if group[here] >= 0 and met[group[here]] != source:
+            met[group[here]] = source
+            wanted -= 1
+            if wanted == 0:
+                return away[here]
         size -= 1
         sink(queue[size], size, away, queue, place)
         for edge in range(first[here], first[here + 1]):
@@ -144,8 +151,9 @@ def grow(
                     size += 1
                 away[there], before[there] = total, here
                 rise(there, away, queue, place)
-            elif total == away[there] and here < before[there]:
+            elif total == away[there] and away[here] < total and here < before[there]:
                 before[there] = here
+    return limit
 
 
 def rise(node: int, away: Any, queue: Any, place: Any) -> None:

@@ -33,9 +33,10 @@ cpdef void find_lengths(
 ) noexcept nogil
 
 @cython.locals(edge=whole, here=whole, size=whole, there=whole, total=double)
-cpdef void grow(
-    whole source, double limit, const whole[::1] first, const whole[::1] to, const double[::1] length,
-    double[::1] away, whole[::1] before, whole[::1] queue, whole[::1] place
+cpdef double grow(
+    whole source, double limit, whole wanted, const whole[::1] group, const whole[::1] first,
+    const whole[::1] to, const double[::1] length, double[::1] away, whole[::1] before, whole[::1] queue,
+    whole[::1] place, whole[::1] met
 ) noexcept nogil
 
 @cython.locals(at=whole)

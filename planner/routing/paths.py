@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ from stopgo.planner.geometry.index_ranges import ranges
 from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.routing.dijkstra_kernel import find_lengths
+from stopgo.planner.routing.path_trees import path_trees
 
 CHUNK = 256
 """Points whose distances to all nodes are in memory at a time."""
@@ -61,8 +62,7 @@ class Paths:
         if kept is None:
             self._asked[start] = self._asked.get(start, 0) + 1
             if self._asked[start] > FEW and len(self.xy) * (len(self._trees) + 1) <= MOST_KEPT:
-                kept = dijkstra(self._both_ways, True, start, return_predecessors=True)[1]
-                self._trees[start] = kept
+                kept = self._trees[start] = self._found_before(np.array([start]))[0]
         return kept
 
     def _nodes_between(self, start: int, end: int) -> IntArray:
@@ -78,8 +78,8 @@ class Paths:
             own = self._both_ways[nodes][:, nodes]
             first, last = np.searchsorted(nodes, (start, end)).tolist()
             limit = length * (1 + ROUNDING) + ROUNDING
-            found = dijkstra(own, True, first, return_predecessors=True, limit=limit)[1]
-            if len(path := _followed(found, first, last)):
+            before = path_trees(own, np.array([first]), limit=limit)[1]
+            if len(path := _followed(before[0], first, last)):
                 break
         return nodes[path]
 
@@ -98,12 +98,10 @@ class Paths:
     def before(self, points: IntArray) -> IntArray:
         """The node before each node on its shortest path from each of these points (n, nodes)."""
         kept = [self._trees.get(point) for point in points.tolist()]
-        if any(tree is None for tree in kept):
-            found: IntArray = dijkstra(
-                self._both_ways, True, points, return_predecessors=True, limit=self.limit
-            )[1]
-            return found
-        return np.array(kept)
+        return self._found_before(points) if any(tree is None for tree in kept) else np.array(kept)
+
+    def _found_before(self, points: IntArray) -> IntArray:
+        return path_trees(self._both_ways, points, limit=self.limit)[1].astype(np.int32)
 
     way = path  # its name in 0.1; ends with 0.3
 
@@ -135,15 +133,16 @@ def shortest_paths(
     With `trees` what leads to each node is kept, if there is room for it. Paths longer than the limit, in
     metres, are not found.
     """
-    graph, kept = edge_lengths(xy, edges), {}
+    graph = edge_lengths(xy, edges)
+    found = Paths(frozen(xy), np.empty((0, 0)), graph, limit=limit)
     if not trees or points * len(xy) > MOST_KEPT:
-        return Paths(frozen(xy), frozen(_lengths(graph, points, limit)), graph, limit=limit)
+        return replace(found, lengths=frozen(_lengths(graph, points, limit)))
     lengths = np.empty((points, points))
     for chunk in np.split(np.arange(points), range(CHUNK, points, CHUNK)):
-        away, before = dijkstra(graph, False, chunk, return_predecessors=True, limit=limit)
-        kept.update(zip(chunk.tolist(), before, strict=True))
+        away, before = path_trees(found._both_ways, chunk, limit=limit)
+        found._trees.update(zip(chunk.tolist(), before.astype(np.int32), strict=True))
         lengths[chunk] = away[:, :points]
-    return Paths(frozen(xy), frozen(lengths), graph, limit=limit, _trees=kept)
+    return replace(found, lengths=frozen(lengths))
 
 
 def _lengths(graph: csr_array, points: int, limit: float) -> FloatArray:

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.routing.dijkstra_kernel import grow
-from stopgo.planner.routing.path_trees import NONE, path_trees
+from stopgo.planner.routing.path_trees import NONE, path_trees, trees_to_groups
 from stopgo.planner.routing.paths import edge_lengths
 from tests.planner.kernels import interpret
 from tests.planner.routing.test_nearby_paths import network
@@ -32,22 +32,47 @@ def both_ways(xy: FloatArray, edges: IntArray) -> csr_array:
     return csr_array(graph + graph.T)
 
 
+@pytest.mark.parametrize("wanted", [0, 1, 4, 30, 99])
 @pytest.mark.parametrize("limit", [np.inf, 11.0])
 @pytest.mark.parametrize("drawn", [lattice(), network(3)], ids=["lattice", "network"])
 def test_trees_are_the_same_by_kernel_and_scipy(
-    drawn: tuple[FloatArray, IntArray], limit: float, monkeypatch: pytest.MonkeyPatch
+    drawn: tuple[FloatArray, IntArray], limit: float, wanted: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = both_ways(*drawn)
-    away, before = path_trees(graph, SOURCES, limit=limit)
-    assert away.tolist() == dijkstra(graph, indices=SOURCES, limit=limit).tolist()
+    group = np.where(np.arange(graph.shape[0]) % 3, NONE, np.arange(graph.shape[0]) % 30)
+    away, before, ends = trees_to_groups(graph, SOURCES, group, wanted, limit=limit)
     pieces = (graph.indptr.tolist(), graph.indices.tolist(), graph.data.tolist())
     for source in SOURCES.tolist():
         lengths, nodes = [np.inf] * graph.shape[0], [NONE] * graph.shape[0]
-        grow(source, limit, *pieces, lengths, nodes, [0] * len(nodes), [0] * len(nodes))
-        assert (lengths, nodes) == (away[source].tolist(), before[source].tolist())
+        rest = ([0] * len(nodes), [0] * len(nodes), [NONE] * 30)
+        end = grow(source, limit, wanted, group.tolist(), *pieces, lengths, nodes, *rest)
+        assert end == ends[source]
+        found = [length <= end for length in lengths]
+        assert found == np.isfinite(away[source]).tolist()
+        assert [node for node, is_found in zip(nodes, found, strict=True) if is_found] == (
+            before[source][found].tolist()
+        )
     interpret(monkeypatch)
-    lengths, nodes = path_trees(graph, SOURCES, limit=limit)
-    assert np.array_equal(lengths, away) and np.array_equal(nodes, before)
+    for one, other in zip(
+        trees_to_groups(graph, SOURCES, group, wanted, limit=limit), (away, before, ends), strict=True
+    ):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("limit", [np.inf, 11.0])
+@pytest.mark.parametrize("drawn", [lattice(), network(3)], ids=["lattice", "network"])
+def test_all_paths_up_to_the_last_wanted_group_are_found(
+    drawn: tuple[FloatArray, IntArray], limit: float
+) -> None:
+    graph, wanted = both_ways(*drawn), 4
+    whole, _ = path_trees(graph, SOURCES, limit=limit)
+    assert whole.tolist() == dijkstra(graph, indices=SOURCES, limit=limit).tolist()
+    group = np.where(np.arange(graph.shape[0]) % 3, NONE, np.arange(graph.shape[0]) % 30)
+    away, _, ends = trees_to_groups(graph, SOURCES, group, wanted, limit=limit)
+    for lengths, found, end in zip(whole, away, ends, strict=True):
+        assert np.array_equal(found, np.where(lengths <= end, lengths, np.inf))
+        nearest = sorted(lengths[group == one].min() for one in np.unique(group[group >= 0]))
+        assert end == min(limit, nearest[wanted - 1])
 
 
 def test_of_equally_short_paths_the_last_node_but_one_is_the_lowest() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -36,16 +37,18 @@ def test_all_lengths_are_those_of_scipy(seed: int, monkeypatch: pytest.MonkeyPat
     assert shortest_paths(xy, edges, POINTS).lengths.tolist() == asked.tolist()
 
 
-def test_paths_are_those_of_a_search_of_pieces_without_direction() -> None:
+def test_a_path_is_the_same_alone_and_of_a_tree() -> None:
     """On a lattice, where many paths are of one length."""
     place = np.random.default_rng(1).permutation(400)
     cells = place.reshape(20, 20)
     xy = np.empty((400, 2))
     xy[place] = np.stack(np.divmod(np.arange(400), 20), axis=1)
     across, along = (np.stack([some[:-1], some[1:]], axis=-1).reshape(-1, 2) for some in (cells, cells.T))
-    found = shortest_paths(xy, np.concatenate([across, along]), 9)
-    asked = dijkstra(found.graph, directed=False, indices=range(9), return_predecessors=True)[1]
-    assert found.before(np.arange(9)).tolist() == asked.tolist()
+    edges = np.concatenate([across, along])
+    of_tree = shortest_paths(xy, edges, 9, trees=True)
+    for start, end in permutations(range(9), 2):
+        alone = shortest_paths(xy, edges, 9)
+        assert alone.path(start, end).tolist() == of_tree.path(start, end).tolist()
 
 
 def test_a_path_of_a_graph_whose_lengths_are_too_short_is_not_found() -> None:
