@@ -15,7 +15,7 @@ import typer
 from stopgo.mission.console.freed_memory import give_back, looking_seldom
 from stopgo.mission.console.running_step import RunningStep, running
 from stopgo.mission.errors import StopgoError
-from stopgo.mission.files.atomic import must_be_writable, replacing
+from stopgo.mission.files.atomic import Replacement, alone_in, must_be_writable, replacement
 from stopgo.planner import plan
 from stopgo.planner.geometry.instance_cache import forget_all
 from stopgo.planner.geometry.side_work import SideWork
@@ -77,7 +77,7 @@ class _Writing:
 
 
 def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool) -> list[PlanReport]:
-    from stopgo.planner.commands.outputs import names
+    from stopgo.planner.commands.outputs import names, set_aside_file
 
     load_when_used()
     from stopgo.planner.floors import options_of, read_floor, standing_bodies
@@ -96,11 +96,17 @@ def _planned(floor: Path, settings: Settings, writing: _Writing, all_parts: bool
 
     bodies = standing_bodies(floor, options_of(settings))
     common = None if made.divided is None else FloorsOnPaper(several=True)
-    reports = [
-        _write_part(made, number, folder, writing, bodies, common or FloorsOnPaper(several=False))
-        for number in range(len(made.parts))
-    ]
-    _set_aside_old(folder, len(reports), read, settings)
+    floors, unwanted = common or FloorsOnPaper(several=False), list[Path]()
+    with replacement() as files:
+        reports = [
+            _write_part(made, number, _PlaceOfPart(folder, files, unwanted), writing, bodies, floors)
+            for number in range(len(made.parts))
+        ]
+        with alone_in(folder):
+            files.replace()
+            for path in unwanted:
+                set_aside_file(path)
+            _set_aside_old(folder, len(reports), read, settings)
     if made.divided is None:
         return reports
     from stopgo.planner.commands.shared_report import shared_report
@@ -134,7 +140,7 @@ def _set_aside_old(folder: Path, parts: int, floor: FloorPlan, settings: Setting
 
 
 WRITTEN = ("recording", "sheets", "coverage", "picture", "mission")
-"""A plan's files in the order in which they appear: the mission when all else is there."""
+"""The files of a part in the order in which they appear: its mission when all else is there."""
 
 
 MANY = 200
@@ -144,20 +150,30 @@ The sheets of 99 780 m² would take 300 MB there.
 """
 
 
+@dataclass(frozen=True)
+class _PlaceOfPart:
+    """Place of the files of a part: they appear together with those of all parts."""
+
+    folder: Path
+    files: Replacement
+    unwanted: list[Path]
+    """Files of an earlier plan that this one does not have; parts add theirs."""
+
+
 def _write_part(
     plan: Plan,
     number: int,
-    folder: Path,
+    place: _PlaceOfPart,
     writing: _Writing,
     bodies: Sequence[StandingBody],
     floors: FloorsOnPaper,
 ) -> PlanReport:
-    """Write the plan of one part; its files appear together, mission.json last."""
+    """Write the plan of one part next to the files that it will replace."""
     from stopgo.planner.checking.model_clearance import too_near
-    from stopgo.planner.commands.outputs import names, set_aside_file
+    from stopgo.planner.commands.outputs import names
     from stopgo.planner.commands.plan_report import PlanReport
 
-    files = names(folder, number)
+    files = names(place.folder, number)
     part, is_last = _revised(plan.parts[number], files["mission"]), number == len(plan.parts) - 1
     recording = _recording(part, plan, writing.recorder, more=plan.divided is not None and not is_last)
     if recording is None:
@@ -171,7 +187,7 @@ def _write_part(
     data = contents.made(files, beside=beside if len(part.mission.stops) >= MANY else None)
     unwanted += [] if "sheets" in data else [files.pop("sheets")]
     keys = [key for key in WRITTEN if key in files]
-    with replacing(*(files[key] for key in keys)) as paths:
+    with place.files.filled(*(files[key] for key in keys)) as paths:
         written = dict(zip(keys, paths, strict=True))
         for key, content in data.items():
             written[key].write_bytes(content)
@@ -179,9 +195,7 @@ def _write_part(
         if recording is not None:
             recording.write(written["recording"])
         watch.lap("recording")
-    for path in unwanted:
-        set_aside_file(path)
-    watch.lap("files")
+    place.unwanted.extend(unwanted)
     near = tuple(too_near(part.mission, bodies, plan.settings))
     return PlanReport(part=part, files=files, times_s=watch.times(), too_near=near, surface=contents.surface)
 

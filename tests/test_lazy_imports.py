@@ -22,6 +22,7 @@ REASONS = {
     "stopgo.site.kept_variants": "Windows has no fcntl; variants are temporary there",
     "stopgo.bridge.link.admission": "Windows has no resource; robots on it use zenoh alone",
     "stopgo.bridge.robot.journal_file": "Windows has no fcntl; everything else of the bridge runs there",
+    "stopgo.mission.files.atomic": "Windows has no fcntl; plans do not wait for one another there",
     "stopgo.mission.console.plugins": "importlib.metadata takes 25 ms, and few plans use plug-ins",
     "stopgo.mission.console.freed_memory": "Windows has no resource; it needs no call for this",
     "stopgo.mission.console.process": "only commands that start workers need multiprocessing",

@@ -43,28 +43,91 @@ def replacing(*paths: Path | str) -> Iterator[list[Path]]:
     InputError
         When a folder is missing or cannot be written, or the disk is full; `paths` are then untouched.
     """
-    targets = [_target(path) for path in paths]
-    temporaries = [target.parent / f".stopgo-{secrets.token_hex(6)}.tmp" for target in targets]
+    with replacement() as made:
+        with made.filled(*paths) as temporaries:
+            yield temporaries
+        made.replace()
+
+
+@contextlib.contextmanager
+def replacement() -> Iterator[Replacement]:
+    """Yield files that are filled one after another and appear together; what did not appear is removed."""
+    made = Replacement()
     try:
-        for temporary in temporaries:
-            _create(temporary)
-        yield temporaries
-        for temporary in temporaries:
-            _sync(temporary)
-        for temporary, target in zip(temporaries, targets, strict=True):
-            os.replace(temporary, target)
-        for folder in {target.parent for target in targets}:
-            _sync_folder(folder)
-    except OSError as error:
-        folder = targets[0].parent
-        raise InputError(
-            f"{paths[0] if len(paths) == 1 else folder}: cannot be written ({error.strerror}); "
-            f"check that the folder {folder} is writable and has space, or choose another"
-        ) from None
+        yield made
     finally:
-        for temporary in temporaries:
+        made.discard()
+
+
+class Replacement:
+    """Temporary files next to others, which `replace` puts in their places together."""
+
+    def __init__(self) -> None:
+        self._named: list[Path | str] = []
+        self._temporaries: list[Path] = []
+        self._targets: list[Path] = []
+
+    @contextlib.contextmanager
+    def filled(self, *paths: Path | str) -> Iterator[list[Path]]:
+        """Yield empty files next to `paths` for the block to fill; errors are those of `replacing`."""
+        targets = [_target(path) for path in paths]
+        temporaries = [target.parent / f".stopgo-{secrets.token_hex(6)}.tmp" for target in targets]
+        self._named += paths
+        self._targets += targets
+        self._temporaries += temporaries
+        with self._refusing():
+            for temporary in temporaries:
+                _create(temporary)
+            yield temporaries
+
+    def replace(self) -> None:
+        """Sync all files to disk, then rename them in the order in which they were filled."""
+        with self._refusing():
+            for temporary in self._temporaries:
+                _sync(temporary)
+            for temporary, target in zip(self._temporaries, self._targets, strict=True):
+                os.replace(temporary, target)
+            for folder in {target.parent for target in self._targets}:
+                _sync_folder(folder)
+
+    def discard(self) -> None:
+        """Remove the files that did not replace others."""
+        for temporary in self._temporaries:
             with contextlib.suppress(OSError):  # gone after the rename, and nothing to do if it cannot go
                 temporary.unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def _refusing(self) -> Iterator[None]:
+        """Raise what the disk refuses as an InputError with the file, or with the folder of several."""
+        try:
+            yield
+        except OSError as error:
+            folder = self._targets[0].parent
+            raise InputError(
+                f"{self._named[0] if len(self._named) == 1 else folder}: cannot be written "
+                f"({error.strerror}); "
+                f"check that the folder {folder} is writable and has space, or choose another"
+            ) from None
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Wait until no other process is in this block for the same folder.
+
+    Systems and disks that cannot lock a folder are not waited for.
+    """
+    try:
+        import fcntl
+    except ModuleNotFoundError:  # Windows has no such locks
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # a disk over the network may have none
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def must_be_writable(path: Path) -> None:

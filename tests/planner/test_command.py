@@ -8,12 +8,14 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import ezdxf
 import pytest
 
 import stopgo
 from stopgo.command_line import main
+from stopgo.mission.files import plan_svg
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import Settings
@@ -560,12 +562,60 @@ def test_a_plan_that_ends_in_the_middle_changes_nothing(
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
 
 
+@pytest.mark.parametrize("fault", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+def test_a_fault_in_a_later_part_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: BaseException
+) -> None:
+    narrow, out = drawn(tmp_path / "narrow.dxf", door=0.6), tmp_path / "out"
+    plan_files(narrow, out, Settings(), all_parts=True)
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def fail() -> None:
+        raise fault
+
+    _before_the_second_part_is_drawn(monkeypatch, fail)
+    with pytest.raises(type(fault)):
+        plan_files(narrow, out, Settings(range=4.0), all_parts=True)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_files_of_two_plans_into_one_folder_at_once_are_not_mixed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    narrow, out = drawn(tmp_path / "narrow.dxf", door=0.6), tmp_path / "out"
+    other = drawn(tmp_path / "other.dxf", door=0.9)
+    _before_the_second_part_is_drawn(monkeypatch, lambda: plan_files(other, out, Settings()))
+    plan_files(narrow, out, Settings(), all_parts=True)
+    assert left_in(out) == FILES | SECOND
+    for number in ("", "-2"):
+        mission = read(out / f"mission{number}.json")
+        coverage = json.loads((out / f"coverage{number}.json").read_text())
+        assert mission.origin is not None
+        assert mission.origin.floor == "narrow"
+        assert coverage["mission"]["digest"] == mission.digest
+
+
+def _before_the_second_part_is_drawn(monkeypatch: pytest.MonkeyPatch, do: Callable[[], object]) -> None:
+    """Call `do` in the middle of a plan of two parts: when the files of its first part are made."""
+    pictures: list[object] = []
+    draw = plan_svg.plan_svg
+
+    def drawing(*arguments: Any, **options: Any) -> bytes:
+        pictures.append(arguments)
+        if len(pictures) == 2:
+            do()
+        return draw(*arguments, **options)
+
+    monkeypatch.setattr(plan_svg, "plan_svg", drawing)
+
+
 # ---- interrupted ----
 
 INTERRUPTED = """
 import os, signal, sys
 import stopgo.planner.routing.assemble
 from stopgo.command_line import main
+from stopgo.mission.files import plan_svg
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits that it is ignored
 

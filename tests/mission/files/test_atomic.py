@@ -87,6 +87,15 @@ def test_if_one_of_them_finds_no_room_none_changes(tmp_path: Path) -> None:
     assert (tmp_path / "a").read_bytes() == b"old"
 
 
+def test_one_alone_puts_files_in_place_in_a_folder(tmp_path: Path) -> None:
+    locks = pytest.importorskip("fcntl")
+    other = os.open(tmp_path, os.O_RDONLY)
+    with atomic.alone_in(tmp_path), pytest.raises(BlockingIOError):
+        locks.flock(other, locks.LOCK_EX | locks.LOCK_NB)
+    locks.flock(other, locks.LOCK_EX | locks.LOCK_NB)
+    os.close(other)
+
+
 @pytest.mark.parametrize(
     "command",
     [
