@@ -26,6 +26,8 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
 
     try:
         text = io.TextIOWrapper(io.BytesIO(whole_file(path)), encoding="utf-8-sig").read()
+        if max(map(_dots, text.splitlines()), default=0) > MOST_DOTS:
+            raise InputError(f"{path}: a key has more than {MOST_DOTS} dots; write a flat file")
         return {key: _as_text(value) for key, value in tomllib.loads(text).items()}
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from None
@@ -34,6 +36,15 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
     except (OSError, ValueError) as error:  # a name that no file can have is a ValueError
         why = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({why}){f'; {remedy}' if remedy else ''}") from None
+
+
+def _dots(line: str) -> int:
+    """Dots before the value in a line: keys of very many parts take memory as the square of their number."""
+    return 0 if line.lstrip().startswith("#") else line.partition("=")[0].count(".")
+
+
+MOST_DOTS = 1000
+"""Dots that a key may have, or a table's name."""
 
 
 def with_quotes(problem: str) -> str:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from stopgo.mission.geometry import FloatArray, polyline_length
+from stopgo.mission.geometry import FloatArray, IntArray, polyline_length
 from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.linework.swings import swings_of
 
@@ -24,6 +25,10 @@ _SMALLEST = 3.0
 """A drawing smaller than this, in metres, is not a storey."""
 _MUCH = 5.0
 """A drawing with this many times as much wall as any other is the plan; the others are details."""
+MOST_SAMPLES = 5_000_000
+"""Points at which lines are sampled: one for each metre, unless they are longer than any building's."""
+AT_ONCE = 200
+"""Boxes of groups that are compared with all others at a time."""
 _NOT_BUILT = ("ignore", "names", "other")
 
 
@@ -103,24 +108,31 @@ def _groups(strokes: Sequence[Stroke]) -> list[list[int]]:
     label = _overlapping(label, cells)
     group = np.empty(len(strokes), dtype=np.int64)
     group[owner[:, 0]] = label[owner[:, 1]]
-    return [np.flatnonzero(group == k).tolist() for k in np.unique(group)]
+    _, order, begin = _sorted_out(group)
+    return [some.tolist() for some in np.split(order, begin[1:])]
 
 
 def _cells(strokes: Sequence[Stroke]) -> tuple[FloatArray, np.ndarray]:
     """Cells of 1 m that strokes pass through (n, 2), and pairs of a stroke and one cell of it."""
-    sampled = [_sampled(item.points) for item in strokes]
-    number = np.repeat(np.arange(len(strokes)), [len(points) for points in sampled])
-    cells, place = np.unique(np.floor(np.concatenate(sampled)), axis=0, return_inverse=True)
+    lines = [item.points for item in strokes]
+    sampled, number = _sampled(lines)
+    ends = np.concatenate([line[-1:] for line in lines])
+    cells, place = np.unique(np.floor(np.concatenate([sampled, ends])), axis=0, return_inverse=True)
     # A stroke is connected itself: its cells are linked by their distance alone, being 1 m apart at most.
-    return cells, np.stack([number, place.reshape(-1)], axis=1)
+    return cells, np.stack([np.append(number, np.arange(len(lines))), place.reshape(-1)], axis=1)
 
 
-def _sampled(points: FloatArray) -> FloatArray:
-    """Points along a polyline, at most 1 m apart, and no more than a building has."""
-    steps = np.diff(points, axis=0)
-    counts = np.clip(np.ceil(np.hypot(*steps.T)), 1, 10_000).astype(int)
-    pieces = [points[k] + steps[k] * (np.arange(count)[:, None] / count) for k, count in enumerate(counts)]
-    return np.concatenate([*pieces, points[-1:]])
+def _sampled(lines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
+    """Points (n, 2) along polylines, at most 1 m apart and no more than a building has; and their lines."""
+    begin = np.concatenate([line[:-1] for line in lines])
+    steps = np.concatenate([np.diff(line, axis=0) for line in lines])
+    number = np.repeat(np.arange(len(lines)), [len(line) - 1 for line in lines])
+    counts = np.clip(np.ceil(np.hypot(*steps.T)), 1, 10_000).astype(np.int64)
+    if (total := int(counts.sum())) > MOST_SAMPLES:
+        counts = np.maximum(1, counts * MOST_SAMPLES // total)
+    of = np.repeat(np.arange(len(counts)), counts)
+    along = (np.arange(len(of)) - (np.cumsum(counts) - counts)[of]) / counts[of]
+    return begin[of] + steps[of] * along[:, None], number[of]
 
 
 def _connected(count: int, pairs: np.ndarray) -> np.ndarray:
@@ -131,11 +143,26 @@ def _connected(count: int, pairs: np.ndarray) -> np.ndarray:
 def _overlapping(label: np.ndarray, cells: FloatArray) -> np.ndarray:
     """Labels in which groups whose boxes overlap are one."""
     while True:
-        names = np.unique(label)
-        low = np.array([cells[label == k].min(axis=0) for k in names])
-        high = np.array([cells[label == k].max(axis=0) for k in names])
-        over = (low[:, None] <= high[None]).all(axis=-1) & (high[:, None] >= low[None]).all(axis=-1)
-        merged = _connected(len(names), np.argwhere(np.triu(over, 1)))
+        names, order, begin = _sorted_out(label)
+        low, high = (extreme.reduceat(cells[order], begin) for extreme in (np.minimum, np.maximum))
+        merged = _merged(shapely.box(*low.T, *high.T))
         if len(np.unique(merged)) == len(names):
             return label
         label = merged[np.searchsorted(names, label)]
+
+
+def _merged(boxes: NDArray[np.object_]) -> np.ndarray:
+    """A label for each box, the same for those that overlap; some boxes at a time, as pairs take memory."""
+    tree, label = shapely.STRtree(boxes), np.arange(len(boxes))
+    for begin in range(0, len(boxes), AT_ONCE):
+        index, other = tree.query(boxes[begin : begin + AT_ONCE])
+        pairs = np.stack([label[index + begin], label[other]], axis=1)
+        label = _connected(len(boxes), pairs)[label]
+    return label
+
+
+def _sorted_out(label: np.ndarray) -> tuple[np.ndarray, IntArray, IntArray]:
+    """The distinct labels, the indices in the order of their labels, and where each label begins in it."""
+    order = np.argsort(label, kind="stable")
+    names, begin = np.unique(label[order], return_index=True)
+    return names, order, begin

@@ -82,14 +82,18 @@ def drawn(strokes: Iterable[Stroke], *, gap: float = SNAP) -> Drawn:
     shapes = [_shape(stroke, gap=gap) for stroke in strokes]
     closed = sorted((shape for shape in shapes if isinstance(shape, Closed)), key=_closed_key)
     lines = sorted((shape for shape in shapes if isinstance(shape, Open)), key=_open_key)
-    points = [line for line in lines if polyline_length(line.points) <= SNAP]
+    points = [line for line in lines if _is_point(line)]
     return Drawn(
         closed=_each_closed_once(_without_fills(closed)),
-        open=_each_line_once([line for line in lines if line not in points]),
+        open=_each_line_once([line for line in lines if not _is_point(line)]),
         dropped=tuple(
             Anomaly("no_length", "a line shorter than 1 mm is ignored", place(line.points)) for line in points
         ),
     )
+
+
+def _is_point(line: Open) -> bool:
+    return polyline_length(line.points) <= SNAP
 
 
 def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:

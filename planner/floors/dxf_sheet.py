@@ -224,8 +224,9 @@ def _one_drawing(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfShe
     )
 
 
-def drawings_text(drawings: Sequence[DrawingFound]) -> str:
-    """The drawings by number, each with its size and contents, in words."""
+def drawings_text(drawings: Sequence[DrawingFound], *, most: int = 20) -> str:
+    """The drawings by number, each with its size and contents, in words; of very many the first."""
     if not drawings:
         return ""
-    return ": " + "; ".join(f"{k} is {item.description}" for k, item in enumerate(drawings, start=1))
+    more = f"; and {len(drawings) - most} more" if len(drawings) > most else ""
+    return ": " + "; ".join(f"{k} is {item.description}" for k, item in enumerate(drawings[:most], 1)) + more

@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import FloorPlan, Opening
-from stopgo.mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.planner.geometry.ring_index import RingIndex
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape, widened
@@ -48,6 +48,7 @@ def crossings_of(
     """Every opening with its clear width and the rooms on its sides; in two processes if `forked`."""
     origin = local_origin(floor)
     rooms = shapely.STRtree([to_shape(room.polygons, origin) for room in floor.rooms])
+    shapely.prepare(rooms.geometries)
     outline = to_shape(floor.outline, origin)
     shapely.prepare(outline)
 
@@ -122,11 +123,17 @@ def _sides(clear: BaseGeometry, rooms: shapely.STRtree) -> tuple[int | None, int
     middle, across = middle_and_normal(clear)
     found = []
     for sign in (1.0, -1.0):
-        points = [shapely.Point(middle + sign * step * across) for step in PROBES]
-        hits = [rooms.query(point, predicate="intersects") for point in points]
+        points = (shapely.Point(middle + sign * step * across) for step in PROBES)
+        hits = (_around(point, rooms) for point in points)
         nearest = next((some for some in hits if len(some)), ())
         found.append(min(map(int, nearest), key=lambda k: (rooms.geometries[k].area, k), default=None))
     return found[0], found[1]
+
+
+def _around(point: BaseGeometry, rooms: shapely.STRtree) -> IntArray:
+    """The rooms that a point lies in. They are prepared: a room around thousands has as many holes."""
+    near = rooms.query(point)
+    return near[shapely.intersects(rooms.geometries[near], point)]
 
 
 def middle_and_normal(line: BaseGeometry) -> tuple[FloatArray, FloatArray]:

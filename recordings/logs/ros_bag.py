@@ -143,7 +143,8 @@ def _damage() -> tuple[type[Exception], ...]:
 
     apsw = sys.modules.get("apsw")
     of_database = () if apsw is None else (apsw.Error,)
-    return (AnyReaderError, Error1, Error2, TypesysError, ZstdError, *LOW_LEVEL, *of_database)
+    odd = (TypeError, AttributeError)  # of columns whose values are of another type
+    return (AnyReaderError, Error1, Error2, TypesysError, ZstdError, *odd, *LOW_LEVEL, *of_database)
 
 
 LOW_LEVEL = (

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -34,6 +35,8 @@ MOST_PACKED = 100
 """A model packs to no less than this fraction of its size (1/100); more is a zip bomb …"""
 NO_BOMB = 50 * 1024**2
 """… unless it is no larger than this, bytes."""
+PIECE = 1024**2
+"""Bytes that are unpacked at a time."""
 READING = "import sys; from stopgo.planner.floors.ifc.extract import main; sys.exit(main(sys.argv[1:]))"
 """The other process."""
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
@@ -117,7 +120,9 @@ def _unzipped(file: FloorFile) -> bytes:
             if len(members) != 1:
                 raise InputError(f"{file.path}: holds {len(members)} .ifc files; zip one model alone")
             _check_size(members[0].file_size, file)
-            return archive.read(members[0])
+            with archive.open(members[0]) as packed:
+                # In pieces: read at once it is all unpacked, before its size is found to be another one.
+                return b"".join(iter(partial(packed.read, PIECE), b""))
     except (zipfile.BadZipFile, OSError, EOFError, RuntimeError, ValueError) as error:
         said = str(error) or type(error).__name__
         raise InputError(f"{file.path}: cannot be unzipped ({said}); copy or export it again") from None

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.legible_text import legible
 from stopgo.planner.floors.lines_and_texts import Stroke
 
 MOST_MEETING = 300
@@ -26,6 +27,10 @@ CELL_M, STEP_M = 10.0, 5.0
 """Edge of such a square, and length of the pieces of lines that are counted where their middles are."""
 MOST_PIECES = 500_000
 """Pieces that are counted; they are longer where the lines are longer than any building's."""
+MOST_SWINGS = 10_000
+"""Arcs of the leaves of doors: the largest storeys have some thousands of doors."""
+SWINGING, LEAST_LEAF_M = ("doors", "openings"), 0.4
+"""Roles of lines among which these arcs are, and their least extent; handles and hinges are less wide."""
 AREAS = ("walls", "floor", "rooms", "columns")
 """Roles of lines that bound areas."""
 SOME = 100
@@ -34,7 +39,22 @@ SOME = 100
 
 def pattern_in(strokes: Sequence[Stroke]) -> str:
     """Return the fault of lines that are a pattern, and the remedy; empty if they may be a building's."""
-    return next(_faults(strokes), "")
+    return next(_faults(strokes), "") or _many_doors(strokes)
+
+
+def _many_doors(strokes: Sequence[Stroke]) -> str:
+    """Return the fault of more arcs of doors than any storey has."""
+    arcs = [stroke for stroke in strokes if stroke.role in SWINGING and stroke.curved]
+    if len(arcs) <= MOST_SWINGS:
+        return ""
+    wide = sum(bool(np.ptp(stroke.points, axis=0).max() >= LEAST_LEAF_M) for stroke in arcs)
+    if wide <= MOST_SWINGS:
+        return ""
+    layer = legible(arcs[0].layer)
+    return (
+        f"{wide} arcs of doors on {layer}, more than {MOST_SWINGS}, as no storey has; choose a part with "
+        "--region, or export one storey"
+    )
 
 
 def _faults(strokes: Sequence[Stroke]) -> Iterator[str]:

@@ -38,6 +38,11 @@ LEAST_WALL = 0.5
 """A connected group of occupied cells smaller than this, in metres, is an obstacle and not a wall."""
 LEAST_FLOOR = 1.0
 """A connected group of free cells smaller than this, in m², is not floor."""
+MOST_SPECKS = 5000
+"""Such groups that are obstacles: the maps of large halls have some hundreds."""
+MOST_STEPS = 500_000
+"""Edges between cells that are set and others: 25 km of outlines in cells of 5 cm."""
+_NOISE = "that is noise, no map; filter it, or check image, negate, mode and the thresholds"
 _EIGHT = np.ones((3, 3), dtype=bool)
 
 
@@ -119,11 +124,27 @@ def _grid(description: MapDescription, picture: bytes, path: Path) -> _Grid:
     occupied = (cells == OCCUPIED) & floor
     specks = _small(occupied, LEAST_WALL / description.resolution)
     findings = []
+    _check_noise(floor, "free", path)
+    _check_noise(occupied, "occupied", path)
     if specks.any():
         _, count = ndimage.label(specks, _EIGHT)
+        if count > MOST_SPECKS:
+            raise InputError(
+                f"{path}: {count} groups of occupied cells smaller than {LEAST_WALL:g} m, more than "
+                f"{MOST_SPECKS}: {_NOISE}"
+            )
         text = f"{count} groups of occupied cells smaller than {LEAST_WALL:g} m are obstacles, no walls"
         findings.append(Finding("small_obstacles", text))
     return _Grid(occupied & ~specks, specks, floor, tuple(findings))
+
+
+def _check_noise(mask: NDArray[np.bool_], what: str, path: Path) -> None:
+    """Refuse cells with more outlines than any map has, before these are drawn."""
+    steps = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"{path}: the outlines of its {what} cells have {steps} edges, more than {MOST_STEPS}: {_NOISE}"
+        )
 
 
 def _largest_floors(cells: NDArray[np.uint8], description: MapDescription, path: Path) -> NDArray[np.bool_]:

@@ -60,6 +60,8 @@ def _pgm(data: bytes, name: str) -> GreyPicture:
     else:
         values = np.frombuffer(body, dtype=">u2" if most > 255 else "u1", count=-1).astype(np.float64)
     values = _whole(values, rows * columns, name).reshape(rows, columns)
+    if not np.isfinite(values).all():
+        raise ValueError("a value is no number")
     grey = np.round(values * (255.0 / most)).clip(0, 255).astype(np.uint8)
     return GreyPicture(grey, np.ones(grey.shape, dtype=bool))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -14,9 +15,12 @@ from stopgo.planner.floors.drawn_shapes import Shape
 from stopgo.planner.floors.strokes import sketch, word_of
 from stopgo.planner.floors.written_measures import area_in, sides_in
 
+T = TypeVar("T")
 _ROOM_ROLES = ("rooms", "walls", "floor", "names", "other")
 _LABELS = 3
 """So many written areas must lie in different faces of lines to say something."""
+MOST_LABELS = 2000
+"""Texts that are compared with what is drawn around them: of more, that many spread over all of them."""
 _MOST = 3000
 """Lines between which faces are searched, at most …"""
 _POINTS = 64
@@ -41,12 +45,17 @@ def sides_of(shapes: Sequence[Shape], written: Sequence[Shape]) -> list[RoomSide
         return []
     segments = _segments(shapes)
     found = []
-    for sides, at in labels:
+    for sides, at in some_of(labels):
         spans = [_span(segments[..., [axis, 1 - axis]], at[axis], at[1 - axis]) for axis in (0, 1)]
         if np.isfinite(spans).all() and min(spans) > 0:
             longer, shorter = max(sides), min(sides)
             found.append(RoomSides((longer, shorter), (max(spans), min(spans))))
     return found
+
+
+def some_of(labels: Sequence[T]) -> Sequence[T]:
+    """All labels, or of very many some: each is compared with all lines of the drawing."""
+    return labels[:: -(-len(labels) // MOST_LABELS)] if labels else labels
 
 
 def _segments(shapes: Sequence[Shape]) -> FloatArray:
@@ -98,6 +107,7 @@ def areas_in(shapes: Sequence[Shape], written: Sequence[Shape]) -> list[tuple[fl
     labels = [(area, at) for text, at in texts if (area := area_in(text))]
     if not labels:
         return []
+    labels = some_of(labels)
     found = _around(labels, _faces(_closed(shapes)))
     if len({face for face, _, _ in found}) < _LABELS <= len(labels):
         between = _around(labels, _enclosed(shapes))
