@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -19,6 +20,8 @@ from stopgo.planner.geometry.side_work import in_halves
 from stopgo.planner.routing.dijkstra_kernel import find_lengths
 from stopgo.planner.routing.path_trees import path_trees
 
+NodeArray = NDArray[np.int32]
+"""Numbers of nodes, of which very many are kept."""
 CHUNK = 256
 """Points whose distances to all nodes are in memory at a time."""
 MANY = 20_000_000
@@ -43,7 +46,7 @@ class Paths:
     """(nodes, nodes): lengths of the straight pieces."""
     limit: float = np.inf
     """Metres beyond which paths were not searched."""
-    _trees: dict[int, IntArray] = field(default_factory=dict)
+    _trees: dict[int, NodeArray] = field(default_factory=dict)
     """By point: the node before each node (nodes,), if it is kept."""
     _asked: dict[int, int] = field(default_factory=dict)
     """By point: how many paths were searched from it, one by one."""
@@ -56,7 +59,7 @@ class Paths:
             raise ValueError(f"no path from point {start} to point {end}")
         return straightened(self.xy[nodes])
 
-    def _tree(self, start: int) -> IntArray | None:
+    def _tree(self, start: int) -> NodeArray | None:
         """The node before each node on its shortest path from `start` (nodes,), if many paths begin there."""
         kept = self._trees.get(start)
         if kept is None:
@@ -78,7 +81,7 @@ class Paths:
             own = self._both_ways[nodes][:, nodes]
             first, last = np.searchsorted(nodes, (start, end)).tolist()
             limit = length * (1 + ROUNDING) + ROUNDING
-            before = path_trees(own, np.array([first]), limit=limit)[1]
+            before = path_trees(own, np.array([first]), limit=limit)[1].astype(np.int32)
             if len(path := _followed(before[0], first, last)):
                 break
         return nodes[path]
@@ -95,18 +98,18 @@ class Paths:
             to[place], length[place] = half.indices, half.data
         return csr_array((length, to, first), shape=self.graph.shape)
 
-    def before(self, points: IntArray) -> IntArray:
+    def before(self, points: IntArray) -> NodeArray:
         """The node before each node on its shortest path from each of these points (n, nodes)."""
         kept = [self._trees.get(point) for point in points.tolist()]
         return self._found_before(points) if any(tree is None for tree in kept) else np.array(kept)
 
-    def _found_before(self, points: IntArray) -> IntArray:
+    def _found_before(self, points: IntArray) -> NodeArray:
         return path_trees(self._both_ways, points, limit=self.limit)[1].astype(np.int32)
 
     way = path  # its name in 0.1; ends with 0.3
 
 
-def _followed(before: IntArray, start: int, end: int) -> IntArray:
+def _followed(before: NodeArray, start: int, end: int) -> IntArray:
     """The nodes from one to another, by the node before each; none if no path leads there."""
     nodes = [end]
     while nodes[-1] != start:
