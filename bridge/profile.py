@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,28 +35,36 @@ Profile = Mapping[str, Preset]
 """Presets by name."""
 
 
-def read_profile(
-    environment: Mapping[str, str] = os.environ,
-    *,
-    folder: Path | None = None,
-    unread: Callable[[str], None] | None = None,
-) -> Profile:
+def read_profile(environment: Mapping[str, str] = os.environ, *, folder: Path | None = None) -> Profile:
     """Read the presets; of each name the value of the source that takes precedence.
-
-    With `unread` it receives the fault of each file that is not valid, and nothing of that file applies.
 
     Raises
     ------
     InputError
-        Without `unread`: names the file, and the unknown key or the wrong value.
+        Names the file, and the unknown key or the wrong value.
     """
-    found: dict[str, Preset] = {}
-    files = (_valid_file(path, unread) for path in profile_files(environment, folder))
-    sources = (_of_environment(environment), *files)
-    for rank, source in enumerate(sources):
-        for name, value, where in source:
-            found.setdefault(name, Preset(value, where, rank))
+    found, faults = read_valid_profile(environment, folder=folder)
+    for fault in faults.values():
+        raise InputError(fault)
     return found
+
+
+def read_valid_profile(
+    environment: Mapping[str, str] = os.environ, *, folder: Path | None = None
+) -> tuple[Profile, Mapping[int, str]]:
+    """Read the presets of all sources that are valid, and the fault of each other one by its rank."""
+    found: dict[str, Preset] = {}
+    faults: dict[int, str] = {}
+    sources = (_of_environment(environment), *map(_of_file, profile_files(environment, folder)))
+    for rank, source in enumerate(sources):
+        try:
+            presets = list(source)
+        except InputError as error:
+            faults[rank] = str(error)
+            continue
+        for name, value, where in presets:
+            found.setdefault(name, Preset(value, where, rank))
+    return found, faults
 
 
 def effective(profile: Profile, typed: Set[str]) -> Profile:
@@ -105,19 +113,12 @@ def _of_environment(environment: Mapping[str, str]) -> Iterator[tuple[str, str, 
             yield name, environment[variable], f"environment {variable}"
 
 
-def _valid_file(path: Path, unread: Callable[[str], None] | None) -> list[tuple[str, str, str]]:
-    """Return the presets of a file; none of a file whose fault `unread` has received."""
-    try:
-        return list(_of_file(path))
-    except InputError as error:
-        if unread is None:
-            raise
-        unread(str(error))
-        return []
-
-
 def _of_file(path: Path) -> Iterator[tuple[str, str, str]]:
-    if not path.exists():
+    try:
+        is_there = path.exists()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    if not is_there:
         return
     for name, value in read_toml(path).items():
         if name not in NAMES:

@@ -28,7 +28,7 @@ from stopgo.bridge.commands.bridge_options import (
     VehicleId,
 )
 from stopgo.bridge.console import say
-from stopgo.bridge.profile import effective, read_profile
+from stopgo.bridge.profile import Profile, effective, read_profile, read_valid_profile
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -154,10 +154,14 @@ def given_options(context: typer.Context) -> GivenOptions:
 def with_presets(given: GivenOptions, values: dict[str, Any], *, stopping: bool = False) -> dict[str, Any]:
     """Return the options' values; a preset replaces each that was not given.
 
-    A command that stops a robot which was given needs no valid stopgo.toml: what is wrong is printed.
+    A command that stops a robot needs no valid stopgo.toml if the robot is named by an option, or by a source
+    that takes precedence over that file: what is wrong is printed.
     """
-    is_named = not given.isdisjoint({"--robot", "--mavlink"})
-    profile = read_profile(unread=_say_unread if stopping and is_named else None)
+    profile, faults = read_valid_profile() if stopping else (read_profile(), {})
+    if faults and not _is_named(given, profile, min(faults)):
+        raise InputError(faults[min(faults)])
+    for fault in faults.values():
+        say(f"{fault}; its presets do not apply to this command")
     presets = effective(profile, {option.removeprefix("--") for option in given})
     preset: dict[str, Any] = {PARAMETERS.get(name, name): one.value for name, one in presets.items()}
     if "keys" in preset:
@@ -165,8 +169,10 @@ def with_presets(given: GivenOptions, values: dict[str, Any], *, stopping: bool 
     return {name: preset.get(name, value) for name, value in values.items()}
 
 
-def _say_unread(fault: str) -> None:
-    say(f"{fault}; its presets do not apply to this command")
+def _is_named(given: GivenOptions, profile: Profile, rank: int) -> bool:
+    """True if a robot or vehicle is named, and no source of this rank or a later one could name another."""
+    preset = [profile[name].rank for name in ("robot", "mavlink") if name in profile]
+    return not given.isdisjoint({"--robot", "--mavlink"}) or min(preset, default=rank) < rank
 
 
 PARAMETERS = {"as": "who"}

@@ -108,6 +108,44 @@ def test_a_bad_file_stops_no_order_to_stop_a_robot_that_is_given(
     assert "not found" not in capsys.readouterr().err  # what starts a robot needs all presets
 
 
+def test_a_bad_file_stops_no_order_to_stop_the_robot_that_the_environment_names(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("stopgo.toml").write_text('robot = "r8')
+    monkeypatch.setenv("STOPGO_ROBOT", "r7")
+    monkeypatch.setenv("STOPGO_CONNECT", "tcp/127.0.0.1:1")
+    assert main(["abort", "--timeout", "0.1"]) == 2
+    told = capsys.readouterr().err
+    assert "stopgo.toml: not a TOML file" in told
+    assert "robot r7 not found" in told
+    assert main(["start", "--timeout", "0.1"]) == 2
+    assert "not found" not in capsys.readouterr().err
+
+
+def test_a_bad_file_that_may_name_another_robot_is_not_passed_over(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The nearer file takes precedence over the user's: it alone may be the bad one."""
+    near, users = Path("stopgo.toml"), place / "user" / "stopgo" / "stopgo.toml"
+    names, bad = 'robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n', 'robot = "r8'
+    for near_text, users_text, is_found in ((names, bad, True), (bad, names, False)):
+        near.write_text(near_text)
+        users.write_text(users_text)
+        assert main(["abort", "--timeout", "0.1"]) == 2
+        assert ("robot r7 not found" in capsys.readouterr().err) == is_found
+
+
+def test_a_folder_of_settings_that_may_not_be_entered_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuses(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "exists", refuses)
+    with pytest.raises(InputError, match=r"stopgo\.toml: cannot be read \(Permission denied\)"):
+        read_profile()
+
+
 def test_a_command_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
     Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
     assert main(["pause", "--timeout", "0.1"]) == 2
