@@ -20,6 +20,7 @@ from stopgo.mission.console.process import (
     have_output,
     output_is_closed,
 )
+from stopgo.mission.console.state_folder import have_home
 from stopgo.mission.errors import InputError, MissingExtra, StopgoError
 from stopgo.renamed_options import with_new_names
 from stopgo.root_help import must_be_command, root_help
@@ -78,6 +79,7 @@ def main(arguments: list[str] | None = None) -> int:
     end = ProcessEnd()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its matrices are small: other threads only wait
     have_output()
+    have_home()
     have_plain_output(escaped=not {"--json", "--print-config"}.isdisjoint(sys.argv))
     if sys.argv[1:2] == ["plan"]:
         from stopgo.mission.console.freed_memory import look_seldom

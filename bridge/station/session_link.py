@@ -226,7 +226,9 @@ def _open_session(
     options: SessionOptions, say: Callable[[str], None]
 ) -> tuple[Conversation, Greeting] | None:
     """Return the user's open session and its greeting; `None` if there is none that can be used."""
-    if not has_unix_sockets() or len(os.fsencode(path := options.path)) > LONGEST_PATH or not path.exists():
+    if not has_unix_sockets() or len(os.fsencode(path := options.path)) > LONGEST_PATH:
+        return None
+    if not os.path.exists(path):  # also where its folder may not be entered
         return None
     connected = socket.socket(socket.AF_UNIX)
     try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import getpass
 import hashlib
+import os
 import socket
 import threading
 import time
@@ -115,8 +116,12 @@ def connect(
 
 
 def whoami() -> str:
-    """Return the default name of the operator: user@host."""
-    return f"{getpass.getuser()}@{socket.gethostname()}"
+    """Return the default name of the operator: user@host, with the number of a user without a name."""
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):  # Python up to 3.12, and later ones
+        user = f"user-{os.getuid()}"
+    return f"{user}@{socket.gethostname()}"
 
 
 class Station:
