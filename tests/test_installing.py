@@ -199,12 +199,14 @@ def test_without_file_locks_everything_is_importable_and_a_journal_is_refused(
         raise AssertionError("was opened")
 
 
-def test_only_three_modules_know_of_file_locks() -> None:
-    """Where there are none, the first two are refused in one line, and a site's variants are temporary."""
+def test_only_four_modules_know_of_file_locks() -> None:
+    """Where there are none, the first two are refused in one line, plans of one folder do not wait for one
+    another, and a site's variants are temporary."""
     knows = [name for name, path in MODULES.items() if "import fcntl" in path.read_text(encoding="utf-8")]
     assert sorted(knows) == [
         "stopgo.bridge.robot.journal_file",
         "stopgo.bridge.station.shared_session",
+        "stopgo.mission.files.atomic",
         "stopgo.site.kept_variants",
     ]
 
