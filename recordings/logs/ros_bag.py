@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.bag_tables import tables_checked
 from stopgo.recordings.logs.salvage import Salvaged, salvage
 
 
@@ -87,6 +88,8 @@ def whole_bag(path: Path) -> Iterator[Bag]:
     ------
     Damaged
         With the reason, when it is opened or while its messages are read.
+    InputError
+        When a table of a database is none.
     """
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -96,7 +99,8 @@ def whole_bag(path: Path) -> Iterator[Bag]:
             described = path.is_dir() and (path / METADATA).exists()
             paths = [path] if described else stack.enter_context(_unpacked(files_of(path)))
             reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-            stack.enter_context(reader)
+            with tables_checked():
+                stack.enter_context(reader)
         yield _bag(reader)
 
 

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from urllib.parse import quote
 
 from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.bag_tables import check_salvaged
 
 Raw = tuple[int, int, bytes]
 """Number of the connection, time of logging (ns), and the bytes."""
@@ -333,6 +334,7 @@ def _db3_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
         whole = _of_full_length(path, Path(folder))
         connection = sqlite3.connect(f"file:{quote(str(whole))}?immutable=1", uri=True)
         try:
+            check_salvaged(connection, path)
             topics = _rows(connection, "SELECT id, name, type FROM topics", path, loss)
             yield from (BagConnection(int(number), str(name), str(kind), "") for number, name, kind in topics)
             yield from _db3_messages(connection, path, loss)
