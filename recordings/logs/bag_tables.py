@@ -1,4 +1,4 @@
-"""Refusal of rosbag2 databases whose tables are queries: such a query may never end."""
+"""Refusal of rosbag2 databases whose tables are queries, which may never end, or hold too long messages."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.bag_sizes import Longest, check_rows
 
 TABLES = ("topics", "messages", "schema", "message_definitions", "metadata")
 _QUERIES = (
@@ -34,7 +35,7 @@ def check_tables(connection: Any, path: object) -> None:
 
 
 @contextmanager
-def tables_checked() -> Iterator[None]:
+def tables_checked(longest: Longest) -> Iterator[None]:
     """Check each database that rosbags opens, before it asks for anything."""
     try:
         import apsw
@@ -42,9 +43,14 @@ def tables_checked() -> Iterator[None]:
         yield
         return
 
+    checked: set[str] = set()
+
     def check(connection: Any) -> None:
         try:
             check_tables(connection, connection.filename)
+            if connection.filename not in checked:  # rosbags opens each one twice
+                check_rows(connection, connection.filename, longest)
+                checked.add(connection.filename)
         except apsw.Error:
             return  # rosbags finds the damage
 
