@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import tracemalloc
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import ezdxf
@@ -23,7 +24,9 @@ from stopgo.planner.floors.dxf_sheet import drawings_text
 from stopgo.planner.floors.ifc.loading import _unzipped
 from stopgo.planner.floors.lines_and_texts import Stroke
 from stopgo.planner.floors.linework import patterns, swings
-from stopgo.planner.floors.robot_map.grey_picture import read_picture
+from stopgo.planner.floors.robot_map import cell_regions, grey_picture
+from stopgo.planner.floors.robot_map.description import MapDescription
+from stopgo.planner.floors.robot_map.grey_picture import GreyPicture, read_picture
 from stopgo.planner.floors.units import room_texts, unit_evidence
 from stopgo.planner.space.opening_joins import PROBES, _sides
 
@@ -221,6 +224,37 @@ def test_a_map_of_very_many_specks_is_refused(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(robot_map_reader, "MOST_SPECKS", 99)
     with pytest.raises(InputError, match=r"100 groups of occupied cells smaller than 0.5 m, more than 99"):
         read_floor(robot_map(tmp_path, occupied))
+
+
+def peak_of(work: Callable[[], object]) -> int:
+    """Most bytes that are held at once."""
+    tracemalloc.start()
+    work()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak
+
+
+def test_a_row_of_very_many_cells_takes_few_bytes_for_each() -> None:
+    """20 million of them took 1.25 GB."""
+    count = 200_000
+    row = np.ones((1, count), dtype=bool)
+    assert peak_of(lambda: cell_regions._edges(row)) < 25 * count
+    picture = GreyPicture(np.full((1, count), 254, dtype=np.uint8), np.ones((1, count), dtype=bool))
+    described = MapDescription("map.pgm", 0.05, (0, 0, 0))
+    assert peak_of(lambda: described.cells(picture)) < 10 * count
+
+
+@pytest.mark.parametrize("kind", ["P2", "P5"])
+def test_pictures_are_read_in_few_bytes_for_each_pixel(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    count = 200_000
+    values = b"254 " * count if kind == "P2" else b"\xfe" * count
+    data = b"%s\n%d 1\n255\n" % (kind.encode(), count) + values
+    monkeypatch.setattr(grey_picture, "_PIECE", 1000)
+    found = []
+    assert peak_of(lambda: found.append(read_picture(data, name="map.pgm"))) < 10 * count
+    assert (found[0].grey == 254).all()
+    assert found[0].grey.shape == (1, count)
 
 
 @pytest.mark.filterwarnings("error")
