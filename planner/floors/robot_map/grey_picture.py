@@ -5,9 +5,8 @@ from __future__ import annotations
 import io
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +59,9 @@ def _pgm(data: bytes, name: str) -> GreyPicture:
         raise ValueError(f"greatest value {most}")
     body = data[header.end() :]
     if data[:2] == b"P5" and most < 256:
-        values = _whole(np.frombuffer(body, dtype="u1"), rows * columns, name)
-        grey = _greys(np.arange(256.0), most)[values].reshape(rows, columns)
+        values = np.frombuffer(body, dtype="u1")
+        _check_whole(values, rows * columns, name)
+        grey = _greys(np.arange(256.0), most)[values[: rows * columns]].reshape(rows, columns)
     else:
         grey = _greys_of_numbers(data[:2], body, rows * columns, most, name).reshape(rows, columns)
     return GreyPicture(grey, np.ones(grey.shape, dtype=bool))
@@ -70,9 +70,13 @@ def _pgm(data: bytes, name: str) -> GreyPicture:
 def _greys_of_numbers(kind: bytes, body: bytes, count: int, most: int, name: str) -> GreyBytes:
     """Greys of values that are written as numbers, or in two bytes."""
     if kind == b"P5":
-        return _greys(_whole(np.frombuffer(body, dtype=">u2"), count, name).astype(np.float64), most)
-    pieces = [np.empty(0, np.uint8), *(_greys(values, most) for values in _numbers(body, count))]
-    return _whole(np.concatenate(pieces), count, name)
+        values = np.frombuffer(body, dtype=">u2")
+        _check_whole(values, count, name)
+        return _greys(values[:count].astype(np.float64), most)
+    pieces = [np.empty(0, np.uint8), *(_greys(piece, most) for piece in _numbers(body, count))]
+    greys = np.concatenate(pieces)
+    _check_whole(greys, count, name)
+    return greys
 
 
 def _numbers(body: bytes, count: int) -> Iterator[NDArray[np.float64]]:
@@ -92,13 +96,9 @@ def _greys(values: NDArray[np.float64], most: int) -> GreyBytes:
     return np.round(values * (255.0 / most)).clip(0, 255).astype(np.uint8)
 
 
-Values = TypeVar("Values", NDArray[np.uint16], GreyBytes)
-
-
-def _whole(values: Values, count: int, name: str) -> Values:
+def _check_whole(values: Sized, count: int, name: str) -> None:
     if len(values) < count:
         raise InputError(f"{name}: is cut off after {len(values)} of {count} pixels; copy or save it again")
-    return values[:count]
 
 
 def _check_size(columns: int, rows: int, name: str) -> None:
