@@ -10,8 +10,8 @@ from typing import Any
 import ifcopenshell
 import numpy as np
 
-from stopgo.planner.floors.linework.patterns import MOST_VERTICES
-
+MOST_VERTICES = 20_000
+"""Vertices of one outline, as of one line of a drawing."""
 LEAST_BYTES = 2
 """A vertex is written in no fewer bytes: `1,`."""
 _STATEMENT = re.compile(rb"#(\d+)\s*=\s*(\w+)")
