@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from stopgo.mission.geometry import FloatArray, IntArray, polyline_length
 from stopgo.planner.floors.lines_and_texts import Stroke
+from stopgo.planner.floors.linework.patterns import door_arcs
 from stopgo.planner.floors.linework.swings import swings_of
 
 DrawingBox = tuple[float, float, float, float]
@@ -92,7 +93,7 @@ def _drawing(strokes: Sequence[Stroke]) -> DrawingFound:
     return DrawingFound(
         (x0, y0, x1, y1),
         sum(polyline_length(item.points) for item in walls),
-        len(swings_of(doors)),
+        door_arcs(strokes) or len(swings_of(doors)),
         dict(sorted(Counter(item.role for item in strokes).items())),
     )
 

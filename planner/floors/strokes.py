@@ -165,9 +165,17 @@ def stretch_of(matrix: Matrix44 | None) -> float:
 
 
 def word_of(shape: Shape, *, scale: float) -> Word:
-    """The text of a shape, in metres; without text for a note."""
+    """The text of a shape, in metres; without text for a note. It is decoded once, in drawing units."""
     if shape.is_note:
         return Word("", shape.layer, shape.role)
+    if "word" not in shape.memo:
+        shape.memo["word"] = _written(shape)
+    text, places = shape.memo["word"]
+    return Word(text, shape.layer, shape.role, tuple((x * scale, y * scale) for x, y in places))
+
+
+def _written(shape: Shape) -> tuple[str, list[tuple[float, float]]]:
+    """The text of a shape, and its places in drawing units."""
     entity = shape.entity
     text = entity.plain_text() if hasattr(entity, "plain_text") else str(entity.dxf.text)
     values = entity.dxf.all_existing_dxf_attribs()
@@ -176,8 +184,7 @@ def word_of(shape: Shape, *, scale: float) -> Word:
     plane = OCS(values.get("extrusion", Z_AXIS)) if shape.kind != "MTEXT" else OCS()
     world = np.array([plane.to_wcs(Vec3(point)).xyz for point in points]).reshape(-1, 3)
     sound = [point for point in _flat(world, shape.matrix) if (np.abs(point) <= LARGEST).all()]
-    at = tuple((float(x) * scale, float(y) * scale) for x, y in sound)
-    return Word(legible(text), shape.layer, shape.role, at)
+    return legible(text), [(float(x), float(y)) for x, y in sound]
 
 
 def _damage(shape: Shape, error: Exception, *, scale: float) -> Finding:

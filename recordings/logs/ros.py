@@ -14,6 +14,7 @@ import numpy as np
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.given_file import file_digest
 from stopgo.recordings.logs import foxglove
+from stopgo.recordings.logs.bag_sizes import LARGEST_CHUNK, LONGEST_MESSAGE
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Sweep, fixes_of, poses_of
 from stopgo.recordings.logs.ros_bag import Bag, Damaged, Topic, UnknownType, files_of, salvaged_bag, whole_bag
 from stopgo.recordings.logs.ros_poses import TYPES, WITH_CHILD, PoseColumns, heading_of
@@ -24,6 +25,9 @@ POSES = (*TYPES, *foxglove.POSES)
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage", *foxglove.TRANSFORMS)
 FIXES = ("sensor_msgs/msg/NavSatFix", *foxglove.FIXES)
 BATTERY = "sensor_msgs/msg/BatteryState"
+LONGEST = dict.fromkeys((*POSES, *TRANSFORMS, *FIXES, BATTERY), LONGEST_MESSAGE)
+LONGEST_SWEEPS = dict.fromkeys(SWEEPS, LARGEST_CHUNK)
+"""Bytes that a message may have at most, by the types that are read."""
 SIMULATED_BELOW_NS = 10**18
 """Times before September 2001 are simulated, or count from a start."""
 NOT_THE_ROBOT = ("goal", "target", "setpoint", "initialpose", "plan", "desired", "reference")
@@ -41,7 +45,7 @@ def read_ros(path: Path, reading: Reading) -> FieldLog:
         When it is not a bag, or nothing in it can be read.
     """
     try:
-        with whole_bag(path) as bag:
+        with whole_bag(path, LONGEST) as bag:
             return _read_bag(path, bag, reading)
     except Damaged as damage:
         with _readable_bag(path, damage) as bag:
@@ -121,7 +125,7 @@ class _TopicSorter:
     """First and last time."""
 
     def wants(self, topic: Topic) -> bool:
-        return topic.msgtype in (*POSES, *TRANSFORMS, *FIXES, BATTERY)
+        return topic.msgtype in LONGEST
 
     def take(self, topic: Topic, ns: int, raw: bytes) -> None:
         self.counts[topic] += 1
@@ -131,6 +135,9 @@ class _TopicSorter:
         self.logged = [min(self.logged[0], ns), max(self.logged[1], ns)] if self.logged else [ns, ns]
         handler = self._handler_of(topic)
         if handler is None:
+            return
+        if len(raw) > LONGEST_MESSAGE:
+            self.faults[f"{topic.name}: longer than any {topic.msgtype}"] += 1
             return
         try:
             handler(topic, ns, raw)
@@ -272,19 +279,23 @@ def _rank(topic: str, msgtype: str, frame: str) -> int:
 def _sweeps(path: Path, reading: Reading) -> Iterator[Sweep]:
     """Yield the scans of the log, in order; of a damaged log, the readable ones."""
     try:
-        with whole_bag(path) as bag:
-            for _ in bag.messages(bag.topics):  # damage is found only by reading
+        with whole_bag(path, LONGEST_SWEEPS) as bag:
+            for _ in bag.messages(_with_sweeps(bag)):  # damage is found only by reading
                 pass
     except Damaged as damage:
         with _readable_bag(path, damage) as bag:
             yield from _sweeps_of(bag, reading)
         return
-    with whole_bag(path) as bag:
+    with whole_bag(path, LONGEST_SWEEPS) as bag:
         yield from _sweeps_of(bag, reading)
 
 
+def _with_sweeps(bag: Bag) -> list[Topic]:
+    return [topic for topic in bag.topics if topic.msgtype in SWEEPS]
+
+
 def _sweeps_of(bag: Bag, reading: Reading) -> Iterator[Sweep]:
-    for topic, ns, raw in bag.messages([topic for topic in bag.topics if topic.msgtype in SWEEPS]):
+    for topic, ns, raw in bag.messages(_with_sweeps(bag)):
         try:
             message = bag.decode(topic, raw)
         except UnknownType:

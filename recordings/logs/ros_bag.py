@@ -12,9 +12,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 
 from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.bag_sizes import Longest, check_mcap
+from stopgo.recordings.logs.bag_tables import tables_checked
 from stopgo.recordings.logs.salvage import Salvaged, salvage
 
 
@@ -80,13 +83,20 @@ def _natural(name: str) -> list[tuple[int, str]]:
 
 
 @contextmanager
-def whole_bag(path: Path) -> Iterator[Bag]:
+def whole_bag(path: Path, longest: Longest = MappingProxyType({})) -> Iterator[Bag]:
     """Open a bag with rosbags.
+
+    Parameters
+    ----------
+    longest
+        Bytes that a message may have at most, by the types that are read.
 
     Raises
     ------
     Damaged
         With the reason, when it is opened or while its messages are read.
+    InputError
+        When a table of a database is none, or a message that is read is too long.
     """
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -95,8 +105,11 @@ def whole_bag(path: Path) -> Iterator[Bag]:
         with _raising_damage():
             described = path.is_dir() and (path / METADATA).exists()
             paths = [path] if described else stack.enter_context(_unpacked(files_of(path)))
+            for file in files_of(path) if described else paths:
+                check_mcap(file, longest)
             reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-            stack.enter_context(reader)
+            with tables_checked(longest):
+                stack.enter_context(reader)
         yield _bag(reader)
 
 

@@ -21,6 +21,8 @@ from typing import NamedTuple
 from urllib.parse import quote
 
 from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.bag_sizes import LARGEST_CHUNK
+from stopgo.recordings.logs.bag_tables import check_salvaged
 
 Raw = tuple[int, int, bytes]
 """Number of the connection, time of logging (ns), and the bytes."""
@@ -243,8 +245,11 @@ def _mcap_stream(
             return
         if not 0 < operation < 0x80 or (end > len(data) and operation != 0x06):
             break
-        body = data[begin:end]
         at = end
+        if length > LARGEST_CHUNK:
+            loss.add(f"{name}: a record of {length} bytes is too long and was not read")
+            continue
+        body = data[begin:end]
         try:
             yield from _mcap_record(operation, body, name, loss, schemas)
         except (struct.error, UnicodeDecodeError):
@@ -312,11 +317,13 @@ def _bz2(body: bytes) -> bytes:
 
 
 def _piecewise(unpack: Callable[[bytes], bytes], body: bytes) -> bytes:
-    """Return the output before the first error."""
+    """Return the output before the first error, and of no more than a chunk may have."""
     from backports import zstd
 
     plain = bytearray()
     for at in range(0, len(body), STEP_BYTES):
+        if len(plain) > LARGEST_CHUNK:
+            break
         try:
             plain += unpack(body[at : at + STEP_BYTES])
         except (OSError, RuntimeError, EOFError, ValueError, zstd.ZstdError):
@@ -333,6 +340,7 @@ def _db3_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
         whole = _of_full_length(path, Path(folder))
         connection = sqlite3.connect(f"file:{quote(str(whole))}?immutable=1", uri=True)
         try:
+            check_salvaged(connection, path)
             topics = _rows(connection, "SELECT id, name, type FROM topics", path, loss)
             yield from (BagConnection(int(number), str(name), str(kind), "") for number, name, kind in topics)
             yield from _db3_messages(connection, path, loss)
@@ -371,9 +379,7 @@ def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> It
     after, step, last = 0, 1, 0
     while step < FARTHEST_ROW:
         try:
-            for row in connection.execute(
-                "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? ORDER BY id", (after,)
-            ):
+            for row in connection.execute(_ROWS, (LARGEST_CHUNK, after)):
                 if not after < row[0] < LAST_ROW:
                     raise sqlite3.DatabaseError("rows out of order")
                 if step > 1:
@@ -381,6 +387,8 @@ def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> It
                 after, step, last = row[0], 1, row[0]
                 if tuple(map(type, row)) == MESSAGE_ROW:
                     yield row[1:]
+                elif row[3] is None:
+                    loss.add(f"{path.name}: messages that are no bytes, or too long, were not read")
         except sqlite3.DatabaseError:
             after, step = after + step, step * 2
         else:
@@ -389,6 +397,11 @@ def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> It
         loss.add(f"{path.name}: rows from {last + 1} on cannot be read")
 
 
+_ROWS = (
+    "SELECT id, topic_id, timestamp, CASE WHEN typeof(data) = 'blob' AND length(data) <= ? THEN data END"
+    " FROM messages WHERE id > ? ORDER BY id"
+)
+"""Rows with their data, where these are bytes and no longer than a sweep's."""
 FARTHEST_ROW = 1 << 40
 LAST_ROW = 1 << 62
 MESSAGE_ROW = (int, int, int, bytes)

@@ -24,6 +24,7 @@ from stopgo.planner.floors.ifc.construction_dates import phases_by_product, task
 from stopgo.planner.floors.ifc.earth_placement import place_of
 from stopgo.planner.floors.ifc.kernel_shapes import Made, is_sound
 from stopgo.planner.floors.ifc.model import Described, Model, Product, Storey, packed
+from stopgo.planner.floors.ifc.outlines import too_many_vertices
 from stopgo.planner.floors.ifc.product_shapes import (
     BOX,
     UNCUT,
@@ -101,6 +102,9 @@ def main(arguments: list[str]) -> int:
     alone = frozenset(rest[1:])
     try:
         entities = _shaped_entities(model)
+        if fault := too_many_vertices(model, Path(path), entities):
+            Path(f"{out}.why").write_text(fault, encoding="utf-8")
+            return 2
         shapes = (
             one_by_one(model, entities, alone, Path(f"{out}.at")) if rest else all_at_once(model, entities)
         )

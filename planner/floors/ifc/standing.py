@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.ifc.class_kinds import IGNORED
@@ -45,16 +46,39 @@ def _faces(triangles: FloatArray, low: float, high: float) -> list[shapely.Geome
     """The part of each face between two heights, in plan: an area, or a line where it is upright."""
     z = triangles[..., 2]
     there = triangles[(z.max(axis=1) > low) & (z.min(axis=1) < high)]
-    points = (_above(_above(face, low, 1.0), high, -1.0) for face in there)
-    return [shapely.MultiPoint(part[:, :2]).convex_hull for part in points if len(part) > 1]
+    upper = _above(np.arange(len(there)), there, low, 1.0)
+    parts = [part for number, points in upper for part in _above(number, points, high, -1.0)]
+    parts = [(number, points) for number, points in parts if points.shape[1] > 1]
+    if not parts:
+        return []
+    hulls = np.concatenate([_hulls(points) for _, points in parts])
+    order = np.argsort(np.concatenate([number for number, _ in parts]))
+    return list(hulls[order])
 
 
-def _above(points: FloatArray, height: float, sign: float) -> FloatArray:
-    """The part of a polygon above a height, or below it where the sign is negative."""
-    if not len(points):
-        return points
-    up = sign * (points[:, 2] - height)
-    following, up_next = np.roll(points, -1, axis=0), np.roll(up, -1)
+def _hulls(points: FloatArray) -> NDArray[np.object_]:
+    """The convex hulls in plan of polygons (n, k, 3)."""
+    flat = shapely.points(points[..., :2].reshape(-1, 2))
+    index = np.repeat(np.arange(len(points)), points.shape[1])
+    hulls: NDArray[np.object_] = shapely.convex_hull(shapely.multipoints(flat, indices=index))
+    return hulls
+
+
+def _above(
+    number: NDArray[np.int64], points: FloatArray, height: float, sign: float
+) -> Iterator[tuple[NDArray[np.int64], FloatArray]]:
+    """Yield the parts of polygons (n, k, 3) above a height, or below it where the sign is negative.
+
+    Those with the same corners above it come together, with their numbers: they have as many vertices.
+    """
+    up = sign * (points[..., 2] - height)
+    following, up_next = np.roll(points, -1, axis=1), np.roll(up, -1, axis=1)
     crossing = (up < 0) != (up_next < 0)
-    fraction = np.divide(up, up - up_next, out=np.zeros_like(up), where=crossing)[:, None]
-    return np.vstack([points[up >= 0], (points + fraction * (following - points))[crossing]])
+    fraction = np.divide(up, up - up_next, out=np.zeros_like(up), where=crossing)[..., None]
+    crossed = points + fraction * (following - points)
+    pattern = (up < 0) @ (1 << np.arange(points.shape[1]))
+    for same in np.unique(pattern):
+        these = pattern == same
+        first = np.argmax(these)
+        kept = points[these][:, up[first] >= 0]
+        yield number[these], np.concatenate([kept, crossed[these][:, crossing[first]]], axis=1)

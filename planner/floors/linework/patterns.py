@@ -42,15 +42,21 @@ def pattern_in(strokes: Sequence[Stroke]) -> str:
     return next(_faults(strokes), "") or _many_doors(strokes)
 
 
-def _many_doors(strokes: Sequence[Stroke]) -> str:
-    """Return the fault of more arcs of doors than any storey has."""
+def door_arcs(strokes: Sequence[Stroke]) -> int:
+    """Number of arcs as wide as leaves on layers of doors, if they are more than any storey has; else 0."""
     arcs = [stroke for stroke in strokes if stroke.role in SWINGING and stroke.curved]
     if len(arcs) <= MOST_SWINGS:
-        return ""
+        return 0
     wide = sum(bool(np.ptp(stroke.points, axis=0).max() >= LEAST_LEAF_M) for stroke in arcs)
-    if wide <= MOST_SWINGS:
+    return wide if wide > MOST_SWINGS else 0
+
+
+def _many_doors(strokes: Sequence[Stroke]) -> str:
+    """Return the fault of more arcs of doors than any storey has."""
+    wide = door_arcs(strokes)
+    if not wide:
         return ""
-    layer = legible(arcs[0].layer)
+    layer = legible(next(item.layer for item in strokes if item.role in SWINGING and item.curved))
     return (
         f"{wide} arcs of doors on {layer}, more than {MOST_SWINGS}, as no storey has; choose a part with "
         "--region, or export one storey"

@@ -154,16 +154,19 @@ def _largest_floors(cells: NDArray[np.uint8], description: MapDescription, path:
     lone = (cells == UNKNOWN) & (others == 1)
     label, count = ndimage.label(free | lone)
     area = np.bincount(label[free], minlength=count + 1) * description.resolution**2
-    kept = np.isin(label, np.flatnonzero(area >= LEAST_FLOOR)) & (label > 0)
+    large = area >= LEAST_FLOOR
+    large[0] = False
+    kept = large[label]
     if not kept.any():
         unknown = np.count_nonzero(cells == UNKNOWN) / cells.size
         raise InputError(
             f"{path}: no floor is free on the map ({unknown:.0%} of its cells are unknown); "
             "check image, negate, mode and the thresholds"
         )
-    standing, _ = ndimage.label((cells == OCCUPIED) | kept, _EIGHT)
-    adjacent = np.unique(standing[kept])
-    return kept | (np.isin(standing, adjacent) & (cells == OCCUPIED))
+    standing, count = ndimage.label((cells == OCCUPIED) | kept, _EIGHT)
+    adjacent = np.zeros(count + 1, dtype=bool)
+    adjacent[standing[kept]] = True
+    return kept | (adjacent[standing] & (cells == OCCUPIED))
 
 
 def _small(occupied: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:

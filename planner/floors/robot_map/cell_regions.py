@@ -31,7 +31,7 @@ def _edges(mask: NDArray[np.bool_]) -> FloatArray:
     padded = np.pad(mask, 1)
     border = padded[1:, 1:-1] != padded[:-1, 1:-1]
     # A border that changes sides ends where it does so: there cells touch at a corner.
-    side = np.where(border, np.where(padded[1:, 1:-1], 1, -1), 0)
+    side = np.where(border, np.where(padded[1:, 1:-1], np.int8(1), np.int8(-1)), np.int8(0))
     steps = np.diff(np.pad(side, ((0, 0), (1, 1))), axis=1) != 0
     row, at = np.nonzero(steps)
     same = row[:-1] == row[1:]

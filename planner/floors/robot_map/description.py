@@ -44,16 +44,17 @@ class MapDescription:
         Unknown cells are recognised by the value that map savers write, whatever the thresholds are.
         Values between free and occupied of `scale` and `raw` are unknown: not drivable and not a target.
         """
-        grey = picture.grey.astype(np.float64)
-        written = [255 - value if self.negate else value for value in _WRITTEN_UNKNOWN[self.mode]]
-        known = picture.opaque & ~np.isin(picture.grey, written)
+        grey = np.arange(256.0)
+        known = ~np.isin(grey, [255 - v if self.negate else v for v in _WRITTEN_UNKNOWN[self.mode]])
         if self.mode == "raw":
             fraction, known = grey / 100.0, known & (grey <= 100)
         else:
             fraction = grey / 255.0 if self.negate else 1.0 - grey / 255.0
-        cells = np.full(grey.shape, UNKNOWN, dtype=np.uint8)
-        cells[known & (fraction < self.free_thresh)] = FREE
-        cells[known & (fraction > self.occupied_thresh)] = OCCUPIED
+        meaning = np.full(256, UNKNOWN, dtype=np.uint8)
+        meaning[known & (fraction < self.free_thresh)] = FREE
+        meaning[known & (fraction > self.occupied_thresh)] = OCCUPIED
+        cells = meaning[picture.grey]
+        cells[~picture.opaque] = UNKNOWN
         return cells[::-1]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import struct
+from collections.abc import Iterator, Sized
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ from stopgo.mission.errors import InputError
 
 GreyBytes = NDArray[np.uint8]
 MOST_PIXELS = 100_000_000
+_GAP, _PIECE = re.compile(rb"\s"), 1 << 20
+"""Numbers are cut into pieces of about so many bytes, between two of them."""
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -55,21 +58,47 @@ def _pgm(data: bytes, name: str) -> GreyPicture:
     if not 0 < most < 65536:
         raise ValueError(f"greatest value {most}")
     body = data[header.end() :]
-    if data[:2] == b"P2":
-        values = np.array(body.split()[: rows * columns], dtype=np.float64)
+    if data[:2] == b"P5" and most < 256:
+        values = np.frombuffer(body, dtype="u1")
+        _check_whole(values, rows * columns, name)
+        grey = _greys(np.arange(256.0), most)[values[: rows * columns]].reshape(rows, columns)
     else:
-        values = np.frombuffer(body, dtype=">u2" if most > 255 else "u1", count=-1).astype(np.float64)
-    values = _whole(values, rows * columns, name).reshape(rows, columns)
-    if not np.isfinite(values).all():
-        raise ValueError("a value is no number")
-    grey = np.round(values * (255.0 / most)).clip(0, 255).astype(np.uint8)
+        grey = _greys_of_numbers(data[:2], body, rows * columns, most, name).reshape(rows, columns)
     return GreyPicture(grey, np.ones(grey.shape, dtype=bool))
 
 
-def _whole(values: NDArray[np.float64], count: int, name: str) -> NDArray[np.float64]:
+def _greys_of_numbers(kind: bytes, body: bytes, count: int, most: int, name: str) -> GreyBytes:
+    """Greys of values that are written as numbers, or in two bytes."""
+    if kind == b"P5":
+        values = np.frombuffer(body, dtype=">u2")
+        _check_whole(values, count, name)
+        return _greys(values[:count].astype(np.float64), most)
+    pieces = [np.empty(0, np.uint8), *(_greys(piece, most) for piece in _numbers(body, count))]
+    greys = np.concatenate(pieces)
+    _check_whole(greys, count, name)
+    return greys
+
+
+def _numbers(body: bytes, count: int) -> Iterator[NDArray[np.float64]]:
+    """Yield written numbers in pieces: a list of all takes 60 bytes for each."""
+    at = 0
+    while at < len(body) and count > 0:
+        gap = _GAP.search(body, at + _PIECE)
+        end = gap.start() if gap else len(body)
+        values = np.array(body[at:end].split()[:count], dtype=np.float64)
+        if not np.isfinite(values).all():
+            raise ValueError("a value is no number")
+        yield values
+        at, count = end, count - len(values)
+
+
+def _greys(values: NDArray[np.float64], most: int) -> GreyBytes:
+    return np.round(values * (255.0 / most)).clip(0, 255).astype(np.uint8)
+
+
+def _check_whole(values: Sized, count: int, name: str) -> None:
     if len(values) < count:
         raise InputError(f"{name}: is cut off after {len(values)} of {count} pixels; copy or save it again")
-    return values[:count]
 
 
 def _check_size(columns: int, rows: int, name: str) -> None:

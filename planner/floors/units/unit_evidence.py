@@ -18,6 +18,7 @@ from ezdxf.entities import DXFEntity
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.drawing import BROKEN_INPUT
 from stopgo.planner.floors.drawn_shapes import Shape
+from stopgo.planner.floors.linework.patterns import MOST_SWINGS
 from stopgo.planner.floors.linework.swings import swings_of
 from stopgo.planner.floors.room_words import names_a_room
 from stopgo.planner.floors.strokes import sketch, stretch_of, strokes_of, word_of
@@ -39,6 +40,9 @@ _NAMES = 3
 """Fewer names of rooms tell no usual distance."""
 _LARGE = 5000
 """Shapes from which walls are compared in a process of their own."""
+_ARCS = ("ARC", "ELLIPSE", "SPLINE")
+_SOME_ARCS = 1000
+"""Of so many arcs of doors the radii are measured, if there are more than any storey has."""
 _LINEAR = (0, 1, 6)
 """Types of dimensions that measure a length: linear, aligned, ordinate."""
 
@@ -169,9 +173,18 @@ def _leaf_radii(own: Sequence[Shape], *, drawn_leaf: bool) -> list[float]:
     if not size:
         return []
     scale = _HOUSE / size
-    strokes, _, _ = strokes_of(own, scale=scale, chord=1e9)
+    strokes, _, _ = strokes_of(_some_arcs(own), scale=scale, chord=1e9)
     found = swings_of([stroke.points for stroke in strokes], width=(0.0, np.inf), drawn_leaf=drawn_leaf)
     return [swing.radius / scale for swing in found]
+
+
+def _some_arcs(shapes: Sequence[Shape]) -> Sequence[Shape]:
+    """All shapes, or of more arcs than any storey has some, evenly, with the other shapes."""
+    arcs = [k for k, shape in enumerate(shapes) if shape.entity.dxftype() in _ARCS]
+    if len(arcs) <= MOST_SWINGS:
+        return shapes
+    left_out = set(arcs).difference(arcs[:: len(arcs) // _SOME_ARCS])
+    return [shape for k, shape in enumerate(shapes) if k not in left_out]
 
 
 def _thickness(shapes: Sequence[Shape], size: float) -> float | None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import struct
 import tracemalloc
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import ezdxf
 import numpy as np
 import pytest
 import shapely
+from ezdxf.entities import Text
 from numpy.typing import NDArray
 
 from stopgo.mission.errors import InputError
@@ -21,9 +23,11 @@ from stopgo.planner.floors.drawn import Open, drawn
 from stopgo.planner.floors.dxf_sheet import drawings_text
 from stopgo.planner.floors.ifc.loading import _unzipped
 from stopgo.planner.floors.lines_and_texts import Stroke
-from stopgo.planner.floors.linework import patterns
-from stopgo.planner.floors.robot_map.grey_picture import read_picture
-from stopgo.planner.floors.units import room_texts
+from stopgo.planner.floors.linework import patterns, swings
+from stopgo.planner.floors.robot_map import cell_regions, grey_picture
+from stopgo.planner.floors.robot_map.description import MapDescription
+from stopgo.planner.floors.robot_map.grey_picture import GreyPicture, read_picture
+from stopgo.planner.floors.units import room_texts, unit_evidence
 from stopgo.planner.space.opening_joins import PROBES, _sides
 
 
@@ -128,6 +132,56 @@ def test_more_arcs_of_doors_than_any_storey_has_are_refused(
         read_floor(tmp_path / "doors.dxf", FloorOptions(units="m"))
 
 
+def test_each_text_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Names, areas and sides are sought in the same texts, and the words of the floor are read after them."""
+    decoded = []
+    plain_text = Text.plain_text
+
+    def counted(text: Text) -> str:
+        decoded.append(text.dxf.handle)
+        return plain_text(text)
+
+    monkeypatch.setattr(Text, "plain_text", counted)
+    drawing = ezdxf.new("R2010", units=6)
+    space = drawing.modelspace()
+    for layer in ("FLOOR", "WALLS"):
+        space.add_lwpolyline([(0, 0), (9, 0), (9, 9), (0, 9)], close=True, dxfattribs={"layer": layer})
+    for k in range(8):
+        layer = "A-ROOM" if k % 2 else "NOTES"
+        space.add_text(f"Office {k}", dxfattribs={"layer": layer, "insert": (1 + k, 1), "height": 0.2})
+    drawing.saveas(tmp_path / "texts.dxf")
+    read_floor(tmp_path / "texts.dxf")
+    assert len(decoded) == len(set(decoded)) == 8
+
+
+def test_of_very_many_arcs_some_show_the_unit_and_none_the_swings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All arcs were searched three times before their number was refused."""
+    fitted = []
+    fit = swings._fitted
+
+    def counted(arc: NDArray[np.float64]) -> swings.Swing | None:
+        fitted.append(arc)
+        return fit(arc)
+
+    monkeypatch.setattr(swings, "_fitted", counted)
+    for module in (patterns, unit_evidence):
+        monkeypatch.setattr(module, "MOST_SWINGS", 30)
+    monkeypatch.setattr(unit_evidence, "_SOME_ARCS", 10)
+    drawing = ezdxf.new("R2010", units=6)
+    space = drawing.modelspace()
+    for out in (0.0, 0.2):
+        ring = [(-out, -out), (90 + out, -out), (90 + out, 9 + out), (-out, 9 + out)]
+        space.add_lwpolyline(ring, close=True, dxfattribs={"layer": "A-WALL"})
+    for k in range(40):
+        space.add_arc((2.0 * k + 1, 4), 0.9, 0, 90, dxfattribs={"layer": "A-DOOR"})
+    drawing.saveas(tmp_path / "doors.dxf")
+    with pytest.raises(InputError, match="40 arcs of doors on A-DOOR, more than 30"):
+        read_floor(tmp_path / "doors.dxf")
+    assert len(fitted) == 10
+
+
 def test_rooms_beside_an_opening_are_probed_no_farther_than_the_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -170,6 +224,37 @@ def test_a_map_of_very_many_specks_is_refused(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(robot_map_reader, "MOST_SPECKS", 99)
     with pytest.raises(InputError, match=r"100 groups of occupied cells smaller than 0.5 m, more than 99"):
         read_floor(robot_map(tmp_path, occupied))
+
+
+def peak_of(work: Callable[[], object]) -> int:
+    """Most bytes that are held at once."""
+    tracemalloc.start()
+    work()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak
+
+
+def test_a_row_of_very_many_cells_takes_few_bytes_for_each() -> None:
+    """20 million of them took 1.25 GB."""
+    count = 200_000
+    row = np.ones((1, count), dtype=bool)
+    assert peak_of(lambda: cell_regions._edges(row)) < 25 * count
+    picture = GreyPicture(np.full((1, count), 254, dtype=np.uint8), np.ones((1, count), dtype=bool))
+    described = MapDescription("map.pgm", 0.05, (0, 0, 0))
+    assert peak_of(lambda: described.cells(picture)) < 10 * count
+
+
+@pytest.mark.parametrize("kind", ["P2", "P5"])
+def test_pictures_are_read_in_few_bytes_for_each_pixel(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    count = 200_000
+    values = b"254 " * count if kind == "P2" else b"\xfe" * count
+    data = b"%s\n%d 1\n255\n" % (kind.encode(), count) + values
+    monkeypatch.setattr(grey_picture, "_PIECE", 1000)
+    found = []
+    assert peak_of(lambda: found.append(read_picture(data, name="map.pgm"))) < 10 * count
+    assert (found[0].grey == 254).all()
+    assert found[0].grey.shape == (1, count)
 
 
 @pytest.mark.filterwarnings("error")
