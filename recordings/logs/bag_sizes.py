@@ -121,7 +121,7 @@ def _text(head: memoryview, at: int) -> tuple[str, int]:
 
 def _frame(head: memoryview) -> int:
     """Length that the compressed data of a chunk states for itself; 0 if it does not."""
-    from backports import zstd
+    from stopgo.recordings.logs.zstandard import zstd
 
     compression, at = _text(head, 28)
     if compression != "zstd":

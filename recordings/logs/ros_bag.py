@@ -125,7 +125,7 @@ def _unpacked(files: Sequence[Path]) -> Iterator[list[Path]]:
 
 def _plain(file: Path, folder: Path) -> Path:
     """Decompress a file as far as possible."""
-    from backports import zstd
+    from stopgo.recordings.logs.zstandard import zstd
 
     target = folder / file.stem
     unpack = zstd.ZstdDecompressor()
@@ -148,16 +148,17 @@ def _raising_damage() -> Iterator[None]:
 
 def _damage() -> tuple[type[Exception], ...]:
     """Return the exceptions that reading a damaged file raises, also those of rosbags' own SQLite."""
-    from backports.zstd import ZstdError
     from rosbags.highlevel import AnyReaderError
     from rosbags.rosbag1 import ReaderError as Error1
     from rosbags.rosbag2 import ReaderError as Error2
     from rosbags.typesys import TypesysError
 
+    from stopgo.recordings.logs.zstandard import zstd
+
     apsw = sys.modules.get("apsw")
     of_database = () if apsw is None else (apsw.Error,)
     odd = (TypeError, AttributeError)  # of columns whose values are of another type
-    return (AnyReaderError, Error1, Error2, TypesysError, ZstdError, *odd, *LOW_LEVEL, *of_database)
+    return (AnyReaderError, Error1, Error2, TypesysError, zstd.ZstdError, *odd, *LOW_LEVEL, *of_database)
 
 
 LOW_LEVEL = (

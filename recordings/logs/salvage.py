@@ -307,7 +307,7 @@ def _lz4(body: bytes) -> bytes:
 
 
 def _zstd(body: bytes) -> bytes:
-    from backports import zstd
+    from stopgo.recordings.logs.zstandard import zstd
 
     return _piecewise(zstd.ZstdDecompressor().decompress, body)
 
@@ -318,7 +318,7 @@ def _bz2(body: bytes) -> bytes:
 
 def _piecewise(unpack: Callable[[bytes], bytes], body: bytes) -> bytes:
     """Return the output before the first error, and of no more than a chunk may have."""
-    from backports import zstd
+    from stopgo.recordings.logs.zstandard import zstd
 
     plain = bytearray()
     for at in range(0, len(body), STEP_BYTES):

@@ -44,7 +44,7 @@ def test_a_bag_without_metadata_and_a_raw_file_are_read_whole(tmp_path: Path, na
 
 
 def test_a_packed_file_is_read(tmp_path: Path) -> None:
-    from backports import zstd
+    from stopgo.recordings.logs.zstandard import zstd
 
     (part,) = (p for p in written(tmp_path, "a.db3").iterdir() if p.suffix == ".db3")
     packed = tmp_path / "a.db3.zstd"
